@@ -1,0 +1,37 @@
+"""Typed errors of the mathematics: every text says what is wrong, how many points, and what to do."""
+
+
+class PointCloudError(ValueError):
+    """A point cloud, or a question asked of it, that has no sound answer."""
+
+
+class InvalidPointsError(PointCloudError):
+    """Coordinates of the wrong shape or type, not finite, or too coarse for their distance from the origin."""
+
+
+class TooFewPointsError(PointCloudError):
+    """Fewer points than the neighbourhoods, or the question, need."""
+
+
+class NotASurfaceError(PointCloudError):
+    """Points along a line or a curve, so that no tangent plane exists."""
+
+
+class IslandError(PointCloudError):
+    """A few points far from all others, too few for an operator of their own."""
+
+
+class AreaError(PointCloudError):
+    """An area estimate that is not positive everywhere."""
+
+
+class UnresolvedModesError(PointCloudError):
+    """More vibration modes asked for than the smoothing length resolves."""
+
+
+class SolverError(PointCloudError):
+    """An iterative solver that did not reach its tolerance."""
+
+
+class Cancelled(Exception):
+    """Raised by a progress callback to stop the work; nothing was changed."""

@@ -1,0 +1,81 @@
+"""Every setting of the operator, with defaults that serve scans."""
+
+from dataclasses import dataclass
+
+from .errors import PointCloudError
+
+_CHOICES = {
+    "bandwidth": ("local", "global"),
+    "normals": ("quadric", "wpca", "pca"),
+    "areas": ("fast", "regularized", "constrained", "uniform"),
+}
+
+
+@dataclass(frozen=True)
+class LaplacianOptions:
+    """Settings of `build_laplacian`.
+
+    Parameters
+    ----------
+    bandwidth : {"local", "global"}
+        "local": a smoothing length per point that follows the spacing, h_ij the mean of both ends. "global": one for
+        all points, as in the paper.
+    neighbors : int
+        The smoothing length is measured by the distance to this neighbour.
+    bandwidth_factor : float
+        h = bandwidth_factor * distance to the neighbour named above. The kernel reaches 3 h.
+    normals : {"quadric", "wpca", "pca"}
+        Where no normals are given: from a local quadric, or from the covariance of the neighbourhood, weighted by the
+        kernel (eq. 9) or not.
+    orient : bool
+        Orient the estimated normals consistently, outwards on closed surfaces.
+    areas : {"fast", "regularized", "constrained", "uniform"}
+        "fast": the unit-integral condition (eq. 6) regularised towards the density areas, with a lower bound.
+        "regularized": eq. (7). "constrained": eq. (8). "uniform": the mean of eq. (7) for every point.
+    regularization : float
+        rho of eqs. (7) and (8), in coordinates scaled to a root mean square radius of one.
+    curvature_correction : bool
+        Measure distances along the surface and correct areas and weights for its Gaussian curvature. Without it,
+        eqs. (6) and (10) as they stand: distances in space for the areas, in the mean-normal plane for the weights.
+    symbol_correction : bool
+        Correct eigenvalues and `apply` for the known effect of the kernel's width on a flat patch.
+    """
+
+    bandwidth: str = "local"
+    neighbors: int = 100
+    bandwidth_factor: float = 0.55
+    normals: str = "quadric"
+    orient: bool = False
+    areas: str = "fast"
+    regularization: float = 1e-3
+    curvature_correction: bool = True
+    symbol_correction: bool = True
+
+    def __post_init__(self):
+        for name, choices in _CHOICES.items():
+            value = getattr(self, name)
+            if value not in choices:
+                raise PointCloudError(f"Option {name} is {value!r}. Choose one of {', '.join(choices)}.")
+        if int(self.neighbors) != self.neighbors or self.neighbors < 6:
+            raise PointCloudError(f"Option neighbors is {self.neighbors!r}. Use a whole number of at least 6.")
+        for name in ("bandwidth_factor", "regularization"):
+            if not getattr(self, name) > 0.0:
+                raise PointCloudError(f"Option {name} is {getattr(self, name)!r}. Use a number above zero.")
+        # About 9 factor^2 neighbors points share a support of 3 h on an even sample; ten keep a plane well determined.
+        if 9.0 * self.bandwidth_factor**2 * self.neighbors < 10.0:
+            raise PointCloudError(
+                f"A bandwidth factor of {self.bandwidth_factor:g} with {self.neighbors} neighbors leaves fewer than 10"
+                " points inside the kernel. Raise one of them."
+            )
+
+    @classmethod
+    def paper(cls):
+        """Return the paper's own setting: global h, WPCA normals, eq. (8) with rho = 1e-3, no corrections."""
+        return cls(
+            bandwidth="global",
+            bandwidth_factor=1.0,
+            normals="wpca",
+            areas="constrained",
+            curvature_correction=False,
+            symbol_correction=False,
+        )

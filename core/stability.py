@@ -1,0 +1,80 @@
+"""The assumptions and conclusions of the paper's Theorem 1, measured on an operator."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What Theorem 1 asks of a cloud, and what it promises of the operator.
+
+    Attributes
+    ----------
+    area_ratio : float
+        (A1) Largest area over the smallest.
+    fill_distance : float
+        (A2) Largest distance of a point to its sixth neighbour [L]: no hole among the points is much wider.
+    most_neighbors : int
+        (A3) Most points inside one support.
+    least_bandwidth : float
+        (A4) Least ratio of the smoothing length to the distance of the sixth neighbour.
+    row_sum, column_sum : float
+        Largest entry of L e and of areas . L, relative to the largest diagonal entry: both vanish, for e spans the
+        kernel of L and the areas that of its transpose.
+    parts : int
+        Dimension of the kernel: connected parts of the operator's graph.
+    """
+
+    area_ratio: float
+    fill_distance: float
+    most_neighbors: int
+    least_bandwidth: float
+    row_sum: float
+    column_sum: float
+    parts: int
+
+    def concerns(self):
+        """Return a sentence for each assumption that does not hold comfortably; none for a sound operator."""
+        found = []
+        if self.area_ratio > 1e4:
+            found.append(f"(A1) The areas differ by a factor of {self.area_ratio:.3g}.")
+        if self.least_bandwidth < 0.8:
+            found.append(
+                f"(A2, A4) Somewhere the smoothing length is only {self.least_bandwidth:.2g} times the distance to the"
+                " sixth neighbor."
+            )
+        if self.most_neighbors > 5000:
+            found.append(f"(A3) One support holds {self.most_neighbors} points.")
+        if self.parts > 1:
+            found.append(f"The operator falls into {self.parts} parts, each with its own constant.")
+        return found
+
+
+def check_stability(laplacian):
+    """Measure the assumptions (A1) to (A4) of Theorem 1 and the two kernels it names.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+
+    Returns
+    -------
+    Stability
+        (A5) holds for the kernel by construction; (A6) concerns rims, which have no part in this.
+    """
+    distinct, first = np.unique(laplacian.points, axis=0, return_index=True)
+    reach = cKDTree(distinct).query(distinct, k=[min(7, len(distinct))], workers=-1)[0][:, 0]
+    stiffness, areas = laplacian.stiffness, laplacian.areas
+    largest = stiffness.diagonal().max()
+    return Stability(
+        float(areas.max() / areas.min()),
+        float(reach.max()),
+        int(np.diff(stiffness.indptr).max()),
+        float((laplacian.smoothing_lengths[first] / reach).min()),
+        float(np.abs(stiffness.sum(axis=1)).max() / largest),
+        float(np.abs(stiffness.sum(axis=0)).max() / largest),
+        int(connected_components(stiffness, directed=False, return_labels=False)),
+    )
