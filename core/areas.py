@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, lsmr
 
 from .distances import arc_length
 from .errors import AreaError
@@ -130,8 +129,8 @@ def fast_areas(matrix, target):
 
     With M = V0^(1/2) A V0^(1/2), whose eigenvalues lie in [0, 1] whatever the points, each round runs Chebyshev's
     semi-iteration on M y = V0^(1/2) b for v = V0^(1/2) y, over the eigenvalues above 3e-3: the smooth part is solved
-    for, and what the kernel cannot see stays near the density areas. Between rounds areas below the floor of 0.05 v0 are
-    put on it, held there, and released when the gradient turns inward. A fixed number of linear steps, unlike conjugate
+    for, and what the kernel cannot see stays near the density areas. Between rounds areas below the floor of 0.05 v0
+    are put on it, held there, and released when the gradient turns inward. A fixed number of linear steps, unlike conjugate
     gradients, does not amplify rounding: the result is the same to 1e-11 for any order of the points.
 
     Parameters
@@ -169,28 +168,37 @@ def fast_areas(matrix, target):
     return AreaSolution(root * y, 1 + _ROUNDS * (1 + _STEPS), float(held.mean()), True)
 
 
-def regularized_areas(matrix, target, rho, atol=1e-8, products=4000):
+def regularized_areas(matrix, target, rho, products=8000, rtol=1e-10):
     """Minimise |A v - b|^2 + rho |v|^2, eq. (7), without a bound.
 
-    Unknowns are u = v / v0 for conditioning only.
+    A is symmetric, so the solution (A^2 + rho)^(-1) A b is the real part of (A + i sqrt(rho))^(-1) b. That system has
+    the square root of the other one's condition number; it is solved by conjugate gradients for complex symmetric
+    matrices (COCG; van der Vorst and Melissen 1990), preconditioned by the density areas.
 
     Returns
     -------
     AreaSolution
-        Areas may be negative where the density jumps.
+        Areas may be negative where the points are irregular.
     """
-    n = len(target)
-    density = 1.0 / (matrix @ np.ones(n))
-    damping = np.sqrt(rho) * density
-    operator = LinearOperator(
-        (2 * n, n),
-        matvec=lambda u: np.concatenate([matrix @ (density * u), damping * u]),
-        rmatvec=lambda w: density * (matrix @ w[:n]) + damping * w[n:],
-        dtype=np.float64,
-    )
-    right = np.concatenate([target, np.zeros(n)])
-    solution = lsmr(operator, right, atol=atol, btol=atol, conlim=0.0, maxiter=products // 2, x0=np.ones(n))
-    return AreaSolution(density * solution[0], 2 * solution[2], 0.0, solution[1] != 7)
+    density = 1.0 / (matrix @ np.ones(len(target)))
+    shift = 1j * np.sqrt(rho)
+    v = np.zeros(len(target), dtype=complex)
+    residual = target.astype(complex)
+    direction = density * residual
+    moment = residual @ direction  # without conjugation, here and below
+    used = 1
+    while used + 2 <= products:
+        image = (matrix @ direction.real) + 1j * (matrix @ direction.imag) + shift * direction
+        used += 2
+        length = moment / (direction @ image)
+        v += length * direction
+        residual -= length * image
+        if np.linalg.norm(residual) <= rtol * np.linalg.norm(target):
+            return AreaSolution(v.real, used, 0.0, True)
+        scaled = density * residual
+        moment, previous = residual @ scaled, moment
+        direction = scaled + (moment / previous) * direction
+    return AreaSolution(v.real, used, 0.0, False)
 
 
 def constrained_areas(matrix, target, rho, products=4000, rtol=1e-6):
@@ -215,7 +223,7 @@ def constrained_areas(matrix, target, rho, products=4000, rtol=1e-6):
         rtol,
     )
     held = float(np.mean(u <= TAU / density))
-    return AreaSolution(density * u, start.products + 2 * used, held, converged)
+    return AreaSolution(np.maximum(density * u, TAU), start.products + 2 * used, held, converged)
 
 
 def bounded_quadratic(product, right, lower, start, norm, products, rtol):

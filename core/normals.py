@@ -68,7 +68,7 @@ def covariance_normals(neighborhoods, weighted=True):
         moments[:, 4:] - mean[:, axes[0]] * mean[:, axes[1]]
     )
     variances, directions = np.linalg.eigh(covariance)
-    curve = np.count_nonzero(variances[:, 1] < 1e-4 * variances[:, 2])
+    curve = np.count_nonzero(variances[:, 1] < 5e-3 * variances[:, 2])
     if curve > 0.01 * len(points):
         raise NotASurfaceError(
             f"Around {curve} of {len(points)} points the neighbors lie along a curve, so there is no tangent plane."

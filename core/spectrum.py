@@ -83,8 +83,8 @@ def correct_eigenvalues(laplacian, values, vectors):
     """
     squared = (laplacian.areas * laplacian.smoothing_lengths**2) @ vectors**2
     corrected = inverse_symbol(values * squared) ** 2 / squared
-    resolved = int(np.count_nonzero(np.isfinite(corrected)))
-    if resolved < len(values):
+    if not np.isfinite(corrected).all():
+        resolved = int(np.argmin(np.isfinite(corrected)))
         raise UnresolvedModesError(
             f"The {len(values)} modes asked for vary faster than the smoothing length resolves: {resolved} are resolved"
             f" on {len(laplacian.areas)} points. Ask for at most {resolved}, or lower the number of neighbors."

@@ -137,7 +137,7 @@ def fit_quadrics(tree):
         offset = points[near] - points[block, None]
         centered = offset - (weight * offset).sum(axis=1, keepdims=True) / weight.sum(axis=1, keepdims=True)
         variance, frame = np.linalg.eigh(np.swapaxes(weight * centered, 1, 2) @ centered)
-        curves += np.count_nonzero(variance[:, 1] < 1e-4 * variance[:, 2])
+        curves += np.count_nonzero(variance[:, 1] < 5e-3 * variance[:, 2])
         unit = distance[:, -1]  # the equations are well scaled in units of the farthest neighbour's distance
         z, v, u = np.moveaxis(offset @ frame / unit[:, None, None], 2, 0)
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)

@@ -1,0 +1,133 @@
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import fibonacci_sphere, marching_cubes_sphere, random_sphere, torus_points, uneven_sphere
+from core.areas import TAU, KernelMatrix, bounded_quadratic, constrained_areas, fast_areas, regularized_areas
+from core.neighbors import find_neighborhoods
+from core.options import LaplacianOptions
+
+SPHERE = 4.0 * np.pi
+METHODS = ["fast", "regularized", "constrained", "uniform"]
+
+
+@pytest.fixture(scope="module")
+def uneven():
+    options = LaplacianOptions(bandwidth="global", bandwidth_factor=0.5)
+    neighborhoods = find_neighborhoods(uneven_sphere(1500), options)
+    return KernelMatrix(neighborhoods, neighborhoods.distance), np.ones(1500)
+
+
+def objective(matrix, areas, target, rho=1e-3):
+    return np.sum((matrix @ areas - target) ** 2) + rho * areas @ areas
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_even_sphere(method):
+    areas = core.estimate_areas(fibonacci_sphere(2000), options=LaplacianOptions(areas=method))
+    assert np.all(areas > 0.0)
+    assert areas.sum() == pytest.approx(SPHERE, rel=2e-3)
+    assert areas.std() < 0.03 * areas.mean()
+
+
+@pytest.mark.parametrize("points", [random_sphere(4000), marching_cubes_sphere(30)], ids=["random", "marching cubes"])
+def test_irregular_spheres(points):
+    areas = core.estimate_areas(points)
+    assert np.all(areas > 0.0)
+    assert areas.sum() == pytest.approx(SPHERE, rel=1e-3)
+
+
+def test_torus():
+    assert core.estimate_areas(torus_points(6000)).sum() == pytest.approx(4.0 * np.pi**2 * 0.4, rel=3e-3)
+
+
+def test_density_jump():
+    points = uneven_sphere(5000)
+    areas = core.estimate_areas(points)
+    assert np.all(areas > 0.0)
+    assert areas.sum() == pytest.approx(SPHERE, rel=1e-2)
+    assert areas[points[:, 2] < -0.3].mean() / areas[points[:, 2] > 0.3].mean() == pytest.approx(9.0, rel=0.05)
+
+
+def test_areas_are_the_operators_own():
+    points = random_sphere(900)
+    np.testing.assert_array_equal(core.estimate_areas(points), core.build_laplacian(points).areas)
+    np.testing.assert_array_equal(
+        core.estimate_areas(points, normals=points), core.build_laplacian(points, normals=points).areas
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_scale_shift_rotation_and_order(method):
+    sphere = random_sphere if method == "fast" else fibonacci_sphere  # eqs. (7) and (8) need wide kernels elsewhere
+    points = sphere(1200) * [1.0, 0.8, 0.6]
+    options = LaplacianOptions(areas=method)
+    areas = core.estimate_areas(points, options=options)
+    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+    order = np.random.default_rng(1).permutation(len(points))
+    for scale in (1e-3, 1e3):
+        moved = core.estimate_areas((scale * points @ turn + scale * 3.0)[order], options=options)
+        np.testing.assert_allclose(moved, scale**2 * areas[order], rtol=1e-6)
+
+
+def test_the_plain_linear_system_goes_negative_and_says_so():
+    options = LaplacianOptions(bandwidth="global", bandwidth_factor=0.5, areas="regularized")
+    with pytest.raises(core.AreaError, match="not positive.*'fast'"):
+        core.build_laplacian(uneven_sphere(1500), options=options)
+
+
+def test_regularized_areas_solve_the_normal_equations():
+    options = LaplacianOptions(bandwidth="global", bandwidth_factor=0.8)
+    neighborhoods = find_neighborhoods(random_sphere(400), options)
+    matrix = KernelMatrix(neighborhoods, neighborhoods.distance)
+    dense = np.column_stack([matrix @ column for column in np.eye(400)])
+    exact = np.linalg.solve(dense @ dense + 1e-3 * np.eye(400), dense @ np.ones(400))
+    np.testing.assert_allclose(regularized_areas(matrix, np.ones(400), 1e-3).areas, exact, rtol=1e-4)
+
+
+def test_constrained_areas_keep_the_bound_and_are_optimal(uneven):
+    matrix, target = uneven
+    solution = constrained_areas(matrix, target, 1e-3, products=40_000)
+    assert solution.converged
+    areas = solution.areas
+    assert areas.min() >= TAU
+    gradient = 2.0 * (matrix @ (matrix @ areas - target) + 1e-3 * areas)
+    scale = np.abs(2.0 * (matrix @ target)).max()
+    held = areas <= TAU
+    assert held.any()
+    assert np.abs(gradient[~held]).max() < 1e-4 * scale
+    assert gradient[held].min() > -1e-4 * scale
+
+
+def test_constrained_areas_are_better_than_any_clipped_ones(uneven):
+    matrix, target = uneven
+    best = objective(matrix, constrained_areas(matrix, target, 1e-3).areas, target)
+    assert best < objective(matrix, np.maximum(regularized_areas(matrix, target, 1e-3).areas, TAU), target)
+    assert best < objective(matrix, 1.0 / (matrix @ target), target)
+    assert best < objective(matrix, fast_areas(matrix, target).areas, target)
+
+
+def test_fast_areas_improve_on_density(uneven):
+    matrix, target = uneven
+    density = 1.0 / (matrix @ target)
+    areas = fast_areas(matrix, target).areas
+    assert np.all(areas >= 0.05 * density * (1.0 - 1e-12))
+    assert np.sum((matrix @ areas - target) ** 2) < 5e-2 * np.sum((matrix @ density - target) ** 2)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bounded_quadratic_meets_the_optimality_conditions(seed):
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((40, 40))
+    matrix = root @ root.T + 0.1 * np.eye(40)
+    right, lower = rng.standard_normal(40), -0.1 * rng.random(40)
+    norm = np.linalg.norm(matrix, 2)
+    x, used, converged = bounded_quadratic(lambda v: matrix @ v, right, lower, np.zeros(40), norm, 5000, 1e-10)
+    assert converged
+    assert used < 5000
+    gradient = matrix @ x - right
+    assert np.all(x >= lower)
+    held = x <= lower
+    assert held.any()
+    assert np.abs(gradient[~held]).max() < 1e-8
+    assert gradient[held].min() > -1e-8

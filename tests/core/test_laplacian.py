@@ -1,0 +1,217 @@
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import (
+    fibonacci_sphere,
+    icosahedral_sphere,
+    marching_cubes_sphere,
+    random_sphere,
+    torus_points,
+)
+
+
+def relative(found, exact):
+    return np.linalg.norm(found - exact) / np.linalg.norm(exact)
+
+
+def sphere_errors(laplacian):
+    """Relative l2 errors of L x, L x^2, L e^x on the unit sphere."""
+    x = laplacian.points[:, 0]
+    return (
+        relative(laplacian.apply(x), -2.0 * x),
+        relative(laplacian.apply(x**2), 2.0 - 6.0 * x**2),
+        relative(laplacian.apply(np.exp(x)), np.exp(x) * (1.0 - x**2 - 2.0 * x)),
+    )
+
+
+@pytest.fixture(scope="module")
+def torus():
+    return core.build_laplacian(torus_points(2500))
+
+
+@pytest.fixture(scope="module", params=["default", "plain", "paper"])
+def any_operator(request):
+    options = {
+        "default": core.LaplacianOptions(),
+        "plain": core.LaplacianOptions(curvature_correction=False, normals="wpca"),
+        "paper": core.LaplacianOptions.paper(),
+    }[request.param]
+    return core.build_laplacian(random_sphere(1500) * [1.0, 0.9, 0.7], options=options)
+
+
+class TestStructure:
+    def test_symmetric_to_the_last_bit(self, any_operator):
+        assert abs(any_operator.stiffness - any_operator.stiffness.T).max() == 0.0
+
+    def test_rows_sum_to_zero(self, any_operator):
+        rows = np.abs(any_operator.stiffness.sum(axis=1))
+        assert np.all(rows <= 1e-10 * any_operator.stiffness.diagonal())
+
+    def test_pair_weights_are_not_negative(self, any_operator):
+        entries = any_operator.stiffness.tocoo()
+        assert np.all(entries.data[entries.row != entries.col] <= 0.0)
+
+    def test_positive_semi_definite_with_one_zero(self, any_operator):
+        values = np.linalg.eigvalsh(any_operator.stiffness.toarray())
+        assert values[0] >= -1e-10 * values[-1]
+        assert values[1] > 1e-6 * values[-1]
+
+    def test_real_spectrum_by_symmetry_for_the_areas(self, any_operator):
+        f, g = np.random.default_rng(0).standard_normal((2, len(any_operator.areas)))
+        left = f @ (any_operator.areas * any_operator.apply(g))
+        assert left == pytest.approx(g @ (any_operator.areas * any_operator.apply(f)), rel=1e-9)
+
+    def test_negative_semi_definite_in_its_strong_form(self, any_operator):
+        for f in np.random.default_rng(0).standard_normal((5, len(any_operator.areas))):
+            assert f @ (any_operator.areas * any_operator.apply(f)) < 0.0
+
+    def test_index_type_suits_every_solver(self, any_operator):
+        assert any_operator.stiffness.indices.dtype == np.int32
+        assert any_operator.stiffness.has_sorted_indices
+
+
+class TestPaper:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def errors(cls):
+        points = icosahedral_sphere(28)
+        assert len(points) == 7842
+        laplacian = core.build_laplacian(points, options=core.LaplacianOptions.paper())
+        return sphere_errors(laplacian), laplacian.areas.sum()
+
+    def test_figure_3_uniform_sphere_with_wpca_normals(self, errors):
+        assert errors[0][1] == pytest.approx(24.5e-3, rel=0.05)
+        assert errors[0][2] == pytest.approx(19.4e-3, rel=0.05)
+
+    def test_figure_2_area(self, errors):
+        assert errors[1] == pytest.approx(4.0 * np.pi, rel=1e-4)
+
+
+class TestAccuracy:
+    @pytest.mark.parametrize("seed", [0, 11])
+    def test_random_sphere(self, seed):
+        laplacian = core.build_laplacian(random_sphere(8000, seed))
+        assert max(sphere_errors(laplacian)[:2]) < 1e-2
+        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-3)
+
+    def test_marching_cubes_sphere(self):
+        laplacian = core.build_laplacian(marching_cubes_sphere(39))
+        assert max(sphere_errors(laplacian)[:2]) < 1e-2
+        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=5e-4)
+
+    def test_even_sphere(self):
+        assert max(sphere_errors(core.build_laplacian(fibonacci_sphere(4000)))) < 3e-3
+
+    def test_curvature_correction_helps_where_the_surface_bends_two_ways(self):
+        points = torus_points(8000)
+        major, minor = 1.0, 0.4
+        radius = np.linalg.norm(points[:, :2], axis=1)
+        cosine = (radius - major) / minor
+        sine = points[:, 2] / minor
+        # z = r sin v has the Laplacian (1 / (w r^2)) d/dv (w d/dv z) with w = R + r cos v.
+        exact = -sine / minor - sine * cosine / radius
+        errors = {
+            corrected: relative(
+                core.build_laplacian(points, options=core.LaplacianOptions(curvature_correction=corrected)).apply(
+                    points[:, 2]
+                ),
+                exact,
+            )
+            for corrected in (True, False)
+        }
+        assert errors[True] < 0.02
+        assert errors[True] < 0.5 * errors[False]
+
+    def test_symbol_correction_helps(self):
+        laplacian = core.build_laplacian(fibonacci_sphere(3000))
+        f = laplacian.points[:, 0] ** 2
+        exact = 2.0 - 6.0 * f
+        assert relative(laplacian.apply(f), exact) < 0.2 * relative(laplacian.apply(f, raw=True), exact)
+
+    def test_error_falls_on_even_points(self):
+        coarse, fine = (max(sphere_errors(core.build_laplacian(fibonacci_sphere(n)))) for n in (1000, 4000))
+        assert fine < coarse / 4.0
+
+
+class TestInvariance:
+    def test_rotation_shift_and_order(self, torus):
+        points = torus.points
+        turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+        order = np.random.default_rng(1).permutation(len(points))
+        moved = core.build_laplacian((points @ turn + [3.0, -2.0, 5.0])[order])
+        f = np.sin(3.0 * points[:, 0]) * points[:, 2]
+        np.testing.assert_allclose(moved.areas, torus.areas[order], rtol=1e-6)
+        np.testing.assert_allclose(moved.apply(f[order]), torus.apply(f)[order], rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(np.abs(np.einsum("ij,ij->i", moved.normals, (torus.normals @ turn)[order])), 1.0)
+
+    @pytest.mark.parametrize("scale", [1e-3, 1e3])
+    def test_scale(self, torus, scale):
+        scaled = core.build_laplacian(scale * torus.points)
+        f = np.sin(3.0 * torus.points[:, 0])
+        np.testing.assert_allclose(scaled.areas, scale**2 * torus.areas, rtol=1e-6)
+        np.testing.assert_allclose(scaled.smoothing_lengths, scale * torus.smoothing_lengths, rtol=1e-6)
+        np.testing.assert_allclose(scaled.apply(f), torus.apply(f) / scale**2, rtol=1e-6, atol=1e-6 / scale**2)
+        np.testing.assert_allclose(
+            scaled.eigenpairs(8).eigenvalues[1:], torus.eigenpairs(8).eigenvalues[1:] / scale**2, rtol=1e-6
+        )
+
+    def test_two_runs_are_the_same(self, torus):
+        again = core.build_laplacian(torus.points)
+        np.testing.assert_array_equal(again.areas, torus.areas)
+        np.testing.assert_array_equal(again.stiffness.data, torus.stiffness.data)
+
+
+class TestApply:
+    def test_columns_one_by_one(self, torus):
+        both = torus.apply(torus.points[:, :2])
+        np.testing.assert_allclose(both[:, 1], torus.apply(torus.points[:, 1]), rtol=1e-12, atol=1e-12)
+
+    def test_raw_is_the_stiffness_over_the_areas(self, torus):
+        f = torus.points[:, 0]
+        np.testing.assert_array_equal(torus.apply(f, raw=True), -(torus.stiffness @ f) / torus.areas)
+
+    def test_constants_vanish(self, torus):
+        assert np.abs(torus.apply(np.ones(len(torus.areas)))).max() < 1e-9
+
+    @pytest.mark.parametrize("shape", [(7,), (2500, 2, 2), ()])
+    def test_wrong_length(self, torus, shape):
+        with pytest.raises(core.InvalidPointsError, match="2500 points"):
+            torus.apply(np.zeros(shape))
+
+
+class TestMeanCurvature:
+    @pytest.mark.parametrize("radius", [0.5, 20.0])
+    def test_sphere(self, radius):
+        points = radius * fibonacci_sphere(3000) + [1.0, 2.0, 3.0]
+        laplacian = core.build_laplacian(points, options=core.LaplacianOptions(orient=True))
+        np.testing.assert_allclose(core.mean_curvature(laplacian), 1.0 / radius, rtol=2e-2)
+
+    def test_inward_normals_turn_the_sign(self):
+        points = fibonacci_sphere(1500)
+        assert np.all(core.mean_curvature(core.build_laplacian(points, normals=-points)) < -0.9)
+
+    def test_torus(self, torus):
+        laplacian = core.build_laplacian(torus_points(8000), options=core.LaplacianOptions(orient=True))
+        radius = np.linalg.norm(laplacian.points[:, :2], axis=1)
+        exact = (2.0 * radius - 1.0) / (2.0 * 0.4 * radius)
+        assert relative(core.mean_curvature(laplacian), exact) < 0.03
+
+
+class TestProgress:
+    def test_stages_come_in_order(self):
+        calls = []
+        core.build_laplacian(random_sphere(400), progress=lambda stage, fraction: calls.append((stage, fraction)))
+        assert [stage for stage, _ in calls] == ["Neighbors", "Normals", "Areas", "Operator"]
+        fractions = [fraction for _, fraction in calls]
+        assert fractions == sorted(fractions)
+        assert 0.0 <= fractions[0] <= fractions[-1] < 1.0
+
+    @pytest.mark.parametrize("when", ["Normals", "Operator", "Spectrum"])
+    def test_a_callback_can_cancel(self, when):
+        def stop(stage, fraction):
+            if stage == when:
+                raise core.Cancelled
+
+        with pytest.raises(core.Cancelled):
+            core.build_laplacian(random_sphere(400), progress=stop).eigenpairs(5, progress=stop)

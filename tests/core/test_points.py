@@ -1,0 +1,196 @@
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import fibonacci_sphere, random_sphere
+
+
+@pytest.fixture
+def sphere():
+    return fibonacci_sphere(600)
+
+
+def test_not_finite_points_are_counted(sphere):
+    sphere[3, 1] = np.nan
+    sphere[17, 0] = np.inf
+    with pytest.raises(core.InvalidPointsError, match="2 of 600 points.*not finite"):
+        core.build_laplacian(sphere)
+
+
+@pytest.mark.parametrize("shape", [(12,), (6, 2), (4, 3, 1), (3, 4)])
+def test_wrong_shape(shape):
+    with pytest.raises(core.InvalidPointsError, match=r"shape \(n, 3\)"):
+        core.build_laplacian(np.zeros(shape))
+
+
+@pytest.mark.parametrize("dtype", [complex, bool, object, "U3"])
+def test_wrong_type(sphere, dtype):
+    with pytest.raises(core.InvalidPointsError, match="real numbers"):
+        core.build_laplacian(sphere.astype(dtype))
+
+
+def test_ragged_lists():
+    with pytest.raises(core.InvalidPointsError, match="shape"):
+        core.build_laplacian([[0.0, 0.0, 0.0], [1.0, 2.0]])
+
+
+def test_no_points():
+    with pytest.raises(core.TooFewPointsError, match="no points"):
+        core.build_laplacian(np.zeros((0, 3)))
+
+
+def test_fewer_points_than_neighbors(sphere):
+    with pytest.raises(core.TooFewPointsError, match="80 points.*need 101"):
+        core.build_laplacian(sphere[:80])
+
+
+def test_fewer_different_points_than_neighbors(sphere):
+    with pytest.raises(core.TooFewPointsError, match="500 points at 50 different places"):
+        core.build_laplacian(np.tile(sphere[:50], (10, 1)))
+
+
+def test_all_points_at_one_place():
+    with pytest.raises(core.PointCloudError):
+        core.build_laplacian(np.ones((300, 3)))
+
+
+def test_collinear_points():
+    with pytest.raises(core.NotASurfaceError, match="500 points lie on a straight line"):
+        core.build_laplacian(np.linspace(0.0, 1.0, 500)[:, None] * [1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize("normals", ["quadric", "wpca", "pca"])
+def test_points_along_a_curve(normals):
+    angle = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(3.0 * angle)])
+    options = core.LaplacianOptions(normals=normals, curvature_correction=normals == "quadric")
+    with pytest.raises(core.NotASurfaceError, match="along a curve"):
+        core.build_laplacian(circle, options=options)
+
+
+def test_a_small_island_is_named(sphere):
+    island = np.array([[4.0, 0.0, 0.0], [4.01, 0.0, 0.0], [4.0, 0.01, 0.0]])
+    with pytest.raises(core.IslandError, match="3 of 603 points lie apart"):
+        core.build_laplacian(np.concatenate([sphere, island]))
+
+
+def test_two_large_parts_are_no_islands():
+    sphere = fibonacci_sphere(1500)
+    laplacian = core.build_laplacian(np.concatenate([sphere, sphere + [5.0, 0.0, 0.0]]))
+    assert core.check_stability(laplacian).parts == 2
+    assert laplacian.areas.sum() == pytest.approx(8.0 * np.pi, rel=2e-3)
+    assert np.all(laplacian.eigenpairs(3).eigenvalues[:2] < 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_points_have_no_islands(seed):
+    core.build_laplacian(random_sphere(2000, seed))
+
+
+def test_an_abrupt_change_of_spacing_is_no_island():
+    grid = np.stack(np.meshgrid(np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 41)), axis=-1).reshape(-1, 2)
+    coarse = np.stack(np.meshgrid(np.arange(1.2, 4.0, 0.2), np.arange(0.0, 3.0, 0.2)), axis=-1).reshape(-1, 2)
+    plane = np.concatenate([grid, coarse])
+    core.build_laplacian(np.column_stack([plane, 0.1 * plane[:, 0] ** 2]))
+
+
+def test_float32_far_from_the_origin_is_refused(sphere):
+    with pytest.raises(core.InvalidPointsError, match="from the origin"):
+        core.check_points((sphere + 1e6).astype(np.float32))
+
+
+def test_float64_a_million_extents_away_is_handled(sphere):
+    near, far = core.build_laplacian(sphere), core.build_laplacian(sphere + 2e6)
+    np.testing.assert_allclose(far.areas, near.areas, rtol=1e-5)
+    assert far.areas.sum() == pytest.approx(near.areas.sum(), rel=1e-6)
+
+
+def test_float64_too_far_to_tell_apart(sphere):
+    with pytest.raises(core.InvalidPointsError, match="from the origin"):
+        core.build_laplacian(sphere + 1e14)
+
+
+def test_integers_are_numbers(sphere):
+    whole = np.round(sphere * 1e6).astype(np.int64)
+    np.testing.assert_allclose(
+        core.build_laplacian(whole).areas, core.build_laplacian(whole.astype(float)).areas, rtol=0.0
+    )
+
+
+def test_the_input_is_left_alone(sphere):
+    before = sphere.copy()
+    laplacian = core.build_laplacian(sphere)
+    np.testing.assert_array_equal(sphere, before)
+    np.testing.assert_array_equal(laplacian.points, before)
+
+
+class TestDuplicates:
+    @pytest.fixture
+    def clouds(self, sphere):
+        rng = np.random.default_rng(0)
+        doubled = np.concatenate([sphere, sphere[:40], sphere[:10]])
+        order = rng.permutation(len(doubled))
+        return sphere, doubled[order], order
+
+    def test_a_notice_counts_them(self, clouds):
+        assert any("50 points lie exactly on another" in notice for notice in core.build_laplacian(clouds[1]).notices)
+
+    def test_they_share_one_area(self, clouds):
+        single, doubled, order = clouds
+        areas = np.empty(len(doubled))
+        areas[order] = core.build_laplacian(doubled).areas
+        expected = core.build_laplacian(single).areas
+        np.testing.assert_allclose(areas[600:640] + areas[:40] + np.pad(areas[640:], (0, 30)), expected[:40], rtol=1e-9)
+        np.testing.assert_allclose(areas[:10], areas[640:], rtol=1e-12)
+        assert areas.sum() == pytest.approx(expected.sum(), rel=1e-12)
+
+    def test_the_operator_is_the_same(self, clouds):
+        single, doubled, order = clouds
+        function = np.sin(3.0 * doubled[:, 0]) + doubled[:, 1]
+        result = np.empty(len(doubled))
+        result[order] = core.build_laplacian(doubled).apply(function)
+        expected = core.build_laplacian(single).apply(np.sin(3.0 * single[:, 0]) + single[:, 1])
+        np.testing.assert_allclose(result[:600], expected, rtol=0.0, atol=1e-9)
+
+    def test_the_spectrum_is_the_same(self, clouds):
+        single, doubled, _ = clouds
+        np.testing.assert_allclose(
+            core.build_laplacian(doubled).eigenpairs(12).eigenvalues,
+            core.build_laplacian(single).eigenpairs(12).eigenvalues,
+            rtol=1e-7,
+            atol=1e-9,
+        )
+
+
+class TestGivenNormals:
+    def test_they_are_used_as_they_are(self, sphere):
+        laplacian = core.build_laplacian(sphere, normals=-2.0 * sphere, options=core.LaplacianOptions(orient=True))
+        np.testing.assert_allclose(laplacian.normals, -sphere, atol=1e-12)
+
+    def test_wrong_length(self, sphere):
+        with pytest.raises(core.InvalidPointsError, match="do not fit 600 points"):
+            core.build_laplacian(sphere, normals=sphere[:5])
+
+    def test_zero_normals(self, sphere):
+        normals = sphere.copy()
+        normals[:4] = 0.0
+        with pytest.raises(core.InvalidPointsError, match="4 of 600 normals are zero"):
+            core.build_laplacian(sphere, normals=normals)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"bandwidth": "wide"},
+        {"neighbors": 3},
+        {"neighbors": 20.5},
+        {"bandwidth_factor": 0.0},
+        {"bandwidth_factor": float("nan")},
+        {"areas": "voronoi"},
+        {"regularization": -1.0},
+        {"neighbors": 10, "bandwidth_factor": 0.2},
+    ],
+)
+def test_options_out_of_range(settings):
+    with pytest.raises(core.PointCloudError, match="Choose|Use|Raise"):
+        core.LaplacianOptions(**settings)

@@ -1,0 +1,113 @@
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import (
+    fibonacci_sphere,
+    marching_cubes_sphere,
+    random_sphere,
+    sphere_eigenvalues,
+    uneven_sphere,
+)
+
+
+@pytest.fixture(scope="module")
+def laplacian():
+    return core.build_laplacian(fibonacci_sphere(2000) * [1.0, 0.9, 0.75])
+
+
+@pytest.fixture(scope="module")
+def spectrum(laplacian):
+    return laplacian.eigenpairs(20)
+
+
+def test_known_eigenvalues():
+    np.testing.assert_array_equal(sphere_eigenvalues(10), [0, 2, 2, 2, 6, 6, 6, 6, 6, 12])
+
+
+@pytest.mark.parametrize(
+    ("points", "bound"),
+    [(fibonacci_sphere(8000), 2e-3), (random_sphere(8000), 5e-3), (marching_cubes_sphere(39), 5e-3)],
+    ids=["even", "random", "marching cubes"],
+)
+def test_first_99_eigenvalues_of_the_sphere(points, bound):
+    values = core.build_laplacian(points).eigenpairs(100).eigenvalues
+    assert values[0] < 1e-9
+    np.testing.assert_allclose(values[1:], sphere_eigenvalues(100)[1:], rtol=bound)
+
+
+def test_eigenvalues_survive_a_density_jump():
+    values = core.build_laplacian(uneven_sphere(9000)).eigenpairs(16).eigenvalues
+    np.testing.assert_allclose(values[1:], sphere_eigenvalues(16)[1:], rtol=2e-2)
+
+
+def test_orthonormal_for_the_areas(laplacian, spectrum):
+    gram = spectrum.eigenvectors.T @ (laplacian.areas[:, None] * spectrum.eigenvectors)
+    np.testing.assert_allclose(gram, np.eye(20), atol=1e-9)
+
+
+def test_pairs_satisfy_the_equation(laplacian):
+    spectrum = laplacian.eigenpairs(20, raw=True)
+    vectors = spectrum.eigenvectors
+    residual = laplacian.apply(vectors, raw=True) + spectrum.eigenvalues * vectors
+    assert np.abs(residual).max() < 1e-5 * spectrum.eigenvalues[-1] * np.abs(vectors).max()
+
+
+def test_the_lowest_are_found(laplacian):
+    root = 1.0 / np.sqrt(laplacian.areas)
+    dense = np.linalg.eigvalsh(root[:, None] * laplacian.stiffness.toarray() * root)
+    np.testing.assert_allclose(laplacian.eigenpairs(20, raw=True).eigenvalues, dense[:20], rtol=1e-8, atol=1e-9)
+
+
+def test_ascending_from_the_constant(spectrum):
+    assert np.all(np.diff(spectrum.eigenvalues) >= 0.0)
+    assert spectrum.eigenvectors[:, 0].std() < 1e-9 * np.abs(spectrum.eigenvectors[:, 0]).mean()
+
+
+def test_signs_are_deterministic(laplacian, spectrum):
+    again = laplacian.eigenpairs(20)
+    np.testing.assert_array_equal(again.eigenvectors, spectrum.eigenvectors)
+    largest = np.argmax(np.abs(spectrum.eigenvectors), axis=0)
+    assert np.all(spectrum.eigenvectors[largest, np.arange(20)] > 0.0)
+
+
+def test_correction_raises_the_eigenvalues_of_the_same_vectors(laplacian, spectrum):
+    raw = laplacian.eigenpairs(20, raw=True)
+    np.testing.assert_array_equal(raw.eigenvectors, spectrum.eigenvectors)
+    assert np.all(raw.eigenvalues[1:] < spectrum.eigenvalues[1:])
+
+
+def test_the_paper_setting_is_raw():
+    laplacian = core.build_laplacian(fibonacci_sphere(800), options=core.LaplacianOptions.paper())
+    np.testing.assert_array_equal(laplacian.eigenpairs(4).eigenvalues, laplacian.eigenpairs(4, raw=True).eigenvalues)
+
+
+def test_order_of_the_points_does_not_matter(laplacian, spectrum):
+    order = np.random.default_rng(0).permutation(2000)
+    moved = core.build_laplacian(laplacian.points[order]).eigenpairs(20)
+    np.testing.assert_allclose(moved.eigenvalues[1:], spectrum.eigenvalues[1:], rtol=1e-6)
+    # A single mode of an ellipsoid with three different axes, up to sign.
+    overlap = moved.eigenvectors[:, 1] @ (laplacian.areas * spectrum.eigenvectors[:, 1])[order]
+    assert abs(overlap) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_unresolved_modes_are_refused_with_the_number_that_is_resolved(laplacian):
+    with pytest.raises(core.UnresolvedModesError, match="on 2000 points") as caught:
+        laplacian.eigenpairs(300)
+    resolved = int(str(caught.value).split("at most ")[1].split(",")[0])
+    assert 50 < resolved < 300
+    assert len(laplacian.eigenpairs(resolved).eigenvalues) == resolved
+    assert len(laplacian.eigenpairs(300, raw=True).eigenvalues) == 300
+
+
+@pytest.mark.parametrize("count", [0, -3, 2.5, 1999])
+def test_impossible_counts(laplacian, count):
+    with pytest.raises(core.TooFewPointsError, match="modes were asked for"):
+        laplacian.eigenpairs(count)
+
+
+def test_progress_is_reported(laplacian):
+    calls = []
+    laplacian.eigenpairs(5, progress=lambda stage, fraction: calls.append((stage, fraction)))
+    assert {stage for stage, _ in calls} == {"Spectrum"}
+    assert all(0.0 <= fraction < 1.0 for _, fraction in calls)
