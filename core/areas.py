@@ -130,8 +130,8 @@ def fast_areas(matrix, target):
     With M = V0^(1/2) A V0^(1/2), whose eigenvalues lie in [0, 1] whatever the points, each round runs Chebyshev's
     semi-iteration on M y = V0^(1/2) b for v = V0^(1/2) y, over the eigenvalues above 3e-3: the smooth part is solved
     for, and what the kernel cannot see stays near the density areas. Between rounds areas below the floor of 0.05 v0
-    are put on it, held there, and released when the gradient turns inward. A fixed number of linear steps, unlike conjugate
-    gradients, does not amplify rounding: the result is the same to 1e-11 for any order of the points.
+    are put on it, held there, and released when the gradient turns inward. A fixed number of linear steps, unlike
+    conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order of the points.
 
     Parameters
     ----------

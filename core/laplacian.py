@@ -149,6 +149,11 @@ def build_laplacian(points, normals=None, options=LaplacianOptions(), progress=N
     notices = []
     if scaled.duplicates:
         notices.append(f"{scaled.duplicates} points lie exactly on another one and share its area.")
+    if 2 * len(neighborhoods.first) > len(scaled.points) ** 2 / 3:
+        notices.append(
+            "The kernel of most points reaches over a third of the object, which is too wide for good results. Add"
+            " points, or lower the number of neighbors."
+        )
 
     report("Normals", 0.35)
     given = None if normals is None else normals[scaled.first]

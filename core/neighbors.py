@@ -138,8 +138,8 @@ def refuse_islands(tree, needed):
     small = sizes[sizes < needed]
     if len(small):
         raise IslandError(
-            f"{small.sum()} of {tree.n} points lie apart from the rest, in {len(small)} islands of fewer than"
-            f" {needed} points. Delete them, or lower the number of neighbors."
+            f"{small.sum()} of {tree.n} points lie apart from the rest, in islands of fewer than {needed} points"
+            f" (islands: {len(small)}). Delete them, or lower the number of neighbors."
         )
 
 

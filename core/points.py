@@ -112,10 +112,10 @@ def scale_points(points, needed):
         centered, axis=0, return_index=True, return_inverse=True, return_counts=True
     )
     if len(distinct) < needed:
-        merged = "" if len(distinct) == len(points) else f" at {len(distinct)} different places"
+        merged = "" if len(distinct) == len(points) else f" among {len(points)}"
         raise TooFewPointsError(
-            f"There are {len(points)} points{merged}, and the neighborhoods need {needed}. Add points, or lower the"
-            " number of neighbors."
+            f"The neighborhoods need {needed} different points, and there are {len(distinct)}{merged}. Add points, or"
+            " lower the number of neighbors."
         )
     spread = np.linalg.eigvalsh(centered.T @ centered / len(centered))
     if spread[1] < 1e-10 * spread[2]:

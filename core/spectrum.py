@@ -3,10 +3,14 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+from scipy.spatial import cKDTree
 
 from .errors import SolverError, TooFewPointsError, UnresolvedModesError
 from .kernel import inverse_symbol
+
+_DEGREE = 6  # of the polynomial that the Lanczos steps work on
 
 
 @dataclass(frozen=True)
@@ -36,38 +40,99 @@ def solve_spectrum(laplacian, count, raw, progress=None):
         raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
     if count > n // 3:
         raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
-    root = 1.0 / np.sqrt(areas)
-    products = 0
-
-    def product(y):
-        nonlocal products
-        if progress is not None and products % 20 == 0:
-            progress("Spectrum", products / (products + 500.0))  # the number of products is not known beforehand
-        products += 1
-        return root * (laplacian.stiffness @ (root * y.ravel()))
-
-    start = np.random.default_rng(0).standard_normal(n)
     try:
-        values, vectors = eigsh(
-            LinearOperator((n, n), matvec=product, dtype=np.float64),
-            k=count,
-            which="SA",
-            v0=start,
-            ncv=min(n, max(2 * count + 1, 40)),
-            tol=1e-8,
-        )
+        values, vectors = lowest_eigenpairs(laplacian, int(count), progress or (lambda stage, fraction: None))
     except ArpackNoConvergence as error:
         raise SolverError(
             f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
         ) from error
-    order = np.argsort(values)
-    values = np.maximum(values[order], 0.0)
-    vectors = root[:, None] * vectors[:, order]
     largest = np.argmax(np.abs(vectors), axis=0)
     vectors *= np.sign(vectors[largest, np.arange(count)])
     if not raw:
         values = correct_eigenvalues(laplacian, values, vectors)
     return Spectrum(values, vectors)
+
+
+def lowest_eigenpairs(laplacian, count, progress):
+    """Solve ``K phi = lambda areas phi`` for the lowest pairs by Lanczos steps on a Chebyshev polynomial.
+
+    The polynomial lifts the eigenvalues below a cut, about twice Weyl's estimate 4 pi count / area of the highest one
+    wanted, and keeps all others within [-1, 1]. Lanczos then needs a sixth of the steps for about the same products,
+    and the work between products, which would be half of the time, shrinks as much. Where a wanted eigenvalue turns out
+    to lie above the cut, the cut is raised.
+
+    Returns
+    -------
+    values : ndarray, (count,)
+        Ascending, not negative.
+    vectors : ndarray, (n, count)
+        Orthonormal for the areas.
+    """
+    order = cKDTree(laplacian.points).indices  # neighbours near in memory make the products faster
+    root = 1.0 / np.sqrt(laplacian.areas[order])
+    scale = sparse.diags_array(root, format="csr")
+    matrix = (scale @ laplacian.stiffness[order][:, order] @ scale).tocsr()
+    n = len(order)
+    random = np.random.default_rng(0)
+    products = 0
+
+    def multiply(y):
+        nonlocal products
+        if products % 20 == 0:
+            progress("Spectrum", products / (products + 30.0 * count))  # the number of products is not known before
+        products += 1
+        return matrix @ y.ravel()
+
+    def solve(function, maxiter=500, **settings):
+        operator = LinearOperator((n, n), matvec=function, dtype=np.float64)
+        return eigsh(operator, which="LA", v0=random.standard_normal(n), maxiter=maxiter, **settings)
+
+    top = 1.02 * solve(multiply, k=1, tol=1e-2, return_eigenvectors=False)[0]
+    cut = 8.0 * np.pi * count / laplacian.areas.sum()
+    while True:
+        if cut < 0.25 * top:
+            degree, center, radius = _DEGREE, 0.5 * (top + cut), 0.5 * (top - cut)
+        else:  # too few points for a polynomial: a shift to [1, 2], right wherever the cut lies
+            degree, center, radius = 1, 2.0 * top, top
+
+        def polynomial(y, degree=degree, center=center, radius=radius):
+            before, now = y.ravel(), (center * y.ravel() - multiply(y)) / radius
+            for _ in range(degree - 1):
+                before, now = now, (2.0 / radius) * (center * now - multiply(now)) - before
+            return now
+
+        try:
+            ncv, restarts = min(n, max(2 * count + 1, 40)), 20 if degree > 1 else 500
+            lifted, vectors = solve(polynomial, k=count, ncv=ncv, tol=1e-13, maxiter=restarts)
+            if degree == 1 or lifted.min() > 1.0:
+                break
+        except ArpackNoConvergence:
+            if degree == 1:
+                raise
+        cut *= 4.0
+
+    # Of an eigenvalue that a symmetric cloud has several times, Lanczos steps from one start may miss copies: look for
+    # any above the least one found, orthogonal to all found.
+    while True:
+
+        def remainder(y, found=vectors):
+            return project(found, polynomial(project(found, y.ravel())))
+
+        if solve(remainder, k=1, tol=1e-3, return_eigenvectors=False)[0] <= lifted.min() * (1.0 + 1e-6):
+            break
+        missed, vector = solve(remainder, k=1, tol=1e-13)
+        best = np.argsort(-np.append(lifted, missed))[:count]
+        lifted, vectors = np.append(lifted, missed)[best], np.column_stack([vectors, vector])[:, best]
+    values = np.einsum("ij,ij->j", vectors, matrix @ vectors)
+    ascending = np.argsort(values)
+    result = np.empty_like(vectors)
+    result[order] = root[:, None] * vectors[:, ascending]
+    return np.maximum(values[ascending], 0.0), result
+
+
+def project(vectors, y):
+    """Take the orthonormal vectors out of y."""
+    return y - vectors @ (vectors.T @ y)
 
 
 def correct_eigenvalues(laplacian, values, vectors):

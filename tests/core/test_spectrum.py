@@ -4,6 +4,7 @@ import pytest
 import core
 from benchmarks.samplings import (
     fibonacci_sphere,
+    icosahedral_sphere,
     marching_cubes_sphere,
     random_sphere,
     sphere_eigenvalues,
@@ -77,8 +78,27 @@ def test_correction_raises_the_eigenvalues_of_the_same_vectors(laplacian, spectr
     assert np.all(raw.eigenvalues[1:] < spectrum.eigenvalues[1:])
 
 
-def test_the_paper_setting_is_raw():
+@pytest.mark.parametrize("count", [5, 12, 33, 60])
+@pytest.mark.parametrize("points", [icosahedral_sphere(8), marching_cubes_sphere(16)], ids=["icosahedral", "cubic"])
+def test_no_copy_of_a_multiple_eigenvalue_is_missed(points, count):
+    laplacian = core.build_laplacian(points)
+    root = 1.0 / np.sqrt(laplacian.areas)
+    dense = np.linalg.eigvalsh(root[:, None] * laplacian.stiffness.toarray() * root)
+    np.testing.assert_allclose(laplacian.eigenpairs(count, raw=True).eigenvalues, dense[:count], rtol=1e-8, atol=1e-9)
+
+
+def test_a_kernel_that_is_far_too_wide_still_has_its_spectrum():
+    # Weyl's estimate is far below these eigenvalues, so the solver's first cut is too low.
     laplacian = core.build_laplacian(fibonacci_sphere(800), options=core.LaplacianOptions.paper())
+    assert any("too wide" in notice for notice in laplacian.notices)
+    root = 1.0 / np.sqrt(laplacian.areas)
+    dense = np.linalg.eigvalsh(root[:, None] * laplacian.stiffness.toarray() * root)
+    np.testing.assert_allclose(laplacian.eigenpairs(4).eigenvalues, dense[:4], rtol=1e-8, atol=1e-9)
+
+
+def test_the_paper_setting_is_raw():
+    laplacian = core.build_laplacian(fibonacci_sphere(3000), options=core.LaplacianOptions.paper())
+    assert laplacian.notices == []
     np.testing.assert_array_equal(laplacian.eigenpairs(4).eigenvalues, laplacian.eigenpairs(4, raw=True).eigenvalues)
 
 

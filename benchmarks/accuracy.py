@@ -1,0 +1,131 @@
+"""Errors on spheres, the paper's Figure 3, structure of the matrix, and invariances."""
+
+import numpy as np
+from scipy.sparse.linalg import eigsh
+
+import core
+
+from .samplings import (
+    fibonacci_sphere,
+    icosahedral_sphere,
+    marching_cubes_sphere,
+    random_sphere,
+    sphere_eigenvalues,
+    torus_points,
+    uneven_sphere,
+)
+from .tables import Table
+
+SPHERE = 4.0 * np.pi
+
+
+def relative(found, exact):
+    """Relative error in the l2 norm."""
+    return np.linalg.norm(found - exact) / np.linalg.norm(exact)
+
+
+def sphere_errors(laplacian):
+    """Relative l2 errors of L x, L x^2 and L e^x on the unit sphere."""
+    x = laplacian.points[:, 0]
+    return (
+        relative(laplacian.apply(x), -2.0 * x),
+        relative(laplacian.apply(x**2), 2.0 - 6.0 * x**2),
+        relative(laplacian.apply(np.exp(x)), np.exp(x) * (1.0 - x**2 - 2.0 * x)),
+    )
+
+
+def paper_figure_3():
+    """The first three rows of the paper's Figure 3: uniform sphere, WPCA normals."""
+    laplacian = core.build_laplacian(icosahedral_sphere(28), options=core.LaplacianOptions.paper())
+    errors = sphere_errors(laplacian)
+    printed = (2.93e-3, 24.5e-3, 19.4e-3)
+    rows = [
+        [f"L {name}", f"{error:.3e}", f"{paper:.3e}", f"{100.0 * (error / paper - 1.0):+.1f} %"]
+        for name, error, paper in zip(("x", "x^2", "e^x"), errors, printed, strict=True)
+    ]
+    rows.append(["area", f"{laplacian.areas.sum() / SPHERE - 1.0:+.1e}", "0.08 %", ""])
+    return Table(
+        "Paper preset on the uniform sphere (Figures 2 and 3)",
+        ["quantity", "relative l2 error", "paper", "difference"],
+        rows,
+        f"Icosahedral sphere, {len(laplacian.points):,} points, `LaplacianOptions.paper()`.",
+    )
+
+
+def default_on_spheres():
+    """Pointwise, area and eigenvalue errors of the default options."""
+    clouds = {f"random, seed {seed}": random_sphere(8000, seed) for seed in range(6)}
+    clouds["marching cubes"] = marching_cubes_sphere(39)
+    clouds["Fibonacci"] = fibonacci_sphere(8000)
+    clouds["icosahedral"] = icosahedral_sphere(28)
+    clouds["density jump 9:1"] = uneven_sphere(9000)
+    rows = []
+    for name, points in clouds.items():
+        laplacian = core.build_laplacian(points)
+        errors = sphere_errors(laplacian)
+        try:
+            spectrum = laplacian.eigenpairs(100)
+        except core.UnresolvedModesError:
+            spectrum = laplacian.eigenpairs(60)
+        exact = sphere_eigenvalues(len(spectrum.eigenvalues))
+        off = np.abs(spectrum.eigenvalues[1:] / exact[1:] - 1.0)
+        rows.append(
+            [name, f"{len(points):,}", *(f"{error:.1e}" for error in errors)]
+            + [f"{laplacian.areas.sum() / SPHERE - 1.0:+.1e}", f"{off.mean():.1e}", f"{off.max():.1e}", str(len(off))]
+        )
+    return Table(
+        "Default options on unit spheres",
+        ["points", "n", "L x", "L x^2", "L e^x", "area", "eigenvalues, mean", "max", "of the first"],
+        rows,
+        "Relative l2 errors; relative errors of area and eigenvalues.",
+    )
+
+
+def structure():
+    """Symmetry, row sums and the ends of the spectrum."""
+    rows = []
+    for name, options in {"default": core.LaplacianOptions(), "paper": core.LaplacianOptions.paper()}.items():
+        for kind, points in {"random sphere": random_sphere(4000), "torus": torus_points(4000)}.items():
+            stiffness = core.build_laplacian(points, options=options).stiffness
+            diagonal = stiffness.diagonal()
+            largest = eigsh(stiffness, k=1, which="LA", return_eigenvectors=False)[0]
+            smallest = eigsh(stiffness, k=1, which="SA", return_eigenvectors=False)[0]
+            rows.append(
+                [
+                    f"{kind}, {name}",
+                    f"{abs(stiffness - stiffness.T).max():.0e}",
+                    f"{np.max(np.abs(stiffness.sum(axis=1)) / diagonal):.1e}",
+                    f"{smallest / largest:+.1e}",
+                ]
+            )
+    return Table(
+        "The stiffness matrix",
+        ["operator", "largest asymmetry", "row sum / diagonal", "smallest / largest eigenvalue"],
+        rows,
+    )
+
+
+def invariance():
+    """Largest relative changes under moves that must not matter."""
+    rows = []
+    for name, points in {"random torus": torus_points(4000), "marching cubes": marching_cubes_sphere(30)}.items():
+        function = np.sin(3.0 * points[:, 0]) * points[:, 2]
+        plain = core.build_laplacian(points)
+        applied = plain.apply(function)
+        turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+        order = np.random.default_rng(1).permutation(len(points))
+        same = np.arange(len(points))
+        extent = np.ptp(points, axis=0).max()
+        for label, moved, index, scale in (
+            ("scaled by 1e-3", 1e-3 * points, same, 1e-3),
+            ("scaled by 1e3", 1e3 * points, same, 1e3),
+            ("rotated", points @ turn, same, 1.0),
+            ("permuted", points[order], order, 1.0),
+            ("shifted by 1e6 extents", points + 1e6 * extent, same, 1.0),
+        ):
+            laplacian = core.build_laplacian(moved)
+            areas = np.abs(laplacian.areas / scale**2 / plain.areas[index] - 1.0).max()
+            total = abs(laplacian.areas.sum() / scale**2 / plain.areas.sum() - 1.0)
+            change = relative(laplacian.apply(function[index]) * scale**2, applied[index])
+            rows.append([f"{name}, {label}", f"{areas:.1e}", f"{total:.1e}", f"{change:.1e}"])
+    return Table("Invariance", ["cloud", "largest change of an area", "of the total", "of L f, l2"], rows)
