@@ -1,0 +1,43 @@
+# Everything runs in private environments under .venv/; the work is done by scripts/*.py, for any Python from 3.8 on.
+# PYTHON=... names the Python to use, 3.11 or 3.13; without it one is looked for.
+
+export PYTHON
+
+# The first Python that runs at all. It finds the right one, or says clearly what is missing.
+BOOT := $(shell for python in "$(PYTHON)" python3.11 python3.13 python3 python "$(HOME)"/.pyenv/versions/*/bin/python3; do \
+	"$$python" -c "import sys; sys.exit(sys.version_info < (3, 8))" >/dev/null 2>&1 && echo "$$python" && break; done)
+run = $(if $(BOOT),"$(BOOT)",$(error No Python is found: install Python 3.11 or 3.13, or name it by PYTHON=...)) -B scripts/
+
+.PHONY: help demo test test-all build validate lint benchmark pictures clean
+
+help: ## Show this list (default)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: ## Analyze a sample point cloud, or SCAN=file.ply (UP=Z if its Z axis points upwards), and render it
+	@$(run)in_blender.py demo.py $(if $(SCAN),"$(SCAN)") $(if $(UP),--up $(UP))
+
+test: ## Test core, and the extension in the newest Blender for this Python
+	@$(run)run_tests.py
+
+test-all: ## Test core and the extension in every supported Python and Blender that can run here
+	@$(run)run_tests.py --all
+
+build: ## Build one zip per platform into dist/
+	@$(run)package.py
+
+validate: ## Build, and run Blender's validator on every zip
+	@$(run)package.py --validate
+
+lint: ## Check style and format
+	@$(run)environments.py lint -m ruff check .
+	@$(run)environments.py lint -m ruff format --check .
+
+benchmark: ## Compute the tables and figures of the paper and the peers
+	@$(run)environments.py benchmark -m benchmarks.run $(ARGUMENTS)
+
+pictures: ## Render the pictures of the manual
+	@$(run)in_blender.py pictures.py
+
+clean: ## Remove everything that was made, the environments too
+	rm -rf .venv build dist .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

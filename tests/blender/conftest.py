@@ -1,0 +1,62 @@
+"""The tests run the installed extension: the zip of this machine's platform, in a user folder of its own."""
+
+import importlib
+import importlib.util
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import pytest
+
+import package
+
+MODULE = "bl_ext.user_default.meshfree_laplacian"
+
+if importlib.util.find_spec("bpy") is None:
+    collect_ignore_glob = ["test_*.py"]  # an environment without Blender: only the tests of core
+else:
+    USER_FOLDER = Path(tempfile.mkdtemp(prefix="meshfree-"))
+    os.environ["BLENDER_USER_RESOURCES"] = str(USER_FOLDER)  # before the first import of bpy
+
+
+@pytest.fixture(scope="session", autouse=True)
+def installed(archive):
+    """Install the built zip, enabled; disable it at the end, for Blender does not exit well with its classes."""
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.extensions.package_install_files(filepath=str(archive), repo="user_default", enable_on_install=True)
+    assert MODULE in bpy.context.preferences.addons, "the extension is not enabled, see the output above"
+    yield USER_FOLDER
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    shutil.rmtree(USER_FOLDER, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def archive():
+    """Zip of this machine's platform, made by `make build` or `make test`."""
+    path = package.archive(package.this_platform())
+    assert path.exists(), f"{path.name} is missing in dist/, `make build` makes it"
+    return path
+
+
+@pytest.fixture(autouse=True)
+def empty_scene(installed):
+    """Start every test from an empty scene."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert MODULE in bpy.context.preferences.addons
+
+
+@pytest.fixture
+def extension(installed):
+    """Root module of the installed extension."""
+    return importlib.import_module(MODULE)
+
+
+@pytest.fixture
+def core(installed):
+    """The installed extension's package of mathematics."""
+    return importlib.import_module(f"{MODULE}.core")
