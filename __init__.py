@@ -1,0 +1,35 @@
+"""Mesh-Free Laplacian: areas, normals, curvature and vibration modes of point clouds, inside Blender."""
+
+
+def _classes():
+    from .operators import analyze, spectrum
+    from .ui import colormap, panel, settings
+
+    return (*settings.CLASSES, *analyze.CLASSES, *spectrum.CLASSES, *colormap.CLASSES, *panel.CLASSES)
+
+
+def register():
+    """Add the extension's classes, the settings of objects and the command line to Blender."""
+    import bpy
+
+    from .operators import command
+    from .ui import settings
+
+    for cls in _classes():
+        bpy.utils.register_class(cls)
+    settings.attach()
+    command.attach()
+
+
+def unregister():
+    """Take everything out again, in reverse order, and give back the memory of the cached operators."""
+    import bpy
+
+    from .operators import cache, command
+    from .ui import settings
+
+    command.detach()
+    settings.detach()
+    for cls in reversed(_classes()):
+        bpy.utils.unregister_class(cls)
+    cache.clear()

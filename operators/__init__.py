@@ -1,0 +1,1 @@
+"""Blender operators: read the object, call core, write the result. No mathematics."""

@@ -1,0 +1,110 @@
+"""Areas, normals and mean curvature of the active object's points."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, IntProperty
+
+from ..core import LaplaceBeltrami, PointCloudError, Spectrum, mean_curvature
+from . import cache
+from .options import laplacian_options
+from .reading import obstacle, read_points
+from .result import area_text, check_writable, write_result
+from .stages import Stages
+
+WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each takes 4 bytes per point in the file
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """All that is computed for an object, in lengths of the world; normals in local space too."""
+
+    laplacian: LaplaceBeltrami
+    local_normals: np.ndarray
+    mean_curvature: np.ndarray
+    spectrum: Spectrum | None
+    seconds: dict
+    notices: list
+
+    @property
+    def total_area(self) -> float:
+        """Area of the whole surface."""
+        return float(self.laplacian.areas.sum())
+
+
+def analyze_object(context, obj, modes: int = 0) -> Analysis:
+    """Compute areas, normals, mean curvature and the lowest modes, if any are asked for; write nothing."""
+    reading = read_points(context, obj)
+    with Stages(context.window_manager) as stages:
+        laplacian = cache.laplacian_for(reading.points, laplacian_options(obj.meshfree), stages)
+        stages("Curvature", 0.0)
+        curvature = mean_curvature(laplacian)
+        spectrum = laplacian.eigenpairs(modes, progress=stages) if modes else None
+    notices = reading.notices + laplacian.notices + (spectrum.notices if spectrum else [])
+    local_normals = reading.local_normals(laplacian.normals)
+    return Analysis(laplacian, local_normals, curvature, spectrum, stages.seconds, notices)
+
+
+class AnalysisOperator:
+    """What the operators that analyze the active object have in common."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    write_limit: IntProperty(
+        name="Modes to Write",
+        description="Write at most this many modes as attributes; the eigenvalues of all of them are kept",
+        default=WRITE_LIMIT,
+        min=1,
+        max=999,
+    )
+    make_single_user: BoolProperty(
+        name="Make Single User",
+        description="Give the object a mesh of its own if it shares its mesh with other objects",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+    show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
+
+    @classmethod
+    def poll(cls, context):
+        reason = obstacle(context.object)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def run(self, context, modes: int, shown: str):
+        """Analyze the active object, write the result, then show the attribute `shown`; empty for the one on show."""
+        obj = context.object
+        written = min(modes, self.write_limit)
+        try:
+            check_writable(obj, written, self.make_single_user or obj.meshfree.make_single_user)
+            analysis = analyze_object(context, obj, modes)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        write_result(obj, analysis, self.write_limit)
+        for notice in analysis.notices:
+            self.report({"WARNING"}, notice)
+        message = f"{area_text(analysis.total_area)} from {len(obj.data.vertices):,} points"
+        self.report({"INFO"}, f"{message}, {modes} modes" if modes else message)
+        if self.show:
+            bpy.ops.meshfree.colormap(attribute=shown)
+        return {"FINISHED"}
+
+
+class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
+    """Compute area, normal and mean curvature of each point, and the total area"""
+
+    bl_idname = "meshfree.analyze"
+    bl_label = "Analyze Points"
+
+    modes: IntProperty(
+        name="Modes", description="Compute this many vibration modes in the same run", default=0, min=0, soft_max=100
+    )
+
+    def execute(self, context):
+        return self.run(context, self.modes, shown="")
+
+
+CLASSES = (MESHFREE_OT_analyze,)

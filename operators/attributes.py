@@ -1,0 +1,93 @@
+"""The attributes of this extension: their names and types, and how values get in and out of a mesh."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import PointCloudError
+
+
+class _Storage(NamedTuple):
+    dtype: type
+    components: int
+    key: str  # what foreach_get and foreach_set call the values
+
+
+_STORAGE = {
+    "FLOAT": _Storage(np.float32, 1, "value"),
+    "FLOAT_VECTOR": _Storage(np.float32, 3, "vector"),
+    "INT": _Storage(np.int32, 1, "value"),
+    "BOOLEAN": _Storage(np.bool_, 1, "value"),
+}
+
+AREA = "lb_area"
+NORMAL = "lb_normal"
+MEAN_CURVATURE = "lb_mean_curvature"
+EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
+_TYPES = {AREA: "FLOAT", NORMAL: "FLOAT_VECTOR", MEAN_CURVATURE: "FLOAT"}
+
+
+def eigenvector_name(mode: int) -> str:
+    """Name of the attribute that holds a mode; modes are counted from 1."""
+    return f"{EIGENVECTOR}{mode:03d}"
+
+
+def mode_number(name: str) -> int:
+    """Number of the mode that an attribute holds; 0 for attributes that hold none."""
+    number = name.removeprefix(EIGENVECTOR)
+    return int(number) if name.startswith(EIGENVECTOR) and number.isdecimal() else 0
+
+
+def check_names(obj, names):
+    """Refuse names that a vertex group holds, since attributes and vertex groups share one namespace."""
+    taken = sorted(set(names) & {group.name for group in obj.vertex_groups})
+    if taken:
+        raise PointCloudError(
+            f'Object "{obj.name}" has vertex groups named {", ".join(taken)}, which results need as attribute names.'
+            " Rename these vertex groups."
+        )
+
+
+def write_attribute(mesh, name: str, values):
+    """Write one value per vertex, replacing an attribute of that name."""
+    data_type = "FLOAT" if name.startswith(EIGENVECTOR) else _TYPES[name]
+    storage = _STORAGE[data_type]
+    values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
+    if len(values) != storage.components * len(mesh.vertices):
+        raise PointCloudError(
+            f"Attribute {name} got {len(values)} numbers for {len(mesh.vertices)} vertices with"
+            f" {storage.components} each. Analyze the object again."
+        )
+    attribute = mesh.attributes.get(name)
+    if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, "POINT"):
+        mesh.attributes.remove(attribute)
+        attribute = None
+    if attribute is None:
+        attribute = mesh.attributes.new(name, data_type, "POINT")
+    if attribute is None or attribute.name != name:
+        raise RuntimeError(f"Blender made no attribute named {name} on mesh {mesh.name}")
+    attribute.data.foreach_set(storage.key, values)
+
+
+def read_attribute(mesh, name: str):
+    """Read an attribute of the vertices as an array of shape (n,) or (n, 3)."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None:
+        raise PointCloudError(
+            f'Mesh "{mesh.name}" has no attribute {name}. Analyze the object, or choose another name.'
+        )
+    storage = _STORAGE.get(attribute.data_type)
+    if storage is None or attribute.domain != "POINT":
+        raise PointCloudError(
+            f"Attribute {name} has the type {attribute.data_type} on the domain {attribute.domain}. Choose a number or"
+            " a vector on points."
+        )
+    values = np.empty((len(attribute.data), storage.components), storage.dtype)
+    attribute.data.foreach_get(storage.key, values.reshape(-1))
+    return values[:, 0] if storage.components == 1 else values
+
+
+def remove_eigenvectors(mesh, beyond: int):
+    """Remove the modes numbered above `beyond`."""
+    for name in [attribute.name for attribute in mesh.attributes if mode_number(attribute.name) > beyond]:
+        mesh.attributes.remove(mesh.attributes[name])

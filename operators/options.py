@@ -1,0 +1,30 @@
+"""From the settings of an object to the options of core."""
+
+from dataclasses import fields
+
+import numpy as np
+
+from ..core import LaplacianOptions
+
+DEFAULTS = LaplacianOptions()
+
+# The options that are settings of an object by the same name; normals are always oriented.
+NAMES = tuple(option.name for option in fields(LaplacianOptions) if option.name != "orient")
+
+
+def settings_values(settings) -> dict:
+    """Values of the settings that change results, as core writes them."""
+    return {name: _value(getattr(settings, name)) for name in NAMES}
+
+
+def laplacian_options(settings) -> LaplacianOptions:
+    """Options of the operator, with oriented normals, which the sign of the mean curvature needs."""
+    return LaplacianOptions(orient=True, **settings_values(settings))
+
+
+def _value(value):
+    if isinstance(value, str):
+        return value.lower()  # Blender's enumerations are upper case
+    if isinstance(value, float):
+        return float(str(np.float32(value)))  # Blender keeps float32: 0.001 comes back as 0.0010000000475
+    return value

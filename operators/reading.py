@@ -1,0 +1,172 @@
+"""From a Blender object to its points, in lengths of the world."""
+
+import zlib
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..core import PointCloudError, check_points
+
+DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
+
+
+def is_display(modifier) -> bool:
+    """Whether a modifier is the extension's own display."""
+    return modifier.type == "NODES" and modifier.node_group is not None and DISPLAY_TAG in modifier.node_group
+
+
+def obstacle(obj) -> str:
+    """What keeps an object from being read and written, and what to do about it; empty if nothing does."""
+    if obj is None:
+        return "No active object. Select a mesh with the points of a surface"
+    if obj.type != "MESH":
+        kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
+        return f'"{obj.name}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
+    if not obj.is_editable or not obj.data.is_editable:
+        return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
+    if obj.mode != "OBJECT" or obj.data.is_editmode:
+        return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
+    if not obj.data.vertices:
+        return f'"{obj.name}" has no vertices. Add points, or select another mesh'
+    return ""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Points of an object.
+
+    Attributes
+    ----------
+    points : ndarray, (n, 3) float64
+        Positions with the object's scale, rotation and shear, but not its location: float64 of small numbers.
+    matrix : ndarray, (3, 3) float64
+        The linear part of the object's matrix: points = local positions @ matrix.T.
+    notices : list of str
+        What the user should know about how the object was read.
+    """
+
+    points: np.ndarray
+    matrix: np.ndarray
+    notices: list = field(default_factory=list)
+
+    def local_normals(self, normals):
+        """Turn normals of the points into unit normals of the local positions: covectors, so by M^T, not M^-1."""
+        local = normals @ self.matrix
+        return local / np.linalg.norm(local, axis=1, keepdims=True)
+
+
+def read_points(context, obj) -> Reading:
+    """Read an object's points as the user sees them, apart from modifiers that are not asked for.
+
+    Raises
+    ------
+    PointCloudError
+        The points cannot be read or used as they are; the text says what to do.
+    """
+    context.view_layer.update()  # a script may have moved the object a line ago
+    mesh = obj.data
+    if obj.meshfree.use_modifiers or mesh.shape_keys is not None:
+        positions = _evaluated_positions(context, obj)
+    else:
+        positions = mesh_positions(mesh)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    if not np.linalg.cond(matrix) < 1e6:
+        raise PointCloudError(
+            f'"{obj.name}" is scaled to nothing along an axis, so its {len(positions)} points have no area. Give it a'
+            " scale above zero along each axis."
+        )
+    notices = []
+    if mesh.polygons:
+        notices.append(f"The mesh has {len(mesh.polygons)} faces: it is taken as its {len(mesh.vertices)} vertices.")
+    return Reading(check_points(positions) @ matrix.T, matrix, notices)
+
+
+def mesh_positions(mesh):
+    """Read the vertices' own positions, (n, 3) float32."""
+    positions = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", positions.reshape(-1))
+    return positions
+
+
+def _evaluated_positions(context, obj):
+    """Positions after shape keys, and after the modifiers if the settings ask for them; never after our own display."""
+    with _left_out([item for item in obj.modifiers if is_display(item) or not obj.meshfree.use_modifiers]):
+        evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+        if not evaluated.is_evaluated:
+            raise PointCloudError(
+                f'"{obj.name}" is disabled in viewports, so its shape keys and modifiers are not computed. Enable it'
+                " in the Outliner (monitor icon)."
+            )
+        positions = mesh_positions(evaluated.to_mesh())
+        evaluated.to_mesh_clear()
+    if len(positions) != len(obj.data.vertices):
+        raise PointCloudError(
+            f'The modifiers of "{obj.name}" turn its {len(obj.data.vertices)} points into {len(positions)}, so results'
+            " have no place. Apply these modifiers, or turn off Use Modifiers."
+        )
+    return positions
+
+
+@contextmanager
+def _left_out(modifiers):
+    """Take modifiers out of the viewport's evaluation, and put them back."""
+    shown = [modifier for modifier in modifiers if modifier.show_viewport]
+    try:
+        for modifier in shown:
+            modifier.show_viewport = False
+        yield
+    finally:
+        for modifier in shown:
+            modifier.show_viewport = True
+
+
+def metric(obj):
+    """Lengths that the object's matrix gives to its local axes, M^T M: rotation and location do not change results."""
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    return matrix.T @ matrix
+
+
+def fingerprint(obj) -> str:
+    """Checksum of the positions and shape keys, quick enough for a panel: 1 million points take a few milliseconds.
+
+    Of modifiers, if they are used, it sees which ones there are, not their settings.
+    """
+    mesh = obj.data
+    checksum = zlib.crc32(mesh_positions(mesh))
+    keys = mesh.shape_keys
+    if keys is not None:
+        state = [keys.use_relative, keys.eval_time, obj.show_only_shape_key and obj.active_shape_key_index]
+        for block in keys.key_blocks:
+            state += [block.name, block.value, block.mute, block.vertex_group, block.relative_key.name]
+            positions = np.empty(3 * len(mesh.vertices), np.float32)
+            block.points.foreach_get("co", positions)
+            checksum = zlib.crc32(positions, checksum)
+        checksum = zlib.crc32(repr(state).encode(), checksum)
+    if obj.meshfree.use_modifiers:
+        state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_display(item)]
+        checksum = zlib.crc32(repr(state).encode(), checksum)
+    return f"{checksum:08x}"
+
+
+def sharing_objects(obj) -> list:
+    """All other objects that show the same mesh."""
+    if obj.data.users == 1:  # as most of the time, for the panel's sake
+        return []
+    return [other for other in bpy.data.objects if other.data == obj.data and other != obj]
+
+
+def spacing(mesh) -> float:
+    """Typical distance between neighbouring vertices in local lengths, from 10,000 vertices at most; 0 if unknown.
+
+    The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8.
+    """
+    positions = mesh_positions(mesh)
+    positions = positions[np.isfinite(positions).all(axis=1)]
+    if len(positions) < 9:
+        return 0.0
+    sample = positions[:: 1 + len(positions) // 10_000]
+    distance = np.median(cKDTree(positions).query(sample, k=9)[0][:, 8])
+    return float(distance * np.sqrt(np.pi / 8.0))

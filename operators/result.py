@@ -1,0 +1,82 @@
+"""What an analysis leaves on an object: attributes, eigenvalues, total area, and what tells whether they still hold."""
+
+import bpy
+import numpy as np
+
+from ..core import PointCloudError
+from .attributes import (
+    AREA,
+    MEAN_CURVATURE,
+    NORMAL,
+    check_names,
+    eigenvector_name,
+    remove_eigenvectors,
+    write_attribute,
+)
+from .options import settings_values
+from .reading import fingerprint, metric, sharing_objects
+
+EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
+
+
+def check_writable(obj, modes: int, make_single_user: bool):
+    """Refuse an object that results cannot be written to, before anything is computed."""
+    others = [other.name for other in sharing_objects(obj)]
+    if others and not make_single_user:
+        shown = ", ".join(f'"{name}"' for name in others[:3]) + (", ..." if len(others) > 3 else "")
+        raise PointCloudError(
+            f'"{obj.name}" shares its mesh with {shown}. Turn on Make Single User to give it a mesh of its own.'
+        )
+    check_names(obj, [AREA, NORMAL, MEAN_CURVATURE, *map(eigenvector_name, range(1, modes + 1))])
+
+
+def write_result(obj, analysis, write_limit: int):
+    """Write an analysis to its object; modes up to `write_limit` become attributes."""
+    if sharing_objects(obj):
+        obj.data = obj.data.copy()
+    mesh = obj.data
+    if analysis.spectrum is not None:
+        vectors = analysis.spectrum.eigenvectors[:, :write_limit]
+        remove_eigenvectors(mesh, beyond=vectors.shape[1])
+        for index, vector in enumerate(vectors.T):
+            write_attribute(mesh, eigenvector_name(index + 1), vector)
+        # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
+        obj[EIGENVALUES] = analysis.spectrum.eigenvalues.tolist()
+    elif is_stale(obj):
+        remove_eigenvectors(mesh, beyond=0)
+        obj.pop(EIGENVALUES, None)
+    write_attribute(mesh, AREA, analysis.laplacian.areas)
+    write_attribute(mesh, NORMAL, analysis.local_normals)
+    write_attribute(mesh, MEAN_CURVATURE, analysis.mean_curvature)
+
+    kept = obj.meshfree
+    kept.total_area = analysis.total_area
+    kept.point_count = len(mesh.vertices)
+    kept.stages.clear()
+    for name, seconds in analysis.seconds.items():
+        stage = kept.stages.add()
+        stage.name, stage.seconds = name, seconds
+    kept.fingerprint = fingerprint(obj)
+    kept.metric = metric(obj).reshape(-1)
+    kept.settings_used = repr(settings_values(kept))
+    mesh.update()
+
+
+def is_analyzed(obj) -> bool:
+    """Whether the object holds results, stale or not."""
+    return obj.meshfree.fingerprint != ""
+
+
+def is_stale(obj) -> bool:
+    """Whether points, scale or settings have changed since the analysis, or the object never had one."""
+    kept = obj.meshfree
+    if kept.fingerprint != fingerprint(obj) or kept.settings_used != repr(settings_values(kept)):
+        return True
+    now = metric(obj).reshape(-1)
+    return not np.allclose(now, kept.metric, rtol=0.0, atol=1e-5 * np.abs(now).max())
+
+
+def area_text(area: float) -> str:
+    """Write an area in the units of the scene."""
+    units = bpy.context.scene.unit_settings
+    return bpy.utils.units.to_string(units.system, "AREA", area * units.scale_length**2, precision=6).strip()

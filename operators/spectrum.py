@@ -1,0 +1,28 @@
+"""Vibration modes of the active object's points."""
+
+import bpy
+from bpy.props import IntProperty
+
+from .analyze import AnalysisOperator
+from .attributes import eigenvector_name
+
+
+class MESHFREE_OT_spectrum(AnalysisOperator, bpy.types.Operator):
+    """Compute the lowest vibration modes of the surface, and its areas and normals where they are not up to date"""
+
+    bl_idname = "meshfree.spectrum"
+    bl_label = "Compute Modes"
+
+    count: IntProperty(
+        name="Modes",
+        description="How many modes to compute, the constant one included",
+        default=30,
+        min=1,
+        soft_max=100,
+    )
+
+    def execute(self, context):
+        return self.run(context, self.count, shown=eigenvector_name(min(2, self.count)))
+
+
+CLASSES = (MESHFREE_OT_spectrum,)

@@ -1,0 +1,177 @@
+"""Objects that cannot be analyzed: a clear error that says what to do, and nothing changed."""
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.clouds import add_object, everything, local_points, sphere_points
+
+
+def changed(points, index, value):
+    points = points.copy()
+    points[index] = value
+    return points
+
+
+def far_away(points):
+    return points * 1e-4 + 1e3
+
+
+CLOUDS = {
+    "NaN": (lambda points: changed(points, 3, np.nan), "1 of 1000 points.*Delete"),
+    "infinite": (lambda points: changed(points, slice(3, 5), np.inf), "2 of 1000 points.*Delete"),
+    "too few": (lambda points: points[:20], "there are 20\\."),
+    "collinear": (lambda points: points * (1, 0, 0), "1000 points.*line"),
+    "all at one place": (lambda points: 0 * points, "there are 1 among 1000"),
+    "far from the origin": (far_away, "from the origin.*Move"),
+    "island of three": (lambda points: np.vstack([points, 100 + 0.01 * np.eye(3)]), "3"),
+}
+
+
+@pytest.mark.parametrize("operator", ["analyze", "spectrum"])
+@pytest.mark.parametrize(("cloud", "text"), CLOUDS.values(), ids=CLOUDS.keys())
+def test_points_without_an_answer(operator, cloud, text):
+    obj = add_object(cloud(sphere_points()))
+    obj["lb_eigenvalues"] = [0.5]
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=f"(?s)Error: .*{text}"):
+        getattr(bpy.ops.meshfree, operator)()
+    assert everything(obj) == before
+
+
+def assert_refused(obj, text):
+    before = everything(obj)
+    for operator in (bpy.ops.meshfree.analyze, bpy.ops.meshfree.spectrum, bpy.ops.meshfree.colormap):
+        with pytest.raises(RuntimeError, match=text):
+            operator()
+    assert everything(obj) == before
+
+
+def test_no_active_object():
+    with pytest.raises(RuntimeError, match=r"No active object. Select a mesh"):
+        bpy.ops.meshfree.analyze()
+
+
+@pytest.mark.parametrize(("kind", "name"), [("LIGHT", "Light"), ("EMPTY", "Empty"), ("FONT", "Text")])
+def test_object_of_another_type(kind, name):
+    data = {
+        "LIGHT": lambda: bpy.data.lights.new("Other", "POINT"),
+        "EMPTY": lambda: None,
+        "FONT": lambda: bpy.data.curves.new("Other", "FONT"),
+    }[kind]()
+    obj = bpy.data.objects.new("Other", data)
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    with pytest.raises(RuntimeError, match=f'"Other" is a {name}, not a Mesh. Convert it'):
+        bpy.ops.meshfree.analyze()
+
+
+def test_edit_mode():
+    obj = add_object(sphere_points())
+    bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        assert_refused(obj, "not in Object Mode. Switch to Object Mode")
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_no_vertices():
+    assert_refused(add_object(np.empty((0, 3))), "has no vertices. Add points")
+
+
+def test_object_linked_from_a_library(tmp_path):
+    obj = add_object(sphere_points(), "Linked")
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {obj})
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, target):
+        target.objects = ["Linked"]
+    obj = target.objects[0]
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    assert_refused(obj, "linked from a library. Use Object > Relations > Make Local")
+
+
+def test_mesh_linked_from_a_library(tmp_path):
+    obj = add_object(sphere_points(), "Linked")
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {obj.data})
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, target):
+        target.meshes = ["Linked"]
+    obj = bpy.data.objects.new("Local", target.meshes[0])
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    assert_refused(obj, "linked from a library")
+
+
+def test_mesh_shared_by_objects():
+    obj = add_object(sphere_points())
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=r'shares its mesh with "Cloud.001"\. Turn on Make Single User'):
+        bpy.ops.meshfree.analyze()
+    assert everything(obj) == before
+
+
+def test_mesh_with_a_fake_user_is_not_shared():
+    add_object(sphere_points()).data.use_fake_user = True
+    assert bpy.ops.meshfree.analyze() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("name", ["lb_area", "lb_eigenvector_002"])
+def test_vertex_group_with_the_name_of_a_result(name):
+    obj = add_object(sphere_points())
+    obj.vertex_groups.new(name=name)
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=f"vertex groups named {name}.*Rename"):
+        bpy.ops.meshfree.analyze(modes=3)
+    assert everything(obj) == before
+
+
+def test_vertex_group_with_the_name_of_a_mode_that_is_not_written_does_no_harm():
+    obj = add_object(sphere_points())
+    obj.vertex_groups.new(name="lb_eigenvector_002")
+    assert bpy.ops.meshfree.analyze() == {"FINISHED"}
+
+
+def test_scale_of_zero():
+    obj = add_object(sphere_points())
+    obj.scale = (1.0, 0.0, 1.0)
+    bpy.context.view_layer.update()
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=r"scaled to nothing along an axis.*scale above zero"):
+        bpy.ops.meshfree.analyze()
+    assert everything(obj) == before
+
+
+def test_settings_that_do_not_go_together():
+    obj = add_object(sphere_points())
+    obj.meshfree.neighbors, obj.meshfree.bandwidth_factor = 6, 0.1
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match="Raise one of them"):
+        bpy.ops.meshfree.analyze()
+    assert everything(obj) == before
+
+
+def test_failed_second_analysis_keeps_the_results_of_the_first():
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.analyze(modes=3)
+    positions = local_points(obj)
+    obj.data.vertices[0].co.x = np.nan
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match="not finite"):
+        bpy.ops.meshfree.analyze()
+    assert everything(obj) == before
+    assert len(positions) == 1000
+
+
+def test_colors_of_a_missing_or_unfit_attribute():
+    obj = add_object(sphere_points())
+    obj.data.attributes.new("edges", "FLOAT", "EDGE")
+    before = everything(obj)
+    for name, text in (("nothing", "no attribute nothing"), ("edges", "on the domain EDGE"), ("", "lb_mean_curvature")):
+        with pytest.raises(RuntimeError, match=text):
+            bpy.ops.meshfree.colormap(attribute=name)
+    assert everything(obj) == before

@@ -1,0 +1,237 @@
+"""The command line, by the function that Blender calls with its arguments."""
+
+import importlib
+import json
+
+import bpy
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests.blender.clouds import add_object, attribute, sphere_points
+
+POINTS = sphere_points()
+
+
+@pytest.fixture
+def run(extension, capfd):
+    """Run the command line; return the exit code and the JSON lines."""
+    command = importlib.import_module(f"{extension.__name__}.operators.command")
+
+    def run(*arguments):
+        code = command.run([str(argument) for argument in arguments])
+        lines = [json.loads(line) for line in capfd.readouterr().out.splitlines() if line.startswith("{")]
+        return code, lines
+
+    return run
+
+
+def write_ply(path):
+    obj = add_object(POINTS)
+    obj.select_set(True)
+    bpy.ops.wm.ply_export(filepath=str(path), forward_axis="Y", up_axis="Z", export_selected_objects=True)
+
+
+def write_obj(path):
+    path.write_text("".join(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in POINTS))
+
+
+def write_text(delimiter, header="", decimal=".", extra=0):
+    def write(path):
+        rows = np.hstack([POINTS, np.zeros((len(POINTS), extra))])
+        lines = [delimiter.join(f"{value:.9g}".replace(".", decimal) for value in row) for row in rows]
+        path.write_text("\n".join([*header.splitlines(), *lines]))
+
+    return write
+
+
+def write_blend(path):
+    add_object(POINTS)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+
+
+FORMATS = {
+    "a.ply": write_ply,
+    "b.obj": write_obj,
+    "c.xyz": write_text(" "),
+    "d.csv": write_text(",", header="# made by hand\nx,y,z,w", extra=1),
+    "e.csv": write_text(";", header="x;y;z", decimal=","),
+    "f.txt": write_text("\t"),
+    "g.blend": write_blend,
+}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
+    FORMATS[name](tmp_path / name)
+    code, lines = run("analyze", tmp_path / name, "--out", tmp_path / "out.npz", "--modes", 4)
+    assert code == 0, lines
+    laplacian = core.build_laplacian(POINTS, options=core.LaplacianOptions(orient=True))
+    spectrum = laplacian.eigenpairs(4)
+    (line,) = lines
+    assert line["file"] == str(tmp_path / name)
+    assert line["points"] == 1000
+    assert line["total_area"] == pytest.approx(laplacian.areas.sum(), rel=1e-4)
+    assert line["eigenvalues"] == pytest.approx(spectrum.eigenvalues.tolist(), rel=1e-3, abs=1e-9)
+    assert line["notices"] == []
+    assert line["seconds"]["Spectrum"] >= 0.0
+    with np.load(tmp_path / "out.npz") as arrays:
+        assert_allclose(arrays["points"], POINTS, atol=1e-6)
+        assert_allclose(arrays["areas"], laplacian.areas, rtol=0.05)
+        assert_allclose(arrays["normals"], laplacian.normals, atol=1e-2)
+        assert_allclose(arrays["smoothing_lengths"], laplacian.smoothing_lengths, rtol=1e-4)
+        assert arrays["mean_curvature"].shape == (1000,)
+        assert arrays["eigenvectors"].shape == (1000, 4)
+        assert arrays["eigenvalues"].tolist() == line["eigenvalues"]
+        assert all(arrays[key].dtype == np.float64 for key in arrays)
+
+
+def test_blend_output_holds_attributes_eigenvalues_and_colors(run, tmp_path):
+    write_obj(tmp_path / "in.obj")
+    code, _ = run("analyze", tmp_path / "in.obj", "--out", tmp_path / "new" / "out.blend", "--modes", 3)
+    assert code == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "new" / "out.blend"))
+    obj = bpy.context.view_layer.objects.active
+    assert len(obj["lb_eigenvalues"]) == 3
+    assert attribute(obj, "lb_eigenvector_003").shape == (1000,)
+    assert [item.name for item in obj.modifiers] == ["Mesh-Free Display"]
+    assert len(bpy.data.objects) == 1
+
+
+def test_ply_output_holds_the_points_and_attributes(run, tmp_path):
+    write_obj(tmp_path / "in.obj")
+    code, _ = run("analyze", tmp_path / "in.obj", "--out", tmp_path / "out.ply", "--modes", 2)
+    assert code == 0
+    header = (tmp_path / "out.ply").read_bytes().split(b"end_header")[0].decode()
+    assert "element vertex 1000" in header
+    for name in ("lb_area", "lb_normal_x", "lb_mean_curvature", "lb_eigenvector_002"):
+        assert f"property float {name}\n" in header
+
+
+def test_many_inputs_one_failing(run, tmp_path):
+    write_obj(tmp_path / "a.obj")
+    (tmp_path / "b.csv").write_text("x,y\n1,2\n")
+    write_text(" ")(tmp_path / "c.xyz")
+    inputs = [tmp_path / name for name in ("a.obj", "b.csv", "missing.ply", "c.xyz")]
+    code, lines = run("analyze", *inputs, "--out-dir", tmp_path / "out", "--format", "npz")
+    assert code == 1
+    assert ["error" in line for line in lines] == [False, True, True, False]
+    assert "columns of numbers x y z" in lines[1]["error"]
+    assert "no file" in lines[2]["error"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.npz", "c.npz"]
+
+
+def test_without_output_it_only_prints(run, tmp_path):
+    write_obj(tmp_path / "in.obj")
+    code, lines = run("analyze", tmp_path / "in.obj")
+    assert code == 0
+    assert lines[0]["output"] is None
+    assert [path.name for path in tmp_path.iterdir()] == ["in.obj"]
+
+
+def test_settings(core, run, tmp_path):
+    write_text(" ")(tmp_path / "in.xyz")
+    given = ("--neighbors", 60, "--bandwidth", "global", "--no-symbol-correction")
+    code, lines = run("analyze", tmp_path / "in.xyz", "--modes", 3, *given)
+    assert code == 0
+    options = core.LaplacianOptions(neighbors=60, bandwidth="global", symbol_correction=False, orient=True)
+    spectrum = core.build_laplacian(POINTS, options=options).eigenpairs(3)
+    assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
+
+
+def test_object_of_a_blend_file(run, tmp_path):
+    add_object(POINTS, "One")
+    add_object(2.0 * POINTS, "Two")
+    bpy.context.view_layer.objects.active = None
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    code, lines = run("analyze", tmp_path / "in.blend")
+    assert code == 1
+    assert "no active mesh object" in lines[0]["error"]
+    assert "--object: One, Two" in lines[0]["error"]
+    code, lines = run("analyze", tmp_path / "in.blend", "--object", "Two")
+    assert code == 0
+    assert lines[0]["total_area"] == pytest.approx(16.0 * np.pi, rel=0.01)
+    code, lines = run("analyze", tmp_path / "in.blend", "--object", "Three")
+    assert code == 1
+    assert 'no mesh object "Three"' in lines[0]["error"]
+
+
+def test_text_far_from_the_origin_keeps_its_precision(run, tmp_path):
+    far = np.array([400_000.0, 5_000_000.0, 100.0])
+    np.savetxt(tmp_path / "in.xyz", POINTS + far, fmt="%.17g")
+    code, lines = run("analyze", tmp_path / "in.xyz", "--out", tmp_path / "out.npz")
+    assert code == 0, lines
+    assert lines[0]["total_area"] == pytest.approx(4.0 * np.pi, rel=0.01)
+    with np.load(tmp_path / "out.npz") as arrays:
+        assert_allclose(arrays["points"], POINTS + far, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("1 2 nan\n" + "1 2 3\n" * 200, "1 of 201 points"),
+        ("1 2 3\n1 2 x\n", "columns of numbers"),
+        ("\0\1\2 binary", "columns of numbers"),
+    ],
+    ids=["NaN", "word", "binary"],
+)
+def test_bad_text(run, tmp_path, text, error):
+    (tmp_path / "in.txt").write_text(text)
+    code, lines = run("analyze", tmp_path / "in.txt")
+    assert code == 1
+    assert error in lines[0]["error"]
+
+
+def test_unreadable_files(run, tmp_path):
+    (tmp_path / "bad.ply").write_text("this is no PLY")
+    (tmp_path / "bad.blend").write_text("this is no Blender file")
+    (tmp_path / "empty.obj").write_text("")
+    (tmp_path / "scan.e57").write_text("")
+    inputs = sorted(tmp_path.iterdir())
+    code, lines = run("analyze", *inputs)
+    assert code == 1
+    assert all(line["error"] for line in lines)
+    assert len(lines) == 4
+
+
+def test_input_is_never_overwritten(run, tmp_path):
+    write_blend(tmp_path / "in.blend")
+    before = (tmp_path / "in.blend").read_bytes()
+    code, lines = run("analyze", tmp_path / "in.blend", "--out", tmp_path / "in.blend")
+    assert code == 1
+    assert "overwrite its input" in lines[0]["error"]
+    assert (tmp_path / "in.blend").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("analyze",),
+        ("paint", "a.ply"),
+        ("analyze", "a.ply", "b.ply", "--out", "c.npz"),
+        ("analyze", "a.ply", "--out", "c.stl"),
+        ("analyze", "a.ply", "--modes", "-1"),
+        ("analyze", "a.ply", "--modes", "many"),
+        ("analyze", "a.ply", "a.obj", "--out-dir", "out"),
+        ("analyze", "a.ply", "--out", "c.npz", "--out-dir", "out"),
+        ("analyze", "a.ply", "--areas", "wrong"),
+    ],
+)
+def test_wrong_usage_has_exit_code_2(run, capfd, arguments):
+    assert run(*arguments) == (2, [])
+
+
+def test_help(extension, capfd):
+    command = importlib.import_module(f"{extension.__name__}.operators.command")
+    assert command.run(["analyze", "--help"]) == 0
+    shown = capfd.readouterr().out
+    for text in ("--out-dir", "--modes", "--bandwidth", "one JSON line per input"):
+        assert text in shown
+
+
+def test_extension_stays_usable_after_a_run(run, tmp_path):
+    write_obj(tmp_path / "in.obj")
+    run("analyze", tmp_path / "in.obj")
+    add_object(POINTS, "After")
+    assert bpy.ops.meshfree.analyze() == {"FINISHED"}

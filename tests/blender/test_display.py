@@ -1,0 +1,246 @@
+"""Colours on points: the modifier, the material, the range, and the legend for renders."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.clouds import add_object, attribute, sphere_points
+
+
+@pytest.fixture
+def display(extension):
+    return importlib.import_module(f"{extension.__name__}.ui.display")
+
+
+@pytest.fixture
+def colormaps(extension):
+    return importlib.import_module(f"{extension.__name__}.ui.colormaps")
+
+
+@pytest.fixture
+def obj():
+    obj = add_object(sphere_points() * (1.0, 1.3, 1.7))
+    bpy.ops.meshfree.analyze(modes=4)
+    return obj
+
+
+def bounds(display, obj):
+    node = display.range_node(obj)
+    return node.inputs["From Min"].default_value, node.inputs["From Max"].default_value
+
+
+def display_points(obj):
+    """Point clouds that the evaluated object shows: number of points, attribute names, radii, materials."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    clouds = [
+        item.object.data
+        for item in graph.object_instances
+        if item.object.type == "POINTCLOUD" and item.parent in {None, obj.evaluated_get(graph)}
+    ]
+    return [
+        (
+            len(cloud.points),
+            set(cloud.attributes.keys()),
+            np.array([value.value for value in cloud.attributes["radius"].data]),
+            list(cloud.materials),
+        )
+        for cloud in clouds
+    ]
+
+
+def test_analysis_shows_its_result(display, obj):
+    assert display.shown_attribute(obj) == "lb_mean_curvature"
+
+
+def test_points_carry_the_attribute_a_radius_and_the_material(display, obj):
+    ((count, names, radii, materials),) = display_points(obj)
+    assert count == 1000
+    assert {"lb_area", "lb_normal", "lb_mean_curvature", "lb_eigenvector_004"} <= names
+    spacing = np.sqrt(obj.meshfree.total_area / 1000)
+    assert (0.3 * spacing < radii).all()
+    assert (radii < 1.5 * spacing).all()
+    assert [material.name for material in materials] == [display.find_material(obj).name]
+
+
+def test_evaluated_mesh_keeps_its_vertices(obj):
+    assert len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices) == 1000
+
+
+def test_points_of_faces_stay_a_surface():
+    obj = add_object(sphere_points(), faces=[(0, 1, 2), (1, 2, 3)])
+    bpy.ops.meshfree.analyze()
+    ((count, *_),) = display_points(obj)
+    assert count == 996
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert len(mesh.polygons) == 2
+    assert mesh.materials[0].name == f"Mesh-Free Display {obj.name}"
+
+
+def test_second_run_changes_the_display_in_place(display, obj):
+    modifier, material = display.find_display(obj).name, display.find_material(obj)
+    display.set_input(display.find_display(obj), "Radius", 0.123)
+    blocks = len(bpy.data.materials), len(bpy.data.node_groups)
+    for name in ("lb_eigenvector_003", "lb_normal", "lb_area"):
+        bpy.ops.meshfree.colormap(attribute=name)
+        assert display.shown_attribute(obj) == name
+    assert [item.name for item in obj.modifiers] == [modifier]
+    assert display.find_material(obj) == material
+    assert (len(bpy.data.materials), len(bpy.data.node_groups)) == blocks
+    assert display.get_input(display.find_display(obj), "Radius") == pytest.approx(0.123)
+
+
+def test_without_a_name_the_attribute_on_show_stays(display, obj):
+    bpy.ops.meshfree.colormap(attribute="lb_eigenvector_003")
+    bpy.ops.meshfree.colormap()
+    assert display.shown_attribute(obj) == "lb_eigenvector_003"
+    obj.data.vertices[0].co *= 1.1
+    bpy.ops.meshfree.analyze()  # removes the modes
+    assert display.shown_attribute(obj) == "lb_mean_curvature"
+
+
+def test_radius_can_be_given(display, obj):
+    bpy.ops.meshfree.colormap(radius=0.05)
+    ((_, _, radii, _),) = display_points(obj)
+    assert np.allclose(radii, 0.05)
+
+
+def test_display_stays_last(obj):
+    obj.modifiers.new("Later", "SMOOTH")
+    assert [item.name for item in obj.modifiers] == ["Later", "Mesh-Free Display"]
+    display = obj.modifiers["Mesh-Free Display"]
+    display.use_pin_to_last = False
+    obj.modifiers.move(1, 0)
+    bpy.ops.meshfree.colormap()
+    assert [item.name for item in obj.modifiers] == ["Later", "Mesh-Free Display"]
+
+
+def test_objects_share_the_nodes_but_not_the_material(display, obj):
+    other = add_object(sphere_points(seed=1), "Other")
+    bpy.ops.meshfree.analyze()
+    assert display.find_display(obj).node_group == display.find_display(other).node_group
+    assert display.find_material(obj) != display.find_material(other)
+
+
+def test_duplicate_of_an_object_gets_its_own_material(display, obj):
+    other = obj.copy()
+    other.data = obj.data.copy()
+    bpy.context.scene.collection.objects.link(other)
+    bpy.context.view_layer.objects.active = other
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert display.shown_attribute(obj) == "lb_mean_curvature"
+    assert display.shown_attribute(other) == "lb_area"
+
+
+def test_material_of_the_user_is_left_alone(display, obj):
+    own = bpy.data.materials.new("Own")
+    if own.node_tree is None:
+        own.use_nodes = True
+    nodes = own.node_tree.nodes.keys()
+    display.set_input(display.find_display(obj), "Material", own)
+    assert display.shown_attribute(obj) == ""
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert own.node_tree.nodes.keys() == nodes
+    assert display.shown_attribute(obj) == "lb_area"
+
+
+def test_display_can_be_left_out():
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.analyze(show=False)
+    assert not obj.modifiers
+
+
+def test_signed_values_are_centered_on_zero(display, obj):
+    bpy.ops.meshfree.colormap(attribute="lb_eigenvector_002")
+    low, high = bounds(display, obj)
+    values = attribute(obj, "lb_eigenvector_002")
+    assert low == -high
+    assert np.mean(np.abs(values) <= high) == pytest.approx(0.98, abs=0.015)
+    middle = display.color_node(obj).color_ramp.evaluate(0.5)
+    assert np.ptp(middle[:3]) < 0.05
+
+
+def test_positive_values_are_sequential(display, obj):
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    low, high = bounds(display, obj)
+    assert 0.0 < low < high
+    assert np.allclose(display.color_node(obj).color_ramp.evaluate(0.0)[:3], (0.0578, 0.0004, 0.0887), atol=1e-3)
+
+
+def test_settings_of_the_display(display, obj):
+    values = attribute(obj, "lb_normal")[:, 0]
+    obj.meshfree.coverage, obj.meshfree.component, obj.meshfree.color_map = 100.0, "X", "VIRIDIS"
+    bpy.ops.meshfree.colormap(attribute="lb_normal")
+    assert bounds(display, obj) == pytest.approx((values.min(), values.max()))
+    obj.meshfree.component = "DIRECTION"
+    bpy.ops.meshfree.colormap(attribute="lb_normal")
+    assert display.range_node(obj) is None
+
+
+def test_attributes_of_other_origin_can_be_shown(display, obj):
+    for kind, name in (("INT", "count"), ("BOOLEAN", "flag"), ("FLOAT", "value")):
+        obj.data.attributes.new(name, kind, "POINT")
+        bpy.ops.meshfree.colormap(attribute=name)
+        assert display.shown_attribute(obj) == name
+
+
+def test_outliers_do_not_wash_the_colors_out(colormaps):
+    values = np.linspace(1.0, 2.0, 1000)
+    values[:3] = 1e6
+    name, low, high = colormaps.fit(values, coverage=98.0)
+    assert name == "VIRIDIS"
+    assert 1.0 <= low < high < 2.1
+
+
+@pytest.mark.parametrize(
+    ("values", "low", "high"),
+    [
+        (np.full(9, 3.0), 2.7, 3.3),
+        (np.zeros(9), -1.0, 1.0),
+        (np.array([np.nan, 1.0, 2.0]), 1.0, 2.0),
+        (np.full(3, np.nan), 0.0, 1.0),
+        (np.arange(100) == 7, 0.0, 1.0),
+        (np.empty(0), 0.0, 1.0),
+    ],
+    ids=["constant", "zero", "not finite in part", "not finite", "one of many", "empty"],
+)
+def test_range_of_special_values(colormaps, values, low, high):
+    coverage = 100.0 if np.isnan(values.astype(float)).any() else 98.0
+    assert colormaps.fit(values, coverage)[1:] == pytest.approx((low, high))
+
+
+@pytest.mark.parametrize(
+    ("name", "title"),
+    [("lb_mean_curvature", "Mean Curvature"), ("lb_eigenvector_007", "Mode 7"), ("weight", "Weight")],
+)
+def test_titles(display, name, title):
+    assert display.label(name) == title
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+@pytest.mark.parametrize(("name", "texts"), [("lb_area", 6), ("lb_normal", 7)])
+def test_legend_lies_inside_the_picture_and_is_made_once(extension, obj, kind, name, texts):
+    legend = importlib.import_module(f"{extension.__name__}.ui.legend")
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    camera.data.type = kind
+    camera.data.shift_x = 0.1
+    camera.location, camera.rotation_euler = (3.0, -4.0, 1.0), (1.2, 0.3, 0.5)
+    bpy.ops.meshfree.colormap(attribute=name)
+    legend.make_legend(scene, obj, camera)
+    parts = list(legend.make_legend(scene, obj, camera).objects)
+    assert len([part for part in parts if part.type == "FONT"]) == texts
+    assert len([block for block in bpy.data.objects if block.parent == camera]) == len(parts)
+    bpy.context.view_layer.update()
+    from bpy_extras.object_utils import world_to_camera_view
+    from mathutils import Vector
+
+    for part in parts:
+        for corner in part.bound_box:
+            x, y, depth = world_to_camera_view(scene, camera, part.matrix_world @ Vector(corner))
+            assert 0.6 < x < 1.0
+            assert 0.1 < y < 0.9
+            assert camera.data.clip_start < depth

@@ -1,0 +1,166 @@
+"""The panel draws in every state, and everything a user meets has a name and a tooltip in house style."""
+
+import importlib
+import re
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.clouds import add_object, sphere_points
+
+OPERATORS = ("analyze", "spectrum", "colormap")
+
+
+class Layout:
+    """Stands in for Blender's layout: checks what it is asked to draw and remembers the texts."""
+
+    def __init__(self, texts=None):
+        self.texts = [] if texts is None else texts
+
+    def row(self, **_):
+        return Layout(self.texts)
+
+    column = box = grid_flow = row
+
+    def label(self, text="", icon="NONE"):
+        assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
+        self.texts.append(text)
+
+    def prop(self, data, path, text=None):
+        data.path_resolve(path)
+        self.texts.append(text or path)
+
+    def operator(self, idname, text=None, icon="NONE", depress=False):
+        kind = getattr(bpy.ops.meshfree, idname.removeprefix("meshfree.")).get_rna_type()
+        self.texts.append(text if text is not None else kind.name)
+        return SimpleNamespace(**dict.fromkeys(item.identifier for item in kind.properties))
+
+
+def draw():
+    """Texts of all panels for the active object."""
+    texts = []
+    for name in ("main", "settings", "spectrum", "display"):
+        panel = getattr(bpy.types, f"MESHFREE_PT_{name}")
+        if not hasattr(panel, "poll") or panel.poll(bpy.context):
+            panel.draw(SimpleNamespace(layout=Layout(texts)), bpy.context)
+    return texts
+
+
+def test_panel_without_object_says_what_to_do():
+    assert "Select a mesh" in " ".join(draw())
+
+
+def test_panel_in_edit_mode_says_what_to_do():
+    add_object(sphere_points())
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert "Switch to Object Mode" in " ".join(draw())
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_panel_of_a_new_object():
+    add_object(sphere_points())
+    texts = draw()
+    assert "Cloud: 1,000 points" in texts
+    assert "Total Area" not in texts
+
+
+def test_panel_follows_the_order_of_work():
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.spectrum(count=25)
+    texts = draw()
+    order = [texts.index(text) for text in ("Analyze Points", "Total Area", "Compute Modes", "Eigenvalues", "Mode 2")]
+    assert order == sorted(order)
+    area = next(text for text in texts if "m²" in text)
+    assert float(area.split()[0]) == pytest.approx(4.0 * np.pi, rel=0.01)
+    second = next(text for text in texts if text.startswith("2:"))
+    assert float(second.split()[1]) == pytest.approx(obj["lb_eigenvalues"][1], rel=1e-4)
+    assert "1:  0" in texts
+    assert any(text.startswith("and 5 more, up to") for text in texts)
+    assert not any("analyze again" in text for text in texts)
+
+
+def test_panel_marks_stale_results():
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.analyze()
+    obj.data.vertices[0].co.x += 0.001
+    assert "Points or settings changed: analyze again" in draw()
+
+
+def test_panel_names_scale_faces_modifiers_and_sharing():
+    obj = add_object(sphere_points(), faces=[(0, 1, 2)])
+    obj.scale = (1.0, 2.0, 1.0)
+    obj.modifiers.new("Smooth", "SMOOTH")
+    bpy.context.scene.collection.objects.link(obj.copy())
+    bpy.context.view_layer.update()
+    texts = draw()
+    for text in (
+        "Object scale (1, 2, 1) is applied",
+        "Faces not used: 1",
+        "Modifiers left out: 1",
+        "Other objects share this mesh",
+    ):
+        assert text in texts
+
+
+@pytest.mark.parametrize("name", ["lb_normal", "lb_area", "lb_eigenvector_001", "lb_eigenvector_003"])
+def test_panel_for_each_kind_of_display(name):
+    add_object(sphere_points())
+    bpy.ops.meshfree.spectrum(count=3)
+    bpy.ops.meshfree.colormap(attribute=name)
+    texts = draw()
+    assert "Point Radius" in texts
+    assert ("Range From" in texts) == (name != "lb_normal")
+
+
+def described():
+    for name in OPERATORS:
+        kind = getattr(bpy.ops.meshfree, name).get_rna_type()
+        yield kind.identifier, kind.name, kind.description
+        for item in kind.properties:
+            if item.identifier != "rna_type":
+                yield f"{kind.identifier}.{item.identifier}", item.name, item.description
+    for group in ("MESHFREE_PG_settings", "MESHFREE_PG_stage"):
+        for item in bpy.types.PropertyGroup.bl_rna_get_subclass_py(group).bl_rna.properties:
+            if item.identifier in {"rna_type", "name"}:
+                continue
+            yield f"{group}.{item.identifier}", item.name, item.description
+            if item.type == "ENUM":
+                for choice in item.enum_items:
+                    yield f"{group}.{item.identifier}.{choice.identifier}", choice.name, choice.description
+
+
+def test_names_and_tooltips():
+    small = {"of", "to", "as", "the", "and"}
+    items = list(described())
+    assert len(items) > 40
+    for path, name, description in items:
+        assert all(word in small or word[0].isupper() for word in name.split()), f"{path}: label {name!r}"
+        assert re.match(r"[A-Z]", description), f"{path}: tooltip {description!r}"
+        assert not description.endswith("."), f"{path}: tooltip {description!r}"
+
+
+def test_every_option_of_core_is_a_setting_with_its_default(extension, core):
+    options = importlib.import_module(f"{extension.__name__}.operators.options")
+    obj = add_object(sphere_points())
+    assert options.laplacian_options(obj.meshfree) == core.LaplacianOptions(orient=True)
+    properties = obj.meshfree.bl_rna.properties
+    for name, value in options.settings_values(obj.meshfree).items():
+        if properties[name].type == "ENUM":
+            for choice in properties[name].enum_items:
+                core.LaplacianOptions(**{name: choice.identifier.lower()})
+        else:
+            assert getattr(core.LaplacianOptions(), name) == value
+
+
+def test_operators_can_be_undone_and_found():
+    for name in OPERATORS:
+        operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
+        assert operator.bl_options == {"REGISTER", "UNDO"}
+        assert operator.bl_idname == f"meshfree.{name}"
+
+
+def test_tab():
+    for name in ("main", "settings", "spectrum", "display"):
+        assert getattr(bpy.types, f"MESHFREE_PT_{name}").bl_category == "Mesh-Free"

@@ -1,0 +1,1 @@
+"""Settings, panels and colours. No mathematics, no data access of its own."""

@@ -1,0 +1,144 @@
+"""A legend for renders: the colours on show, their values and a title, fixed in front of a camera."""
+
+import bpy
+
+from .display import color_node, label, range_node, shown_attribute
+from .nodes import add_node, direction_color, new_tree
+
+NAME = "Mesh-Free Legend"
+_TICKS = 5
+_STEPS = 64  # of the bar's colours
+_COLOR = "legend_color"  # attribute of the parts
+_DIRECTIONS = {
+    "+X": (1, 0, 0),
+    "+Y": (0, 1, 0),
+    "+Z": (0, 0, 1),
+    "-X": (-1, 0, 0),
+    "-Y": (0, -1, 0),
+    "-Z": (0, 0, -1),
+}
+
+
+def make_legend(scene, obj, camera, title: str = ""):
+    """Put a legend of what an object shows at the right edge of the picture, in place of an earlier one.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Its render resolution gives the shape of the picture.
+    obj : bpy.types.Object
+        An object with a display, as `meshfree.colormap` makes it.
+    camera : bpy.types.Object
+        The legend becomes its child, close in front of it.
+    title : str
+        Text above the colours; empty for the name of the attribute.
+
+    Returns
+    -------
+    bpy.types.Collection
+        The legend's objects.
+    """
+    legend = _Legend(scene, camera)
+    legend.rectangle((0.0, 0.0, 1.0, 1.0), [(0.01, 0.01, 0.01, 1.0)] * 2, depth=1.01)
+    legend.text(title or label(shown_attribute(obj)), 0.08, 0.94, width=0.84)
+    low, high, bottom, top = 0.1, 0.32, 0.05, 0.86
+    bounds = range_node(obj)
+    if bounds is None:
+        height = (top - bottom) / len(_DIRECTIONS)
+        for index, (name, direction) in enumerate(_DIRECTIONS.items()):
+            y = top - (index + 1) * height
+            legend.rectangle((low, y, high, y + 0.85 * height), [direction_color(direction)] * 2)
+            legend.text(name, high + 0.1, y + 0.42 * height)
+        return legend.collection
+    ramp = color_node(obj).color_ramp
+    legend.rectangle((low, bottom, high, top), [ramp.evaluate(step / _STEPS) for step in range(_STEPS + 1)])
+    first, last = (bounds.inputs[name].default_value for name in ("From Min", "From Max"))
+    for tick in range(_TICKS):
+        share = tick / (_TICKS - 1)
+        y = bottom + share * (top - bottom)
+        legend.rectangle((high, y - 0.002, high + 0.05, y + 0.002), [(1.0, 1.0, 1.0, 1.0)] * 2)
+        legend.text(f"{first + share * (last - first):.3g}", high + 0.1, y)
+    return legend.collection
+
+
+class _Legend:
+    """A plate in front of a camera; places on it are given from 0 to 1, from the lower left corner."""
+
+    def __init__(self, scene, camera):
+        self.collection = _empty_collection(scene)
+        self._camera = camera
+        self._depth = 1.5 * camera.data.clip_start
+        corners = camera.data.view_frame(scene=scene)
+        scale = 1.0 if camera.data.type == "ORTHO" else self._depth / -corners[0].z
+        right, top = (scale * max(corner[axis] for corner in corners) for axis in (0, 1))
+        left, bottom = (scale * min(corner[axis] for corner in corners) for axis in (0, 1))
+        unit = min(right - left, top - bottom)
+        self._size = (0.3 * unit, 0.7 * unit)
+        self._corner = (right - 0.33 * unit, 0.5 * (bottom + top) - 0.35 * unit)
+
+    def rectangle(self, box, colors, depth=1.0):
+        """Add a rectangle (left, bottom, right, top) with colours from its bottom to its top."""
+        left, bottom, right, top = box
+        steps = len(colors) - 1
+        rows = [bottom + (top - bottom) * index / steps for index in range(len(colors))]
+        mesh = bpy.data.meshes.new(NAME)
+        mesh.from_pydata(
+            [self._place(x, y, depth) for y in rows for x in (left, right)],
+            [],
+            [(2 * index, 2 * index + 1, 2 * index + 3, 2 * index + 2) for index in range(steps)],
+        )
+        attribute = mesh.attributes.new(_COLOR, "FLOAT_COLOR", "POINT")
+        attribute.data.foreach_set("color", [value for color in colors for _ in (0, 1) for value in color])
+        self._add(mesh, _material(f"{NAME} Colors", _COLOR))
+
+    def text(self, text, x, y, width=0.5):
+        """Add white text, centred in height, small enough to end within a width."""
+        curve = bpy.data.curves.new(NAME, "FONT")
+        curve.body = text
+        curve.align_y = "CENTER"
+        curve.size = min(0.06 * self._size[1], width * self._size[0] / (0.5 * len(text)))
+        self._add(curve, _material(f"{NAME} Text", "")).location = self._place(x, y)
+
+    def _place(self, x, y, depth=1.0):
+        return (
+            depth * (self._corner[0] + x * self._size[0]),
+            depth * (self._corner[1] + y * self._size[1]),
+            -depth * self._depth,
+        )
+
+    def _add(self, data, material):
+        obj = bpy.data.objects.new(NAME, data)
+        data.materials.append(material)
+        obj.parent = self._camera
+        obj.hide_select = True
+        obj.visible_shadow = obj.visible_diffuse = obj.visible_glossy = obj.visible_transmission = False
+        self.collection.objects.link(obj)
+        return obj
+
+
+def _empty_collection(scene):
+    collection = bpy.data.collections.get(NAME)
+    if collection is None:
+        collection = bpy.data.collections.new(NAME)
+    if NAME not in scene.collection.children:
+        scene.collection.children.link(collection)
+    parts = list(collection.objects)
+    bpy.data.batch_remove([*parts, *(part.data for part in parts)])
+    return collection
+
+
+def _material(name, attribute):
+    """Return a material that shines in the colours of an attribute, or in white."""
+    material = bpy.data.materials.get(name)
+    if material is not None:
+        return material
+    material = bpy.data.materials.new(name)
+    tree = new_tree(material)
+    emission = add_node(tree, "ShaderNodeEmission", 1, 0)
+    emission.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    output = add_node(tree, "ShaderNodeOutputMaterial", 2, 0)
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    if attribute:
+        source = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=attribute)
+        tree.links.new(source.outputs["Color"], emission.inputs["Color"])
+    return material

@@ -1,0 +1,162 @@
+"""The panel in the sidebar of the 3D view, tab "Mesh-Free"."""
+
+import bpy
+
+from ..operators import options
+from ..operators.attributes import AREA, MEAN_CURVATURE, NORMAL, eigenvector_name, mode_number
+from ..operators.reading import is_display, obstacle, sharing_objects
+from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
+from .display import find_display, input_property, label, range_node, shown_attribute
+
+_LISTED = 20  # eigenvalues in the panel
+
+
+class _Panel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Mesh-Free"
+
+
+class _ReadyPanel(_Panel):
+    """A panel below the main one, for objects that can be analyzed."""
+
+    bl_parent_id = "MESHFREE_PT_main"
+
+    @classmethod
+    def poll(cls, context):
+        return not obstacle(context.object)
+
+
+class MESHFREE_PT_main(_Panel, bpy.types.Panel):
+    """The object, and the button that analyzes it"""
+
+    bl_label = "Mesh-Free Laplacian"
+
+    def draw(self, context):
+        layout = self.layout
+        obj = context.object
+        reason = obstacle(obj)
+        if reason:
+            column = layout.column(align=True)
+            for sentence in reason.split(". "):
+                column.label(text=sentence)
+            return
+        _draw_summary(layout, obj)
+        row = layout.row(align=True)
+        row.operator("meshfree.analyze").modes = obj.meshfree.modes
+        row.prop(obj.meshfree, "modes")
+        if is_analyzed(obj):
+            row = layout.row()
+            row.label(text="Total Area")
+            row.label(text=area_text(obj.meshfree.total_area))
+            if is_stale(obj):
+                layout.label(text="Points or settings changed: analyze again", icon="ERROR")
+
+
+def _draw_summary(layout, obj):
+    mesh = obj.data
+    column = layout.column(align=True)
+    column.label(text=f"{obj.name}: {len(mesh.vertices):,} points", icon="OUTLINER_OB_MESH")
+    if mesh.polygons:
+        column.label(text=f"Faces not used: {len(mesh.polygons):,}", icon="INFO")
+    scale = obj.matrix_world.to_scale()
+    if max(abs(factor - 1.0) for factor in scale) > 1e-5:
+        shown = ", ".join(f"{factor:.4g}" for factor in scale)
+        column.label(text=f"Object scale ({shown}) is applied", icon="INFO")
+        column.label(text="to lengths and areas", icon="BLANK1")
+    modifiers = [modifier for modifier in obj.modifiers if not is_display(modifier)]
+    if modifiers:
+        state = "used" if obj.meshfree.use_modifiers else "left out"
+        column.label(text=f"Modifiers {state}: {len(modifiers)}", icon="MODIFIER")
+        column.prop(obj.meshfree, "use_modifiers")
+    if sharing_objects(obj):
+        column.label(text="Other objects share this mesh", icon="INFO")
+        column.prop(obj.meshfree, "make_single_user")
+
+
+class MESHFREE_PT_settings(_ReadyPanel, bpy.types.Panel):
+    """Settings that change results"""
+
+    bl_label = "Settings"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in options.NAMES:
+            layout.prop(context.object.meshfree, name)
+
+
+class MESHFREE_PT_spectrum(_ReadyPanel, bpy.types.Panel):
+    """Vibration modes and their eigenvalues"""
+
+    bl_label = "Spectrum"
+
+    def draw(self, context):
+        layout = self.layout
+        obj = context.object
+        layout.operator("meshfree.spectrum").count = obj.meshfree.modes
+        eigenvalues = obj.get(EIGENVALUES)
+        if eigenvalues is None:
+            return
+        layout.label(text="Eigenvalues")
+        shown = shown_attribute(obj)
+        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+        for mode, eigenvalue in enumerate(eigenvalues[:_LISTED], start=1):
+            shown_value = eigenvalue if eigenvalue > 1e-9 * eigenvalues[-1] else 0.0  # 0 up to rounding
+            text, name = f"{mode}:  {shown_value:.5g}", eigenvector_name(mode)
+            if name in obj.data.attributes:
+                grid.operator("meshfree.colormap", text=text, depress=name == shown).attribute = name
+            else:
+                grid.label(text=text)
+        if len(eigenvalues) > _LISTED:
+            layout.label(text=f"and {len(eigenvalues) - _LISTED} more, up to {eigenvalues[-1]:.5g}")
+
+
+class MESHFREE_PT_display(_ReadyPanel, bpy.types.Panel):
+    """What is shown as colors on the points"""
+
+    bl_label = "Display"
+
+    def draw(self, context):
+        layout = self.layout
+        obj = context.object
+        shown = shown_attribute(obj)
+        attributes = obj.data.attributes
+        column = layout.column(align=True)
+        for name in (AREA, NORMAL, MEAN_CURVATURE):
+            row = column.row(align=True)
+            row.enabled = name in attributes
+            row.operator("meshfree.colormap", text=label(name), depress=name == shown).attribute = name
+        _draw_mode_steps(layout, attributes, shown)
+        if find_display(obj) is None:
+            return
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column(align=True)
+        if shown == NORMAL:
+            column.prop(obj.meshfree, "component")
+        column.prop(obj.meshfree, "color_map")
+        column.prop(obj.meshfree, "coverage")
+        column.operator("meshfree.colormap", text="Update Colors")
+        column = layout.column(align=True)
+        bounds = range_node(obj)
+        if bounds is not None:
+            column.prop(bounds.inputs["From Min"], "default_value", text="Range From")
+            column.prop(bounds.inputs["From Max"], "default_value", text="To")
+        layout.prop(*input_property(find_display(obj), "Radius"), text="Point Radius")
+
+
+def _draw_mode_steps(layout, attributes, shown):
+    """Draw buttons to the mode before and after the one on show; with none on show, to the first two."""
+    mode = mode_number(shown) or 1
+    row = layout.row(align=True)
+    for step, text, icon in ((-1, "", "TRIA_LEFT"), (0, f"Mode {mode}", "NONE"), (1, "", "TRIA_RIGHT")):
+        name = eigenvector_name(mode + step)
+        column = row.column(align=True)
+        column.enabled = name in attributes
+        column.operator("meshfree.colormap", text=text, icon=icon, depress=name == shown).attribute = name
+
+
+CLASSES = (MESHFREE_PT_main, MESHFREE_PT_settings, MESHFREE_PT_spectrum, MESHFREE_PT_display)

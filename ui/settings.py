@@ -1,0 +1,167 @@
+"""Settings and results of each object: `Object.meshfree`."""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..operators.options import DEFAULTS
+
+
+class MESHFREE_PG_stage(bpy.types.PropertyGroup):
+    """How long one stage of the last analysis took"""
+
+    seconds: FloatProperty(name="Seconds", description="Time that this stage took, in seconds", min=0.0)
+
+
+class MESHFREE_PG_settings(bpy.types.PropertyGroup):
+    """Settings and results of the Mesh-Free Laplacian for one object"""
+
+    # What results depend on. Names and defaults are those of core's options.
+    bandwidth: EnumProperty(
+        name="Bandwidth",
+        description="How far the kernel of each point reaches",
+        items=(
+            ("LOCAL", "Local", "Follows the spacing of the points: for scans of uneven density and thin parts"),
+            ("GLOBAL", "Global", "The same for all points, as in the paper: for even samples"),
+        ),
+        default=DEFAULTS.bandwidth.upper(),
+    )
+    neighbors: IntProperty(
+        name="Neighbors",
+        description="The bandwidth is measured by the distance to this neighbor; more are smoother and slower",
+        default=DEFAULTS.neighbors,
+        min=6,
+        soft_max=200,
+    )
+    bandwidth_factor: FloatProperty(
+        name="Bandwidth Factor",
+        description="Smoothing length as a multiple of the distance to the neighbor above",
+        default=DEFAULTS.bandwidth_factor,
+        min=0.05,
+        soft_min=0.3,
+        soft_max=1.0,
+        max=5.0,
+        step=5,
+    )
+    normals: EnumProperty(
+        name="Normals",
+        description="How the normal of a point is estimated from its neighbors",
+        items=(
+            ("QUADRIC", "Quadric", "From a curved surface fitted to the neighbors: the most exact on curved surfaces"),
+            ("WPCA", "Weighted Plane", "From a plane through the neighbors, near ones counting more, as in the paper"),
+            ("PCA", "Plain Plane", "From a plane through the neighbors, all counting alike"),
+        ),
+        default=DEFAULTS.normals.upper(),
+    )
+    areas: EnumProperty(
+        name="Areas",
+        description="How the area of each point is computed",
+        items=(
+            ("FAST", "Fast", "Regularized towards the density of the points, with a lower bound"),
+            ("REGULARIZED", "Regularized", "Least squares with regularization, equation 7 of the paper"),
+            ("CONSTRAINED", "Constrained", "The same with positive areas only, equation 8 of the paper"),
+            ("UNIFORM", "Uniform", "The mean area for every point: only for even samples"),
+        ),
+        default=DEFAULTS.areas.upper(),
+    )
+    regularization: FloatProperty(
+        name="Regularization",
+        description="Weight of the regularization of the areas, free of the object's size",
+        default=DEFAULTS.regularization,
+        min=1e-9,
+        soft_max=1.0,
+        precision=6,
+    )
+    curvature_correction: BoolProperty(
+        name="Curvature Correction",
+        description="Measure distances along the surface and correct areas and weights for its curvature",
+        default=DEFAULTS.curvature_correction,
+    )
+    symbol_correction: BoolProperty(
+        name="Symbol Correction",
+        description="Correct eigenvalues and curvature for the known effect of the kernel's width",
+        default=DEFAULTS.symbol_correction,
+    )
+    use_modifiers: BoolProperty(
+        name="Use Modifiers",
+        description="Take the points where the modifiers put them; the modifiers must keep their number and order",
+        default=False,
+    )
+    make_single_user: BoolProperty(
+        name="Make Single User",
+        description="Give the object a mesh of its own if it shares its mesh with other objects",
+        default=False,
+    )
+
+    # Choices of the panel.
+    modes: IntProperty(
+        name="Modes",
+        description="How many vibration modes to compute, the constant one included",
+        default=10,
+        min=1,
+        soft_max=100,
+    )
+    color_map: EnumProperty(
+        name="Color Map",
+        description="Colors from low to high values",
+        items=(
+            ("AUTO", "Automatic", "Cool to Warm for values on both sides of zero, Viridis otherwise"),
+            ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
+            ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
+        ),
+        default="AUTO",
+    )
+    coverage: FloatProperty(
+        name="Coverage",
+        description="Share of the values inside the color range, so that a few outliers do not wash the rest out",
+        default=98.0,
+        min=50.0,
+        max=100.0,
+        subtype="PERCENTAGE",
+    )
+    component: EnumProperty(
+        name="Vector",
+        description="What of a vector is shown",
+        items=(
+            ("DIRECTION", "Direction", "Red, green and blue for the directions x, y and z"),
+            ("X", "X", "The x component as a number"),
+            ("Y", "Y", "The y component as a number"),
+            ("Z", "Z", "The z component as a number"),
+        ),
+        default="DIRECTION",
+    )
+
+    # Results of the last analysis, for the panel and for scripts.
+    total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
+    point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
+    stages: CollectionProperty(
+        type=MESHFREE_PG_stage, name="Stages", description="How long each stage of the last analysis took"
+    )
+    fingerprint: StringProperty(name="Fingerprint", description="Checksum of the points that were analyzed")
+    metric: FloatVectorProperty(name="Metric", description="Scale and shear that were analyzed", size=9)
+    settings_used: StringProperty(name="Settings Used", description="Settings of the last analysis")
+
+
+CLASSES = (MESHFREE_PG_stage, MESHFREE_PG_settings)
+
+
+def attach():
+    """Give every object its settings."""
+    bpy.types.Object.meshfree = PointerProperty(
+        type=MESHFREE_PG_settings,
+        name="Mesh-Free Laplacian",
+        description="Settings and results of the Mesh-Free Laplacian for this object",
+    )
+
+
+def detach():
+    """Take the settings away again."""
+    del bpy.types.Object.meshfree
