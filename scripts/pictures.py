@@ -17,7 +17,7 @@ def main():
         with studio.silence():
             obj = demo.make_object(demo.Coral())
             bpy.ops.meshfree.spectrum(count=20, show=False)
-            studio.set_up(bpy.context.scene, obj, size=(960, 600))
+            studio.set_up(bpy.context.scene, obj, size=(640, 400), samples=64)
         for name, attribute in SHOWN.items():
             path = OUTPUT / f"{name}.png"
             with studio.silence():

@@ -72,6 +72,7 @@ def set_up(scene, obj, size=(1280, 800), samples=16, view=(0.45, -1.0, 0.35)):
     scene.cycles.use_denoising = False
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
+    scene.render.image_settings.compression = 100
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     world = bpy.data.worlds.new("Studio")
