@@ -13,8 +13,8 @@ from .options import LaplacianOptions
 from .surface import fit_surface
 
 _FLOOR = 0.05  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
-_ROUNDS, _STEPS = 5, 30  # of the fast areas
-_RESOLVED = 3e-3  # eigenvalues of the scaled kernel matrix below this are left to the start
+_ROUNDS, _STEPS = 10, 15  # of the fast areas
+_RESOLVED = 1e-2  # eigenvalues of the scaled kernel matrix below this are left to the start
 TAU = 2.0**-52  # the paper's lower bound of eq. (8), in scaled coordinates
 
 
@@ -128,7 +128,7 @@ def fast_areas(matrix, target):
     """Solve A v = b by a projected Chebyshev iteration that starts at the density areas v0 = 1 / (A 1).
 
     With M = V0^(1/2) A V0^(1/2), whose eigenvalues lie in [0, 1] whatever the points, each round runs Chebyshev's
-    semi-iteration on M y = V0^(1/2) b for v = V0^(1/2) y, over the eigenvalues above 3e-3: the smooth part is solved
+    semi-iteration on M y = V0^(1/2) b for v = V0^(1/2) y, over the eigenvalues above 1e-2: the smooth part is solved
     for, and what the kernel cannot see stays near the density areas. Between rounds areas below the floor of 0.05 v0
     are put on it, held there, and released when the gradient turns inward. A fixed number of linear steps, unlike
     conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order of the points.

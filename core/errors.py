@@ -26,7 +26,17 @@ class AreaError(PointCloudError):
 
 
 class UnresolvedModesError(PointCloudError):
-    """More vibration modes asked for than the smoothing length resolves."""
+    """More vibration modes asked for than the smoothing length resolves.
+
+    Attributes
+    ----------
+    resolved : int
+        How many are resolved, from the lowest on.
+    """
+
+    def __init__(self, message, resolved):
+        super().__init__(message)
+        self.resolved = resolved
 
 
 class SolverError(PointCloudError):

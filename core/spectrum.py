@@ -1,6 +1,6 @@
 """Eigenpairs of the operator, eq. (12) of the paper."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -23,13 +23,10 @@ class Spectrum:
         Ascending, non-negative [1 / L^2].
     eigenvectors : ndarray, (n, count)
         Orthonormal for the areas: ``phi.T @ (areas * phi)`` is the identity. The entry of largest size is positive.
-    notices : list of str
-        What a user should know.
     """
 
     eigenvalues: np.ndarray
     eigenvectors: np.ndarray
-    notices: list = field(default_factory=list)
 
 
 def solve_spectrum(laplacian, count, raw, progress=None):
@@ -152,6 +149,7 @@ def correct_eigenvalues(laplacian, values, vectors):
         resolved = int(np.argmin(np.isfinite(corrected)))
         raise UnresolvedModesError(
             f"The {len(values)} modes asked for vary faster than the smoothing length resolves: {resolved} are resolved"
-            f" on {len(laplacian.areas)} points. Ask for at most {resolved}, or lower the number of neighbors."
+            f" on {len(laplacian.areas)} points. Ask for at most {resolved}, or lower the number of neighbors.",
+            resolved,
         )
     return corrected

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ..core import LaplaceBeltrami, PointCloudError, Spectrum, mean_curvature
+from ..core import LaplaceBeltrami, PointCloudError, Spectrum, UnresolvedModesError, mean_curvature
 from . import cache
 from .options import laplacian_options
 from .reading import obstacle, read_points
@@ -40,10 +40,21 @@ def analyze_object(context, obj, modes: int = 0) -> Analysis:
         laplacian = cache.laplacian_for(reading.points, laplacian_options(obj.meshfree), stages)
         stages("Curvature", 0.0)
         curvature = mean_curvature(laplacian)
-        spectrum = laplacian.eigenpairs(modes, progress=stages) if modes else None
-    notices = reading.notices + laplacian.notices + (spectrum.notices if spectrum else [])
+        spectrum, unresolved = resolved_modes(laplacian, modes, stages) if modes else (None, [])
+    notices = reading.notices + laplacian.notices + unresolved
     local_normals = reading.local_normals(laplacian.normals)
     return Analysis(laplacian, local_normals, curvature, spectrum, stages.seconds, notices)
+
+
+def resolved_modes(laplacian, modes, progress):
+    """Compute the modes asked for, or as many of them as the points resolve and a notice of that."""
+    try:
+        return laplacian.eigenpairs(modes, progress=progress), []
+    except UnresolvedModesError as error:
+        if error.resolved == 0:
+            raise
+        notice = f"Only {error.resolved} of {modes} modes were computed: finer ones vary faster than the points resolve."
+        return laplacian.eigenpairs(error.resolved, progress=progress), [notice]
 
 
 class AnalysisOperator:
@@ -87,9 +98,11 @@ class AnalysisOperator:
         for notice in analysis.notices:
             self.report({"WARNING"}, notice)
         message = f"{area_text(analysis.total_area)} from {len(obj.data.vertices):,} points"
-        self.report({"INFO"}, f"{message}, {modes} modes" if modes else message)
+        if analysis.spectrum is not None:
+            message += f", {len(analysis.spectrum.eigenvalues)} modes"
+        self.report({"INFO"}, f"{message}, {sum(analysis.seconds.values()):.1f} s")
         if self.show:
-            bpy.ops.meshfree.colormap(attribute=shown)
+            bpy.ops.meshfree.colormap(attribute=shown if shown in obj.data.attributes else "")
         return {"FINISHED"}
 
 

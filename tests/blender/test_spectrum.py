@@ -89,3 +89,12 @@ def test_too_many_modes_are_refused_and_change_nothing(obj):
         bpy.ops.meshfree.spectrum(count=1000)
     assert result_names(obj) == []
     assert "lb_eigenvalues" not in obj
+
+
+@pytest.mark.parametrize("operator", ["analyze", "spectrum"])
+def test_a_small_cloud_gets_the_modes_that_it_resolves(operator):
+    obj = add_object(sphere_points(150))
+    arguments = {"modes": 40} if operator == "analyze" else {"count": 40}
+    assert getattr(bpy.ops.meshfree, operator)(**arguments) == {"FINISHED"}
+    assert 1 <= len(obj["lb_eigenvalues"]) < 40
+    assert len([name for name in result_names(obj) if "eigenvector" in name]) == len(obj["lb_eigenvalues"])

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import core
+from benchmarks.accuracy import relative, sphere_errors
 from benchmarks.samplings import (
     fibonacci_sphere,
     icosahedral_sphere,
@@ -9,20 +10,6 @@ from benchmarks.samplings import (
     random_sphere,
     torus_points,
 )
-
-
-def relative(found, exact):
-    return np.linalg.norm(found - exact) / np.linalg.norm(exact)
-
-
-def sphere_errors(laplacian):
-    """Relative l2 errors of L x, L x^2, L e^x on the unit sphere."""
-    x = laplacian.points[:, 0]
-    return (
-        relative(laplacian.apply(x), -2.0 * x),
-        relative(laplacian.apply(x**2), 2.0 - 6.0 * x**2),
-        relative(laplacian.apply(np.exp(x)), np.exp(x) * (1.0 - x**2 - 2.0 * x)),
-    )
 
 
 @pytest.fixture(scope="module")
