@@ -148,7 +148,7 @@ def build_laplacian(points, normals=None, options=LaplacianOptions(), progress=N
     scaled = neighborhoods.scaled
     notices = []
     if scaled.duplicates:
-        notices.append(f"{scaled.duplicates} points lie exactly on another one and share its area.")
+        notices.append(f"Points that lie exactly on another one: {scaled.duplicates}. They share one area.")
     if 2 * len(neighborhoods.first) > len(scaled.points) ** 2 / 3:
         notices.append(
             "The kernel of most points reaches over a third of the object, which is too wide for good results. Add"
