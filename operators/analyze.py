@@ -53,7 +53,7 @@ def resolved_modes(laplacian, modes, progress):
     except UnresolvedModesError as error:
         if error.resolved == 0:
             raise
-        notice = f"Only {error.resolved} of {modes} modes were computed: finer ones vary faster than the points resolve."
+        notice = f"Only {error.resolved} of {modes} modes were computed: the others are finer than the points resolve."
         return laplacian.eigenpairs(error.resolved, progress=progress), [notice]
 
 

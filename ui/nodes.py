@@ -30,6 +30,7 @@ def display_group():
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
     loose = add_node(group, "FunctionNodeCompare", 1, -200, data_type="INT", operation="EQUAL")
     points = add_node(group, "GeometryNodeMeshToPoints", 2, -100)
+    faces = add_node(group, "GeometryNodeDeleteGeometry", 2, 100)  # loose vertices would be drawn over the points
     joined = add_node(group, "GeometryNodeJoinGeometry", 3, 0)
     colored = add_node(group, "GeometryNodeSetMaterial", 4, 0)
     result = add_node(group, "NodeGroupOutput", 5, 0)
@@ -40,7 +41,9 @@ def display_group():
         (given.outputs["Geometry"], points.inputs["Mesh"]),
         (given.outputs["Radius"], points.inputs["Radius"]),
         (points.outputs["Points"], joined.inputs["Geometry"]),
-        (given.outputs["Geometry"], joined.inputs["Geometry"]),
+        (loose.outputs["Result"], faces.inputs["Selection"]),
+        (given.outputs["Geometry"], faces.inputs["Geometry"]),
+        (faces.outputs["Geometry"], joined.inputs["Geometry"]),
         (joined.outputs["Geometry"], colored.inputs["Geometry"]),
         (given.outputs["Material"], colored.inputs["Material"]),
         (colored.outputs["Geometry"], result.inputs["Geometry"]),

@@ -64,8 +64,10 @@ def test_points_carry_the_attribute_a_radius_and_the_material(display, obj):
     assert [material.name for material in materials] == [display.find_material(obj).name]
 
 
-def test_evaluated_mesh_keeps_its_vertices(obj):
-    assert len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices) == 1000
+def test_no_loose_vertex_is_drawn_over_the_points(obj):
+    # A selected object's loose vertices would cover its colors in orange; its own mesh keeps them all.
+    assert len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices) == 0
+    assert len(obj.data.vertices) == 1000
 
 
 def test_points_of_faces_stay_a_surface():
@@ -74,7 +76,7 @@ def test_points_of_faces_stay_a_surface():
     ((count, *_),) = display_points(obj)
     assert count == 996
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    assert len(mesh.polygons) == 2
+    assert (len(mesh.polygons), len(mesh.vertices)) == (2, 4)
     assert mesh.materials[0].name == f"Mesh-Free Display {obj.name}"
 
 
