@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy
 import scipy
 
-from . import accuracy, speed
+from . import accuracy, speed, targets
 
 TABLES = {
     "figure3": accuracy.paper_figure_3,
     "spheres": accuracy.default_on_spheres,
     "structure": accuracy.structure,
     "invariance": accuracy.invariance,
+    "targets": targets.targets,
     "areas": speed.areas_against_algorithm_1,
     "stages": speed.stages_and_memory,
 }

@@ -1,6 +1,13 @@
 """Point clouds with known answers, for tests and benchmarks."""
 
 import numpy as np
+from scipy.linalg import eigvalsh
+from scipy.sparse import coo_array, diags_array
+from scipy.sparse.linalg import eigsh
+from scipy.spatial import ConvexHull
+from scipy.special import jnp_zeros
+
+GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 def random_sphere(count, seed=0):
@@ -85,3 +92,256 @@ def sphere_eigenvalues(count):
     """Return the first eigenvalues l (l + 1) of the unit sphere, each 2 l + 1 times, (count,)."""
     degree = np.arange(int(np.sqrt(count)) + 1)
     return np.repeat(degree * (degree + 1.0), 2 * degree + 1)[:count]
+
+
+def tube_angles(fraction, ratio):
+    """Return the angles around a bent tube that have this fraction of its area before them, (n,).
+
+    The area element is proportional to ``1 + ratio cos(angle)``: solve ``angle + ratio sin(angle) = 2 pi fraction``.
+    """
+    table = np.linspace(0.0, 2.0 * np.pi, 4097)
+    target = 2.0 * np.pi * fraction
+    angle = np.interp(target, table + ratio * np.sin(table), table)
+    for _ in range(5):
+        angle -= (angle + ratio * np.sin(angle) - target) / (1.0 + ratio * np.cos(angle))
+    return angle
+
+
+def torus_low_discrepancy(count, major=1.0, minor=0.4):
+    """Return a golden-ratio lattice, mapped by area to a torus around the z axis, (count, 3)."""
+    k = np.arange(count)
+    angle = tube_angles((k + 0.5) / count, minor / major)
+    around = 2.0 * np.pi * (k * GOLDEN % 1.0)
+    radius = major + minor * np.cos(angle)
+    return np.column_stack([radius * np.cos(around), radius * np.sin(around), minor * np.sin(angle)])
+
+
+def torus_area(major=1.0, minor=0.4):
+    """Return the area of a torus."""
+    return 4.0 * np.pi**2 * major * minor
+
+
+def torus_eigenvalues(count, major=1.0, minor=0.4):
+    """Return the first eigenvalues of a torus, (count,).
+
+    With exp(i m theta) g(phi) and w = major + minor cos(phi) it is -(w g')' / (minor^2 w) + m^2 g / w^2 = lambda g,
+    solved by Fourier collocation; all m > 0 count twice.
+    """
+    weyl = 4.0 * np.pi * count / torus_area(major, minor)
+    half = int(64 + 2.0 * minor * np.sqrt(weyl))
+    nodes = 2 * half + 1
+    step = np.arange(nodes)[:, None] - np.arange(nodes)
+    with np.errstate(divide="ignore"):
+        derivative = 0.5 * (-1.0) ** step / np.sin(np.pi * step / nodes)
+    np.fill_diagonal(derivative, 0.0)
+    w = major + minor * np.cos(2.0 * np.pi * np.arange(nodes) / nodes)
+    flow = np.sqrt(w)[:, None] * derivative / np.sqrt(w) / minor
+    values = np.empty(0)
+    m = 0
+    while len(values) < count or (m / (major + minor)) ** 2 <= values[count - 1]:  # a bound of the lowest one for m
+        found = eigvalsh(flow.T @ flow + np.diag((m / w) ** 2))[:count]
+        values = np.sort(np.concatenate([values, np.repeat(found, 2 if m else 1)]))[:count]
+        m += 1
+    values[0] = 0.0
+    return values
+
+
+def edge_collapsed_sphere(count=8001, seed=0):
+    """Return what collapses of the shortest edges leave of a random triangulation with twice the points, (count, 3).
+
+    Round by round, of the shortest tenth of the edges, those that are the shortest at both ends shrink to their middle.
+    """
+    points = random_sphere(2 * count, seed)
+    while len(points) > count:
+        corners = ConvexHull(points).simplices
+        edges = np.unique(np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+        length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        edges = edges[np.argsort(length)[: len(edges) // 10 + 1]]
+        rank = np.arange(len(edges))
+        least = np.full(len(points), len(edges))
+        np.minimum.at(least, edges, rank[:, None])
+        chosen = edges[(least[edges] == rank[:, None]).all(axis=1)][: len(points) - count]
+        middle = points[chosen].sum(axis=1)
+        middle /= np.linalg.norm(middle, axis=1)[:, None]
+        points = np.concatenate([np.delete(points, chosen.ravel(), axis=0), middle])
+    return points
+
+
+def noisy_sphere(count, level, seed=0):
+    """Return the Fibonacci sphere with Gaussian noise of ``level`` spacings in every coordinate, (count, 3)."""
+    spacing = np.sqrt(4.0 * np.pi / count)
+    return fibonacci_sphere(count) + level * spacing * np.random.default_rng(seed).standard_normal((count, 3))
+
+
+def hemisphere_random(count, seed=0):
+    """Return points distributed evenly at random on the half of the unit sphere with z >= 0, (count, 3)."""
+    points = random_sphere(count, seed)
+    points[:, 2] = np.abs(points[:, 2])
+    return points
+
+
+def square_grid(side=60):
+    """Return a square grid on the unit square in the plane z = 0, its rim included, (side^2, 3)."""
+    return grid_points(np.linspace(0.0, 1.0, side), np.linspace(0.0, 1.0, side), [0.0])
+
+
+def square_random(count, seed=0):
+    """Return points distributed evenly at random in the unit square in the plane z = 0, (count, 3)."""
+    return np.random.default_rng(seed).random((count, 3)) * (1.0, 1.0, 0.0)
+
+
+def square_eigenvalues(count):
+    """Return the first Neumann eigenvalues of the unit square, (count,)."""
+    squares = np.arange(count) ** 2
+    return np.pi**2 * np.sort(np.add.outer(squares, squares), axis=None)[:count]
+
+
+def disc_random(count, seed=0):
+    """Return points distributed evenly at random in the unit disc in the plane z = 0, and their distances to its rim.
+
+    Returns
+    -------
+    points : ndarray, (count, 3)
+    distance : ndarray, (count,)
+    """
+    share, turn = np.random.default_rng(seed).random((2, count))
+    radius, around = np.sqrt(share), 2.0 * np.pi * turn
+    return np.column_stack([radius * np.cos(around), radius * np.sin(around), np.zeros(count)]), 1.0 - radius
+
+
+def disc_eigenvalues(count):
+    """Return the first Neumann eigenvalues of the unit disc, zeros of J_m' squared, m > 0 twice, (count,)."""
+    most = int(2.0 * np.sqrt(count)) + 4  # Weyl: the highest zero wanted is below, and so is m
+    zeros = [np.repeat(jnp_zeros(m, most // 3 + 2), 2 if m else 1) for m in range(most)]
+    return np.sort(np.concatenate([[0.0], *zeros]))[:count] ** 2
+
+
+def open_cylinder():
+    """Return a regular grid, 196 around and 40 up, on a cylinder of radius and height 2 with both rims, (7840, 3)."""
+    around = 2.0 * np.pi * np.arange(196) / 196
+    around, height = (part.ravel() for part in np.meshgrid(around, np.linspace(-1.0, 1.0, 40), indexing="ij"))
+    return np.column_stack([2.0 * np.cos(around), 2.0 * np.sin(around), height])
+
+
+def grid_points(x, y, z):
+    """Return all points with these coordinates, (n, 3)."""
+    return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def parallel_sheets(side=40, apart=1.5):
+    """Return two square sheets of side x side points at unit spacing, one above the other.
+
+    Returns
+    -------
+    points : ndarray, (2 side^2, 3)
+    sheet : ndarray, (2 side^2,)
+        0 or 1.
+    area : float
+        Of each sheet.
+    """
+    points = grid_points(np.arange(side), np.arange(side), [0.0, apart])
+    return points, (points[:, 2] > 0.0).astype(int), (side - 1.0) ** 2
+
+
+def closed_plate(side=40, thickness=2):
+    """Return a grid of unit spacing on the surface of a closed box of side x side x thickness.
+
+    Returns
+    -------
+    points : ndarray, (n, 3)
+    face : ndarray, (n,)
+        0 or 1 on the two large faces, their rims included, -1 on the narrow ones.
+    inset : ndarray, (n,)
+        Distance to the nearest narrow face: the way around from face to face is at least both insets and the thickness.
+    area : float
+    """
+    points = grid_points(np.arange(side + 1.0), np.arange(side + 1.0), np.arange(thickness + 1.0))
+    inset = np.minimum(points[:, :2], side - points[:, :2]).min(axis=1)
+    bottom, top = points[:, 2] == 0.0, points[:, 2] == thickness
+    face = np.select([bottom, top], [0, 1], -1)
+    outside = bottom | top | (inset == 0.0)
+    return points[outside], face[outside], inset[outside], 2.0 * side**2 + 4.0 * side * thickness
+
+
+def sausage_bend(count, radius=0.25, length=6.0):
+    """Return the radius of the centre line's half circle that leaves a gap of one mean spacing between the arms."""
+    area = 2.0 * np.pi * radius * (length + 2.0 * radius)
+    return radius + 0.5 * np.sqrt(area / count)
+
+
+def sausage(count=3000, bent=False, radius=0.25, length=6.0):
+    """Return a golden-ratio lattice, mapped by area to a capsule, straight or bent into a U.
+
+    Both have the same area on every stretch of the centre line, and the same points on their straight parts.
+
+    Parameters
+    ----------
+    count : int
+    bent : bool
+        Bend the middle to a half circle, so that the arms come as near as one mean spacing.
+    radius, length : float
+        Of the tube and of its centre line, half spheres at both ends excluded.
+
+    Returns
+    -------
+    points : ndarray, (count, 3)
+    along : ndarray, (count,)
+        Position along the centre line, from -radius to length + radius.
+    """
+    k = np.arange(count)
+    along = (k + 0.5) / count * (length + 2.0 * radius) - radius
+    fraction = k * GOLDEN % 1.0
+    beyond = along - np.clip(along, 0.0, length)
+    width = np.sqrt(radius**2 - beyond**2)
+    angle = 2.0 * np.pi * fraction
+    if not bent:
+        return np.column_stack([along, width * np.cos(angle), width * np.sin(angle)]), along
+    bend = sausage_bend(count, radius, length)
+    arm = 0.5 * (length - np.pi * bend)
+    turn = np.clip((along - arm) / bend, 0.0, np.pi)
+    angle = np.where((turn > 0.0) & (turn < np.pi), tube_angles(fraction, radius / bend), angle)
+    out = bend + width * np.cos(angle)
+    straight = np.minimum(along - arm, 0.0) - np.maximum(along - arm - np.pi * bend, 0.0)
+    return np.column_stack([straight + out * np.sin(turn), out * np.cos(turn), width * np.sin(angle)]), along
+
+
+def sausage_eigenvalue(bend=None, radius=0.25, length=6.0, cells=48):
+    """Return the first nonzero eigenvalue of a capsule to about 1e-4, bent to a half circle of radius ``bend`` or not.
+
+    Finite volumes along the meridians (metric (w ds)^2 + (r dtheta)^2, w = 1 + cos(theta) radius / bend in the bend),
+    over the half 0 < theta < pi, which holds the mode.
+    """
+    values = [_sausage_eigenvalue(bend, radius, length, n) for n in (cells, 2 * cells)]
+    return (4.0 * values[1] - values[0]) / 3.0  # the error falls with the square of the cell
+
+
+def _sausage_eigenvalue(bend, radius, length, cells):
+    """Solve `sausage_eigenvalue` on this many cells over half of the circumference."""
+    size = np.pi * radius / cells
+    bow = np.pi * bend if bend else 0.0
+    parts = [0.5 * np.pi * radius, 0.5 * (length - bow), bow, 0.5 * (length - bow), 0.5 * np.pi * radius]
+    steps = [max(1, round(part / size)) if part else 0 for part in parts]
+    ds = np.repeat([part / max(n, 1) for part, n in zip(parts, steps, strict=True)], steps)[:, None]
+    end = np.cumsum(ds)[:, None]
+    position = np.minimum(end - 0.5 * ds, end[-1] - end + 0.5 * ds)  # from the nearer pole
+    r = radius * np.sin(np.minimum(position / radius, 0.5 * np.pi))
+    face = np.minimum(end[:-1], end[-1] - end[:-1])
+    r_face = radius * np.sin(np.minimum(face / radius, 0.5 * np.pi))
+    angle = np.pi * (np.arange(cells) + 0.5) / cells
+    bowed = np.repeat([False, False, True, False, False], steps)[:, None]
+    ratio = radius / bend if bend else 0.0
+    w = np.where(bowed, 1.0 + ratio * np.cos(angle), 1.0)
+    w_face = np.where(bowed, 1.0 + ratio * np.cos(angle[:-1] + 0.5 * np.pi / cells), 1.0)
+    dt = np.pi / cells
+    lengthwise = r_face * dt / (0.5 * (w * ds)[:-1] + 0.5 * (w * ds)[1:])
+    around = w_face * ds / (r * dt)
+    index = np.arange(w.size).reshape(w.shape)
+    weight = np.concatenate([lengthwise.ravel(), around.ravel()])
+    a = np.concatenate([index[:-1].ravel(), index[:, :-1].ravel()])
+    b = np.concatenate([index[1:].ravel(), index[:, 1:].ravel()])
+    coupling = coo_array((weight, (a, b)), shape=(w.size, w.size)).tocsr()
+    coupling = coupling + coupling.T
+    stiffness = diags_array(coupling.sum(axis=1)) - coupling
+    mass = diags_array((w * r * ds * dt).ravel(), format="csc")
+    start = np.random.default_rng(0).standard_normal(w.size)
+    return eigsh(stiffness.tocsc(), k=2, M=mass, sigma=-0.01, v0=start, return_eigenvectors=False).max()
