@@ -1,6 +1,7 @@
 """Mesh-free discrete Laplace-Beltrami operator on point clouds: numpy and scipy only, usable without Blender."""
 
 from .areas import estimate_areas
+from .cloud import estimate_normals
 from .curvature import mean_curvature
 from .errors import (
     AreaError,
@@ -18,7 +19,6 @@ from .options import LaplacianOptions
 from .points import check_points
 from .spectrum import Spectrum
 from .stability import Stability, check_stability
-from .surface import estimate_normals
 
 __all__ = [
     "AreaError",

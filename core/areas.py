@@ -4,17 +4,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .cloud import read_cloud
+from .curvature import kernel_integral
 from .distances import arc_length
 from .errors import AreaError
+from .images import image_excess, mirror, own_images
 from .kernel import kernel
-from .neighbors import find_neighborhoods
-from .normals import unit_normals
 from .options import LaplacianOptions
-from .surface import fit_surface
 
 _FLOOR = 0.05  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
-_ROUNDS, _STEPS = 10, 15  # of the fast areas
-_RESOLVED = 1e-2  # eigenvalues of the scaled kernel matrix below this are left to the start
+_ROUNDS, _STEPS = 15, 20  # of the fast areas
+_RESOLVED = 5e-3  # eigenvalues of the scaled kernel matrix below this are left to the start
+_SQUARED = 12, 20, 3e-4  # the same three for its square
+NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
 TAU = 2.0**-52  # the paper's lower bound of eq. (8), in scaled coordinates
 
 
@@ -28,61 +30,52 @@ class AreaSolution:
         Area elements, all positive.
     products : int
         Products with the kernel matrix.
-    held : float
-        Share of the points at the lower bound.
     converged : bool
         Whether the solver reached its tolerance; the fast areas are a fixed number of steps.
     """
 
     areas: np.ndarray
     products: int
-    held: float
     converged: bool
 
 
-def estimate_areas(points, normals=None, options=LaplacianOptions()):
+def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=None, boundary_distance=None):
     """Estimate the area element of every point, the operator's own, without the operator.
 
     Parameters
     ----------
     points : array_like, (n, 3)
         Coordinates [L].
-    normals : array_like, (n, 3), optional
-        Normals to use as they are; estimated where not given.
-    options : LaplacianOptions
-        Settings.
+    normals, options, boundary, boundary_distance
+        See `build_laplacian`.
 
     Returns
     -------
     ndarray, (n,)
-        Areas [L^2]; points at the same place share one area in equal parts.
+        Areas [L^2]; points at the same place share one area in equal parts, those left out have next to none.
 
     Raises
     ------
     PointCloudError
         The points have no sound areas; see `build_laplacian`.
     """
-    neighborhoods = find_neighborhoods(points, options)
-    scaled = neighborhoods.scaled
-    target, distance = np.ones(len(scaled.points)), neighborhoods.distance
+    cloud = read_cloud(points, options, normals, boundary, boundary_distance)
+    distance = cloud.neighborhoods.distance
     if options.curvature_correction:
-        given = None if normals is None else unit_normals(normals, len(scaled.inverse))[scaled.first]
-        surface = fit_surface(neighborhoods, options, given)
-        target, distance = surface.kernel_integral, arc_length(neighborhoods, surface.normals)
-    return scaled.share(solve_areas(neighborhoods, distance, target, options).areas) * scaled.scale**2
+        distance = arc_length(cloud.neighborhoods, cloud.normals)
+    areas = solve_areas(cloud, distance, options).areas * cloud.scaled.scale**2
+    return cloud.scaled.share(areas, NO_AREA)
 
 
-def solve_areas(neighborhoods, distance, target, options):
+def solve_areas(cloud, distance, options):
     """Solve for the areas of the distinct points, in scaled coordinates, by the method the options name.
 
     Parameters
     ----------
-    neighborhoods : Neighborhoods
+    cloud : Cloud
         Of m distinct points, with p pairs.
     distance : ndarray, (p,)
         Distance of each pair: in space, or along the surface.
-    target : ndarray, (m,)
-        The integral that the kernel should have at each point.
     options : LaplacianOptions
         Its areas and regularization settings.
 
@@ -95,9 +88,11 @@ def solve_areas(neighborhoods, distance, target, options):
     AreaError
         Eq. (7), which has no bound, gave areas that are not positive.
     """
-    matrix = KernelMatrix(neighborhoods, distance)
+    lengths = cloud.neighborhoods.lengths
+    target = kernel_integral(lengths, cloud.gaussian) + image_excess(lengths, cloud.rim)
+    matrix = KernelMatrix(cloud.neighborhoods, distance, cloud.rim)
     if options.areas == "fast":
-        return fast_areas(matrix, target)
+        return fast_areas(matrix, target, cloud.definite)
     if options.areas == "constrained":
         return constrained_areas(matrix, target, options.regularization)
     solution = regularized_areas(matrix, target, options.regularization)
@@ -113,25 +108,37 @@ def solve_areas(neighborhoods, distance, target, options):
 
 
 class KernelMatrix:
-    """The symmetric matrix A of eq. (6), a_ij = W(distance_ij, h_ij), kept as half its pairs."""
+    """The symmetric matrix A of eq. (6), a_ij = W(distance_ij, h_ij), kept as half its pairs.
 
-    def __init__(self, neighborhoods, distance):
+    Near a rim the image of a point in it counts as a neighbour too.
+    """
+
+    def __init__(self, neighborhoods, distance, rim):
         lengths = neighborhoods.mean(neighborhoods.lengths)
-        self._half = neighborhoods.half(kernel(distance / lengths) / lengths**2)
-        self._diagonal = kernel(0.0) / neighborhoods.lengths**2
+        own = neighborhoods.lengths
+        values = kernel(distance / lengths) / lengths**2
+        for pairs, image, factor in mirror(neighborhoods, distance, rim):
+            values[pairs] += factor * kernel(image / lengths[pairs]) / lengths[pairs] ** 2
+        self._half = neighborhoods.half(values)
+        self._diagonal = kernel(0.0) / own**2
+        for rows, image, factor in own_images(neighborhoods, rim):
+            self._diagonal[rows] += factor * kernel(image / own[rows]) / own[rows] ** 2
 
     def __matmul__(self, values):
         return self._diagonal * values + self._half @ values + self._half.T @ values
 
 
-def fast_areas(matrix, target):
+def fast_areas(matrix, target, definite=True):
     """Solve A v = b by a projected Chebyshev iteration that starts at the density areas v0 = 1 / (A 1).
 
     With M = V0^(1/2) A V0^(1/2), whose eigenvalues lie in [0, 1] whatever the points, each round runs Chebyshev's
-    semi-iteration on M y = V0^(1/2) b for v = V0^(1/2) y, over the eigenvalues above 1e-2: the smooth part is solved
+    semi-iteration on M y = V0^(1/2) b for v = V0^(1/2) y, over the eigenvalues above 5e-3: the smooth part is solved
     for, and what the kernel cannot see stays near the density areas. Between rounds areas below the floor of 0.05 v0
     are put on it, held there, and released when the gradient turns inward. A fixed number of linear steps, unlike
     conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order of the points.
+
+    Where pairs were left out, between close sheets, or images added, next to rims, M has negative eigenvalues too; the
+    iteration then runs on M^2.
 
     Parameters
     ----------
@@ -139,6 +146,8 @@ def fast_areas(matrix, target):
         A, (n, n).
     target : ndarray, (n,)
         b, the integral that the kernel should have at each point (1 on a flat surface).
+    definite : bool
+        No pairs were left out, and no images added.
 
     Returns
     -------
@@ -146,17 +155,24 @@ def fast_areas(matrix, target):
     """
     density = 1.0 / (matrix @ np.ones(len(target)))
     root = np.sqrt(density)
-    center, radius = 0.5 * (1.0 + _RESOLVED), 0.5 * (1.0 - _RESOLVED)
+
+    def multiply(y):
+        return root * (matrix @ (root * y))
+
+    normal = multiply if definite else lambda y: multiply(multiply(y))
+    right = root * target if definite else multiply(root * target)
+    rounds, steps, least = (_ROUNDS, _STEPS, _RESOLVED) if definite else _SQUARED
+    center, radius = 0.5 * (1.0 + least), 0.5 * (1.0 - least)
     y, held = root, np.zeros(len(target), dtype=bool)
-    for _ in range(_ROUNDS):
-        residual = root * (target - matrix @ (root * y))
+    for _ in range(rounds):
+        residual = right - normal(y)
         held &= residual < 0.0
         residual[held] = 0.0
         ratio = radius / center
         change = residual / center
-        for _ in range(_STEPS):
+        for _ in range(steps):
             y = y + change
-            image = root * (matrix @ (root * change))
+            image = normal(change)
             image[held] = 0.0
             residual -= image
             following = 1.0 / (2.0 * center / radius - ratio)
@@ -165,7 +181,8 @@ def fast_areas(matrix, target):
         y = y + change
         held = y <= _FLOOR * root
         y = np.maximum(y, _FLOOR * root)
-    return AreaSolution(root * y, 1 + _ROUNDS * (1 + _STEPS), float(held.mean()), True)
+    products = rounds * (1 + steps)
+    return AreaSolution(root * y, 1 + products if definite else 2 + 2 * products, True)
 
 
 def regularized_areas(matrix, target, rho, products=8000, rtol=1e-10):
@@ -194,11 +211,11 @@ def regularized_areas(matrix, target, rho, products=8000, rtol=1e-10):
         v += length * direction
         residual -= length * image
         if np.linalg.norm(residual) <= rtol * np.linalg.norm(target):
-            return AreaSolution(v.real, used, 0.0, True)
+            return AreaSolution(v.real, used, True)
         scaled = density * residual
         moment, previous = residual @ scaled, moment
         direction = scaled + (moment / previous) * direction
-    return AreaSolution(v.real, used, 0.0, False)
+    return AreaSolution(v.real, used, False)
 
 
 def constrained_areas(matrix, target, rho, products=4000, rtol=1e-6):
@@ -222,8 +239,7 @@ def constrained_areas(matrix, target, rho, products=4000, rtol=1e-6):
         products // 2,
         rtol,
     )
-    held = float(np.mean(u <= TAU / density))
-    return AreaSolution(np.maximum(density * u, TAU), start.products + 2 * used, held, converged)
+    return AreaSolution(np.maximum(density * u, TAU), start.products + 2 * used, converged)
 
 
 def bounded_quadratic(product, right, lower, start, norm, products, rtol):

@@ -1,8 +1,15 @@
-"""Two measures of the distance between neighbours along the surface, from their normals."""
+"""Distances between neighbours along the surface, from their normals."""
 
 import numpy as np
 
+from .sheets import same_sheet
+
 _BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
+_BACK = -0.2  # cosine of two oriented normals below which the points lie on two sides of a wall
+
+_PARALLEL = 0.5  # cosine, without its sign, of normals on one sheet where the signs do not tell
+_AGAINST, _BENT = 0.5, 0.25  # turn against the bend, and bend, in radians, that cannot both be true
+_LEANING = 0.3  # what normals within sharp features may be off by, as a share of the distance
 
 
 def projected_distance(neighborhoods, normals):
@@ -19,7 +26,13 @@ def projected_distance(neighborhoods, normals):
     -------
     ndarray, (p,)
     """
-    return _distance(neighborhoods, normals, 1.0, lambda height, mean: -(height**2) / np.einsum("ij,ij->i", mean, mean))
+    result = np.empty(len(neighborhoods.first))
+    for block, left, right, cosine in _heights(neighborhoods, normals):
+        side = np.where(cosine < 0.0, -1.0, 1.0)
+        # The mean of two unit normals has the squared length (1 + cos) / 2.
+        height = (left + side * right) ** 2 / (2.0 + 2.0 * np.abs(cosine))
+        result[block] = np.sqrt(np.maximum(neighborhoods.distance[block] ** 2 - height, 0.0))
+    return result
 
 
 def arc_length(neighborhoods, normals):
@@ -38,19 +51,57 @@ def arc_length(neighborhoods, normals):
     -------
     ndarray, (p,)
     """
-    return _distance(neighborhoods, normals, -1.0, lambda height, turn: height**2 / 12.0)
+    result = np.empty(len(neighborhoods.first))
+    for block, left, right, cosine in _heights(neighborhoods, normals):
+        turn = np.where(cosine < 0.0, -right, right) - left
+        result[block] = np.sqrt(neighborhoods.distance[block] ** 2 + turn**2 / 12.0)
+    return result
 
 
-def _distance(neighborhoods, normals, sign, change):
+def pairs_on_one_sheet(neighborhoods, normals, unsure, bending, spacing):
+    """Tell which pairs lie on one sheet of the surface.
+
+    Parameters
+    ----------
+    neighborhoods : Neighborhoods
+        With p pairs.
+    normals : ndarray, (m, 3)
+        Unit normals whose signs agree: two that point against each other lie on two sides of a wall.
+    unsure : ndarray, (m,) bool
+        Where their signs do not tell.
+    bending : ndarray, (m, 3, 3)
+        Second fundamental form for these normals.
+    spacing : ndarray, (m,)
+        Distance between neighbouring points.
+
+    Returns
+    -------
+    ndarray, (p,) bool
+    """
+    result = np.empty(len(neighborhoods.first), dtype=bool)
+    for block, left, right, cosine in _heights(neighborhoods, normals):
+        mean = 0.5 * (spacing[neighborhoods.first[block]] + spacing[neighborhoods.second[block]])
+        same = same_sheet(left, right, cosine, neighborhoods.distance[block], mean, _LEANING)
+        doubt = unsure[neighborhoods.first[block]] | unsure[neighborhoods.second[block]]
+        same &= np.where(doubt, np.abs(cosine) > _PARALLEL, cosine > _BACK)
+        # Where normals turn against the way the surface bends at both ends, two sheets face each other across a gap.
+        turn = (right - left) / neighborhoods.distance[block]
+        doubtful = np.flatnonzero(same & (turn < -_AGAINST))
+        i, j = neighborhoods.first[block][doubtful], neighborhoods.second[block][doubtful]
+        chord = neighborhoods.points[j] - neighborhoods.points[i]
+        bend = 0.5 * sum(np.einsum("pa,pab,pb->p", chord, bending[k], chord) for k in (i, j))
+        same[doubtful[bend > _BENT * neighborhoods.distance[block][doubtful]]] = False
+        result[block] = same
+    return result
+
+
+def _heights(neighborhoods, normals):
+    """Yield blocks of pairs: the chord along the first normal, along the second, and the cosine of both."""
     first, second, points = neighborhoods.first, neighborhoods.second, neighborhoods.points
-    result = np.empty(len(first))
     for start in range(0, len(first), _BLOCK):
         block = slice(start, start + _BLOCK)
         i, j = first[block], second[block]
         left, right = normals[i], normals[j]
-        side = np.where(np.einsum("ij,ij->i", left, right) < 0.0, -sign, sign)
-        combined = left + side[:, None] * right
-        height = np.einsum("ij,ij->i", points[i] - points[j], combined)
-        squared = neighborhoods.distance[block] ** 2 + change(height, combined)
-        result[block] = np.sqrt(np.maximum(squared, 0.0))
-    return result
+        chord = points[j] - points[i]
+        dot = lambda a, b: np.einsum("ij,ij->i", a, b)  # noqa: E731
+        yield block, dot(chord, left), dot(chord, right), dot(left, right)

@@ -1,87 +1,40 @@
-"""Smoothing lengths and the neighbour pairs inside the kernel's support."""
+"""The neighbour pairs inside the kernel's support."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from .errors import IslandError
 from .kernel import SUPPORT
-from .points import ScaledPoints, check_points, scale_points
 
-_SMOOTHING_NEIGHBORS = 40
-_ISLAND_NEIGHBORS = 8
-_ISLAND_GAP = 4.0  # an edge longer than this many reaches to the 8th neighbour is a gap
 _BLOCK = 1 << 22  # neighbour candidates held at one time while the pairs are collected
-
-
-def smoothing_lengths(tree, options):
-    """Choose h for every point.
-
-    Parameters
-    ----------
-    tree : cKDTree
-        Of the distinct points.
-    options : LaplacianOptions
-        Its bandwidth, neighbors and bandwidth_factor.
-
-    Returns
-    -------
-    ndarray, (n,)
-        Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
-        twice over the 40 nearest neighbours so that h varies slowly within a support.
-    """
-    # The tree counts a point as its own first neighbour.
-    distance = tree.query(tree.data, k=[options.neighbors + 1], workers=-1)[0][:, 0]
-    if options.bandwidth == "global":
-        return np.full(tree.n, options.bandwidth_factor * distance.mean())
-    reach, near = tree.query(tree.data, k=min(_SMOOTHING_NEIGHBORS, tree.n), workers=-1)
-    weight = fading_weights(reach)
-    weight /= weight.sum(axis=1, keepdims=True)
-    for _ in range(2):
-        distance = (weight * distance[near]).sum(axis=1)
-    return options.bandwidth_factor * distance
-
-
-def fading_weights(distance):
-    """Return weights that fall from 1 to 0 at the last neighbour, (n, k).
-
-    Which of several neighbours at the same last distance was found then makes no difference.
-    """
-    return (1.0 - (distance / distance[:, -1:]) ** 2) ** 2
 
 
 @dataclass(frozen=True)
 class Neighborhoods:
-    """The distinct points in scaled coordinates, and all pairs nearer than 3 h_ij, each once.
+    """Points and all pairs nearer than 3 h_ij, each once.
 
     Attributes
     ----------
-    scaled : ScaledPoints
-        The distinct points and the way back to the caller's.
-    tree : cKDTree
-        Of the distinct points.
+    points : ndarray, (m, 3)
+        In scaled coordinates; parts that are not connected stand far apart.
     lengths : ndarray, (m,)
-        Smoothing lengths in scaled coordinates.
+        Smoothing lengths h; h_ij is the mean of both ends.
     first, second : ndarray, (pairs,) int32
         The two points of each pair, ordered by the first.
     distance : ndarray, (pairs,)
         Their distance in space.
     """
 
-    scaled: ScaledPoints
-    tree: cKDTree
+    points: np.ndarray
     lengths: np.ndarray
     first: np.ndarray
     second: np.ndarray
     distance: np.ndarray
 
-    @property
-    def points(self):
-        """The distinct points in scaled coordinates, (m, 3)."""
-        return self.scaled.points
+    def keep(self, kept):
+        """Return the same points with some of the pairs, (pairs,) bool."""
+        return replace(self, first=self.first[kept], second=self.second[kept], distance=self.distance[kept])
 
     def mean(self, values):
         """Return the mean of a point quantity over both ends of every pair."""
@@ -93,54 +46,6 @@ class Neighborhoods:
         start = np.zeros(count + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
         np.cumsum(np.bincount(self.first, minlength=count), out=start[1:])
         return sparse.csr_array((values, self.second, start), shape=(count, count))
-
-
-def find_neighborhoods(points, options):
-    """Go from coordinates to neighbourhoods: check, scale, merge duplicates, choose h, find the pairs.
-
-    Parameters
-    ----------
-    points : array_like, (n, 3)
-        Coordinates [L].
-    options : LaplacianOptions
-        Its bandwidth, neighbors and bandwidth_factor.
-
-    Returns
-    -------
-    Neighborhoods
-
-    Raises
-    ------
-    PointCloudError
-        No sound neighbourhoods: see `check_points`, `scale_points`; or an island of fewer points than they need.
-    """
-    scaled = scale_points(check_points(points), options.neighbors + 1)
-    tree = cKDTree(scaled.points)
-    refuse_islands(tree, options.neighbors + 1)
-    lengths = smoothing_lengths(tree, options)
-    return Neighborhoods(scaled, tree, lengths, *find_pairs(tree, lengths))
-
-
-def refuse_islands(tree, needed):
-    """Raise IslandError where a group of fewer points than needed lies apart from all others.
-
-    Points are joined to their nearest neighbours, except over gaps far wider than the spacing at the nearer end.
-    """
-    near = min(_ISLAND_NEIGHBORS + 1, tree.n)
-    distance, column = tree.query(tree.data, k=near, workers=-1)
-    reach = _ISLAND_GAP * distance[:, -1]
-    row = np.repeat(np.arange(tree.n), near)
-    column, distance = column.ravel(), distance.ravel()
-    joined = distance <= np.maximum(np.minimum(reach[row], reach[column]), np.median(reach))
-    graph = sparse.csr_array((joined[joined], (row[joined], column[joined])), shape=(tree.n, tree.n))
-    part = connected_components(graph, directed=False)[1]
-    sizes = np.bincount(part)
-    small = sizes[sizes < needed]
-    if len(small):
-        raise IslandError(
-            f"{small.sum()} of {tree.n} points lie apart from the rest, in islands of fewer than {needed} points"
-            f" (islands: {len(small)}). Delete them, or lower the number of neighbors."
-        )
 
 
 def find_pairs(tree, lengths):

@@ -8,6 +8,8 @@ from .errors import InvalidPointsError, NotASurfaceError
 from .kernel import kernel
 
 _ORIENTATION_NEIGHBORS = 12
+_CLOSE = 2.0  # spacings between neighbours whose normals cannot point against each other
+_AGAINST = -0.5  # cosine at which they do
 
 
 def unit_normals(normals, count):
@@ -77,16 +79,17 @@ def covariance_normals(neighborhoods, weighted=True):
     return np.ascontiguousarray(directions[:, :, 0])
 
 
-def orient_normals(neighborhoods, normals):
+def orient_normals(nearest, normals):
     """Flip normals so that neighbours agree, outwards where the cloud encloses a volume.
 
-    The sign travels along a minimum spanning tree of the neighbour graph, whose edges cost least where the tangent
-    planes agree best (Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1992).
+    The sign travels along a minimum spanning tree of the neighbour graph, whose edges cost least where a circular arc
+    joins both points best (Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1992). Along an arc the second normal is the
+    mirror image of the first in the plane halfway between the points, which holds across sharp edges too.
 
     Parameters
     ----------
-    neighborhoods : Neighborhoods
-        Of m distinct points.
+    nearest : Nearest
+        Of m points.
     normals : ndarray, (m, 3)
         Unit normals of arbitrary sign.
 
@@ -95,13 +98,13 @@ def orient_normals(neighborhoods, normals):
     ndarray, (m, 3)
         The same normals with consistent signs. Every connected part points away from its own centroid on the whole.
     """
-    points = neighborhoods.points
+    points = nearest.points
     n = len(points)
-    near = neighborhoods.tree.query(points, k=min(_ORIENTATION_NEIGHBORS + 1, n), workers=-1)[1][:, 1:]
-    first = np.repeat(np.arange(n, dtype=np.int32), near.shape[1])
-    second = near.ravel().astype(np.int32)
-    agreement = np.abs(np.einsum("ij,ij->i", normals[first], normals[second]))
-    cost = 1.0 + 1e-9 - np.minimum(agreement, 1.0)  # an edge of cost zero would be no edge
+    column = nearest.index[:, 1 : _ORIENTATION_NEIGHBORS + 1]
+    same = (nearest.weight[:, 1 : _ORIENTATION_NEIGHBORS + 1] > 0.0).ravel()
+    first = np.repeat(np.arange(n, dtype=np.int32), column.shape[1])[same]
+    second = column.ravel()[same]
+    cost = 1.0 + 1e-9 - np.minimum(np.abs(_mirrored(points, normals, first, second)), 1.0)  # zero would be no edge
     graph = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
     graph = graph + graph.T
     parts, part = connected_components(graph, directed=False)
@@ -110,7 +113,9 @@ def orient_normals(neighborhoods, normals):
     for root in np.unique(part, return_index=True)[1]:
         order, before = breadth_first_order(graph, root, directed=False)
         parent[order[1:]] = before[order[1:]]
-    sign = np.where(np.einsum("ij,ij->i", normals, normals[parent]) < 0.0, -1.0, 1.0)
+    child = np.flatnonzero(parent != np.arange(n))
+    sign = np.ones(n)
+    sign[child] = np.where(_mirrored(points, normals, child, parent[child]) < 0.0, -1.0, 1.0)
     while np.any(parent != parent[parent]):  # each round doubles the length of the path already multiplied
         sign *= sign[parent]
         parent = parent[parent]
@@ -120,3 +125,30 @@ def orient_normals(neighborhoods, normals):
     centroid = np.column_stack([np.bincount(part, points[:, axis], parts) for axis in range(3)]) / size[:, None]
     outward = np.bincount(part, np.einsum("ij,ij->i", points - centroid[part], normals), parts)
     return normals * np.where(outward < 0.0, -1.0, 1.0)[part, None]
+
+
+def unsure_orientation(nearest, normals):
+    """Tell where the signs of oriented normals contradict each other between close neighbours, (m,) bool.
+
+    A one-sided surface has such a seam; so has a narrow gap that the orientation once leapt.
+    """
+    column = nearest.index[:, 1 : _ORIENTATION_NEIGHBORS + 1]
+    close = nearest.distance[:, 1 : _ORIENTATION_NEIGHBORS + 1] < _CLOSE * nearest.spacing[:, None]
+    close &= nearest.weight[:, 1 : _ORIENTATION_NEIGHBORS + 1] > 0.0
+    first = np.repeat(np.arange(len(normals)), column.shape[1])[close.ravel()]
+    second = column[close]
+    against = _mirrored(nearest.points, normals, first, second) < _AGAINST
+    result = np.zeros(len(normals), dtype=bool)
+    result[first[against]] = result[second[against]] = True
+    for _ in range(2):
+        result |= result[column].any(axis=1)
+    return result
+
+
+def _mirrored(points, normals, first, second):
+    """Cosine between the second normal and the mirror image of the first in the plane halfway between the points."""
+    chord = points[second] - points[first]
+    chord /= np.linalg.norm(chord, axis=1)[:, None]
+    left, right = normals[first], normals[second]
+    along = np.einsum("ij,ij->i", chord, left) * np.einsum("ij,ij->i", chord, right)
+    return np.einsum("ij,ij->i", left, right) - 2.0 * along

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from .errors import PointCloudError
 
 _CHOICES = {
-    "bandwidth": ("local", "global"),
+    "bandwidth": ("adaptive", "local", "global"),
     "normals": ("quadric", "wpca", "pca"),
     "areas": ("fast", "regularized", "constrained", "uniform"),
+    "rims": ("auto", "off"),
+    "projection": ("auto", "off", "quadric", "plane"),
 }
 
 
@@ -17,18 +19,20 @@ class LaplacianOptions:
 
     Parameters
     ----------
-    bandwidth : {"local", "global"}
-        "local": a smoothing length per point that follows the spacing, h_ij the mean of both ends. "global": one for
-        all points, as in the paper.
+    bandwidth : {"adaptive", "local", "global"}
+        "adaptive": a smoothing length h per point, as wide as the irregularity of the spacing demands and the curvature
+        permits, h_ij the mean of both ends. "local": it follows the spacing alone. "global": one for all points, as in
+        the paper.
     neighbors : int
         The smoothing length is measured by the distance to this neighbour.
     bandwidth_factor : float
-        h = bandwidth_factor * distance to the neighbour named above. The kernel reaches 3 h.
+        "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on the chosen
+        length. The kernel reaches 3 h.
     normals : {"quadric", "wpca", "pca"}
         Where no normals are given: from a local quadric, or from the covariance of the neighbourhood, weighted by the
         kernel (eq. 9) or not.
     orient : bool
-        Orient the estimated normals consistently, outwards on closed surfaces.
+        Orient normals from the covariance consistently, outwards on closed surfaces, as those from quadrics always are.
     areas : {"fast", "regularized", "constrained", "uniform"}
         "fast": the unit-integral condition (eq. 6) regularised towards the density areas, with a lower bound.
         "regularized": eq. (7). "constrained": eq. (8). "uniform": the mean of eq. (7) for every point.
@@ -37,17 +41,28 @@ class LaplacianOptions:
     curvature_correction : bool
         Measure distances along the surface and correct areas and weights for its Gaussian curvature. Without it,
         eqs. (6) and (10) as they stand: distances in space for the areas, in the mean-normal plane for the weights.
+    rims : {"auto", "off"}
+        "auto": find where the surface ends, unless the rim is given, and mirror the points there. "off": take the
+        surface as closed.
+    sheets : bool
+        Keep points of close sheets, such as the two sides of a thin wall, from being neighbours.
+    projection : {"auto", "off", "quadric", "plane"}
+        Move the points that serve the operator, not the caller's, onto local quadrics: where the measured noise asks
+        for it, never, or always; or onto local tangent planes, as the paper does for noisy points.
     symbol_correction : bool
         Correct eigenvalues and `apply` for the known effect of the kernel's width on a flat patch.
     """
 
-    bandwidth: str = "local"
+    bandwidth: str = "adaptive"
     neighbors: int = 100
-    bandwidth_factor: float = 0.55
+    bandwidth_factor: float = 1.0
     normals: str = "quadric"
     orient: bool = False
     areas: str = "fast"
     regularization: float = 1e-3
+    rims: str = "auto"
+    sheets: bool = True
+    projection: str = "auto"
     curvature_correction: bool = True
     symbol_correction: bool = True
 
@@ -62,7 +77,8 @@ class LaplacianOptions:
             if not getattr(self, name) > 0.0:
                 raise PointCloudError(f"Option {name} is {getattr(self, name)!r}. Use a number above zero.")
         # About 9 factor^2 neighbors points share a support of 3 h on an even sample; ten keep a plane well determined.
-        if 9.0 * self.bandwidth_factor**2 * self.neighbors < 10.0:
+        narrow = 0.3 if self.bandwidth == "adaptive" else 1.0
+        if 9.0 * (narrow * self.bandwidth_factor) ** 2 * self.neighbors < 10.0:
             raise PointCloudError(
                 f"A bandwidth factor of {self.bandwidth_factor:g} with {self.neighbors} neighbors leaves fewer than 10"
                 " points inside the kernel. Raise one of them."
@@ -76,6 +92,9 @@ class LaplacianOptions:
             bandwidth_factor=1.0,
             normals="wpca",
             areas="constrained",
+            rims="off",
+            sheets=False,
+            projection="off",
             curvature_correction=False,
             symbol_correction=False,
         )

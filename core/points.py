@@ -1,6 +1,6 @@
 """Checks and preparation of the input coordinates."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -66,7 +66,7 @@ class ScaledPoints:
     scale : float
         The root mean square radius [L]: caller's length = scale * scaled length.
     inverse : ndarray, (n,) int
-        For each of the caller's points, its row in `points`.
+        For each of the caller's points, its row in `points`; -1 for points that were left out.
     copies : ndarray, (m,) int
         How many of the caller's points share each row.
     first : ndarray, (m,) int
@@ -84,9 +84,24 @@ class ScaledPoints:
         """Number of points beyond the first at their place."""
         return len(self.inverse) - len(self.points)
 
-    def share(self, quantity):
-        """Hand a quantity of the distinct points out to the caller's, in equal parts where several lie at one place."""
-        return (quantity / self.copies)[self.inverse]
+    def hand_out(self, quantity, neutral):
+        """Return a quantity of the distinct points for the caller's; those left out get the neutral value."""
+        result = quantity[self.inverse]
+        result[self.inverse < 0] = neutral
+        return result
+
+    def share(self, quantity, neutral):
+        """Hand a quantity out in equal parts where several of the caller's points lie at one place."""
+        return self.hand_out(quantity / self.copies, neutral)
+
+    def leave_out(self, dropped):
+        """Return the same without some of the distinct points, (m,) bool."""
+        row = np.cumsum(~dropped) - 1
+        row[dropped] = -1
+        kept = ~dropped
+        return replace(
+            self, points=self.points[kept], inverse=row[self.inverse], copies=self.copies[kept], first=self.first[kept]
+        )
 
 
 def scale_points(points, needed):
@@ -126,3 +141,43 @@ def scale_points(points, needed):
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     return ScaledPoints(distinct[order], scale, rank[inverse.reshape(-1)], copies[order], first[order])
+
+
+def as_mask(chosen, count):
+    """Return a set of points, (k,) indices or an (n,) bool mask, as a mask.
+
+    Raises
+    ------
+    InvalidPointsError
+        Neither whole numbers below n nor n truth values.
+    """
+    given = np.asarray(chosen)
+    if given.dtype == bool and given.shape == (count,):
+        return given
+    mask = np.zeros(count, dtype=bool)
+    if given.size == 0:
+        return mask
+    if given.ndim != 1 or given.dtype.kind not in "iu" or given.min() < -count or given.max() >= count:
+        raise InvalidPointsError(
+            f"A set of points has the shape {given.shape} and type {given.dtype}. Give whole numbers below {count}, or"
+            f" {count} truth values."
+        )
+    mask[given] = True
+    return mask
+
+
+def check_distances(distances, count):
+    """Check distances to a rim, (count,), infinite where there is none near.
+
+    Raises
+    ------
+    InvalidPointsError
+        Another shape, negative, or NaN.
+    """
+    given = np.asarray(distances)
+    if given.shape != (count,) or given.dtype.kind not in "iuf" or not np.all(given >= 0.0):
+        raise InvalidPointsError(
+            f"Distances to the rim have the shape {given.shape} and type {given.dtype}. Give {count} numbers that are"
+            " not negative, infinity where there is no rim near."
+        )
+    return given.astype(np.float64)

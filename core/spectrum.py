@@ -29,7 +29,7 @@ class Spectrum:
     eigenvectors: np.ndarray
 
 
-def solve_spectrum(laplacian, count, raw, progress=None):
+def solve_spectrum(laplacian, stiffness, count, raw, progress=None):
     """Compute eigenpairs; see `LaplaceBeltrami.eigenpairs`."""
     areas = laplacian.areas
     n = len(areas)
@@ -38,7 +38,9 @@ def solve_spectrum(laplacian, count, raw, progress=None):
     if count > n // 3:
         raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
     try:
-        values, vectors = lowest_eigenpairs(laplacian, int(count), progress or (lambda stage, fraction: None))
+        values, vectors = lowest_eigenpairs(
+            laplacian, stiffness, int(count), progress or (lambda stage, fraction: None)
+        )
     except ArpackNoConvergence as error:
         raise SolverError(
             f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
@@ -50,7 +52,7 @@ def solve_spectrum(laplacian, count, raw, progress=None):
     return Spectrum(values, vectors)
 
 
-def lowest_eigenpairs(laplacian, count, progress):
+def lowest_eigenpairs(laplacian, stiffness, count, progress):
     """Solve ``K phi = lambda areas phi`` for the lowest pairs by Lanczos steps on a Chebyshev polynomial.
 
     The polynomial lifts the eigenvalues below a cut, about twice Weyl's estimate 4 pi count / area of the highest one
@@ -65,10 +67,11 @@ def lowest_eigenpairs(laplacian, count, progress):
     vectors : ndarray, (n, count)
         Orthonormal for the areas.
     """
-    order = cKDTree(laplacian.points).indices  # neighbours near in memory make the products faster
+    known = np.flatnonzero(laplacian.component >= 0)  # points left out have the value zero in every mode
+    order = known[cKDTree(laplacian.points[known]).indices]  # neighbours near in memory make the products faster
     root = 1.0 / np.sqrt(laplacian.areas[order])
     scale = sparse.diags_array(root, format="csr")
-    matrix = (scale @ laplacian.stiffness[order][:, order] @ scale).tocsr()
+    matrix = (scale @ stiffness[order][:, order] @ scale).tocsr()
     n = len(order)
     random = np.random.default_rng(0)
     products = 0
@@ -122,7 +125,7 @@ def lowest_eigenpairs(laplacian, count, progress):
         lifted, vectors = np.append(lifted, missed)[best], np.column_stack([vectors, vector])[:, best]
     values = np.einsum("ij,ij->j", vectors, matrix @ vectors)
     ascending = np.argsort(values)
-    result = np.empty_like(vectors)
+    result = np.zeros((len(laplacian.points), count))
     result[order] = root[:, None] * vectors[:, ascending]
     return np.maximum(values[ascending], 0.0), result
 

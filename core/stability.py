@@ -63,17 +63,18 @@ def check_stability(laplacian):
     Returns
     -------
     Stability
-        (A5) holds for the kernel by construction; (A6) concerns rims, which have no part in this.
+        Of the points that take part. (A5) holds for the kernel by construction; (A6) concerns rims, not measured here.
     """
-    distinct, first = np.unique(laplacian.points, axis=0, return_index=True)
+    known = np.flatnonzero(laplacian.component >= 0)
+    distinct, first = np.unique(laplacian.points[known], axis=0, return_index=True)
     reach = cKDTree(distinct).query(distinct, k=[min(7, len(distinct))], workers=-1)[0][:, 0]
-    stiffness, areas = laplacian.stiffness, laplacian.areas
+    stiffness, areas = laplacian.stiffness[known][:, known], laplacian.areas[known]
     largest = stiffness.diagonal().max()
     return Stability(
         float(areas.max() / areas.min()),
         float(reach.max()),
         int(np.diff(stiffness.indptr).max()),
-        float((laplacian.smoothing_lengths[first] / reach).min()),
+        float((laplacian.smoothing_lengths[known[first]] / reach).min()),
         float(np.abs(stiffness.sum(axis=1)).max() / largest),
         float(np.abs(stiffness.sum(axis=0)).max() / largest),
         int(connected_components(stiffness, directed=False, return_labels=False)),

@@ -1,0 +1,92 @@
+"""Smoothing lengths: how wide the kernel is at every point."""
+
+import numpy as np
+
+# Irregularity of the spacing, and h / d100: the widest that it needs, the narrowest that it bears.
+_IRREGULARITY = (0.03, 0.12, 0.24, 0.30)
+_WIDEST = (0.35, 0.65, 0.70, 0.76)
+_NARROWEST = (0.30, 0.30, 0.30, 0.45)
+_BEND = 0.33  # h times the principal curvature: how far the kernel may reach around a bend
+_NOISE = 0.10  # changes of log d100 that may be chance
+_SLOW, _FAST, _LAST = 160, 10, 2  # rounds of averaging over the 40 nearest neighbours
+
+
+def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None):
+    """Choose h for every point.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    options : LaplacianOptions
+        Its bandwidth, neighbors and bandwidth_factor.
+    label : ndarray, (m,) int, optional
+        Parts of the cloud; neighbours are counted within a part.
+    steepest : ndarray, (m,), optional
+        The larger principal curvature of every point; for "adaptive".
+    inside : ndarray, (m, 2), optional
+        Distances to rims; a neighbourhood that it cuts counts as whole.
+
+    Returns
+    -------
+    ndarray, (m,)
+        Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
+        twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: the same distance
+        without what may be chance, times a factor between 0.3 and 0.76 that is as large as the irregularity of the
+        spacing demands and the curvature permits.
+    """
+    distance = _neighbor_distance(nearest.tree, options.neighbors, label)
+    if options.bandwidth == "global":
+        return np.full(len(distance), options.bandwidth_factor * distance.mean())
+    averaging = nearest.averaging()
+    if options.bandwidth == "local":
+        return options.bandwidth_factor * _repeat(averaging, distance, 2)
+    # Neighbours on other sheets do not count.
+    own = np.log(distance) - 0.5 * np.log((nearest.weight > 0.0).sum(axis=1) / (nearest.weight.shape[1] - 1))
+    if inside is not None:
+        own = own + 0.5 * np.log(_share_inside(inside / distance[:, None])).sum(axis=1)
+    fast = _repeat(averaging, own, _FAST)
+    slow = _repeat(averaging, fast, _SLOW)
+    change = fast - slow
+    reach = slow + np.sign(change) * np.maximum(np.abs(change) - _NOISE, 0.0)
+    irregular = irregularity(nearest, averaging)
+    least, most = (np.log(np.interp(irregular, _IRREGULARITY, factors)) for factors in (_NARROWEST, _WIDEST))
+    bend = np.log(_BEND / np.maximum(steepest, 1e-30))
+    floor = least + np.maximum(reach, own)
+    length = np.maximum(np.clip(bend, least + reach, most + reach), floor)
+    length = np.maximum(_repeat(averaging, length, _LAST), floor)
+    return options.bandwidth_factor * np.exp(_repeat(averaging, length, _LAST))
+
+
+def _neighbor_distance(tree, neighbors, label):
+    # The tree counts a point as its own first neighbour.
+    distance = tree.query(tree.data, k=[min(neighbors + 1, tree.n)], workers=-1)[0][:, 0]
+    if label is not None:
+        size = np.bincount(label)
+        for part in np.flatnonzero(size <= neighbors):
+            few = size[part] - 1
+            rows = np.flatnonzero(label == part)
+            reach = tree.query(tree.data[rows], k=[few + 1], workers=-1)[0][:, 0]
+            distance[rows] = reach * np.sqrt(neighbors / few)
+    return distance
+
+
+def irregularity(nearest, averaging):
+    """Measure how irregular the spacing is: 0 on a lattice, about 0.3 where points are random.
+
+    Robust standard deviation of the logarithm of (d6 / d24)^2 about its local mean.
+    """
+    ratio = 2.0 * np.log(nearest.distance[:, 6] / nearest.distance[:, 24])
+    return float(np.median(np.abs(ratio - averaging @ ratio)) / 0.6745)
+
+
+def _repeat(matrix, values, rounds):
+    for _ in range(rounds):
+        values = matrix @ values
+    return values
+
+
+def _share_inside(ratio):
+    """Share of a disc's area on this side of a straight rim, at ``ratio`` radii from its centre."""
+    ratio = np.clip(ratio, 0.0, 1.0)
+    return 1.0 - (np.arccos(ratio) - ratio * np.sqrt(1.0 - ratio**2)) / np.pi

@@ -1,0 +1,67 @@
+"""The nearest neighbours of every point: a fixed number, before any smoothing length is known."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+COUNT = 41  # the point itself and 40 others
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The 40 nearest neighbours of every point.
+
+    Attributes
+    ----------
+    tree : cKDTree
+        Of m points; parts that are not connected stand far apart in it.
+    index : ndarray, (m, 41) int
+        Neighbours by distance, the point itself first.
+    distance : ndarray, (m, 41)
+    weight : ndarray, (m, 41)
+        From 1 at the point to 0 at its last neighbour; 0 too for neighbours on another sheet of the surface.
+    """
+
+    tree: cKDTree
+    index: np.ndarray
+    distance: np.ndarray
+    weight: np.ndarray
+
+    @property
+    def points(self):
+        """Coordinates, (m, 3)."""
+        return self.tree.data
+
+    @property
+    def spacing(self):
+        """Distance between points of an even sample as dense as the nearest twelve neighbours, (m,)."""
+        last = min(12, self.distance.shape[1] - 1)
+        return self.distance[:, last] * np.sqrt(np.pi / last)
+
+    def keep(self, kept):
+        """Return the same neighbours with the weight of those not kept, (m, 41) bool, set to zero."""
+        return replace(self, weight=np.where(kept, self.weight, 0.0))
+
+    def averaging(self):
+        """Return the (m, m) CSR matrix whose product is the weighted mean over the neighbours."""
+        count, width = self.index.shape
+        weight = self.weight / self.weight.sum(axis=1, keepdims=True)
+        start = np.arange(0, count * width + 1, width, dtype=np.int32)
+        return sparse.csr_array((weight.ravel(), self.index.ravel(), start), shape=(count, count))
+
+
+def find_nearest(points):
+    """Find the 40 nearest neighbours of every point, (m, 3)."""
+    tree = cKDTree(points)
+    distance, index = tree.query(points, k=min(COUNT, len(points)), workers=-1)
+    return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance))
+
+
+def fading_weights(distance):
+    """Return weights that fall from 1 to 0 at the last neighbour, (n, k).
+
+    Which of several neighbours at the same last distance was found then makes no difference.
+    """
+    return (1.0 - (distance / distance[:, -1:]) ** 2) ** 2
