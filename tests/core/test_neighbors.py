@@ -4,7 +4,10 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from benchmarks.samplings import random_sphere, uneven_sphere
-from core.neighbors import find_neighborhoods, find_pairs, smoothing_lengths
+from core.bandwidth import smoothing_lengths
+from core.cloud import read_cloud
+from core.nearest import find_nearest
+from core.neighbors import find_pairs
 from core.options import LaplacianOptions
 
 
@@ -35,27 +38,28 @@ def test_support_may_hold_every_point():
 def test_global_length_is_the_mean_distance_to_the_hundredth_neighbor():
     points = random_sphere(500)
     distance = np.sort(cdist(points, points), axis=1)[:, 100]  # column 0 is the point itself
-    lengths = smoothing_lengths(cKDTree(points), LaplacianOptions.paper())
+    lengths = smoothing_lengths(find_nearest(points), LaplacianOptions.paper())
     np.testing.assert_allclose(lengths, distance.mean(), rtol=1e-12)
 
 
 def test_local_length_follows_the_spacing():
     points = uneven_sphere(4000)
-    lengths = smoothing_lengths(cKDTree(points), LaplacianOptions())
+    lengths = smoothing_lengths(find_nearest(points), LaplacianOptions(bandwidth="local"))
     dense, coarse = lengths[points[:, 2] > 0.6].mean(), lengths[points[:, 2] < -0.6].mean()
     assert coarse / dense == pytest.approx(3.0, rel=0.1)
 
 
 def test_local_length_varies_slowly():
-    neighborhoods = find_neighborhoods(random_sphere(3000), LaplacianOptions())
+    options = LaplacianOptions(bandwidth="local", bandwidth_factor=0.55)
+    neighborhoods = read_cloud(random_sphere(3000), options).neighborhoods
     change = neighborhoods.lengths[neighborhoods.first] / neighborhoods.lengths[neighborhoods.second]
     assert np.abs(np.log(change)).max() < 0.35
 
 
 def test_scaled_coordinates_are_free_of_units():
     points = random_sphere(400)
-    plain = find_neighborhoods(points, LaplacianOptions())
-    moved = find_neighborhoods(1e3 * points + 7.0, LaplacianOptions())
-    np.testing.assert_allclose(moved.lengths, plain.lengths, rtol=1e-9)
+    plain = read_cloud(points, LaplacianOptions())
+    moved = read_cloud(1e3 * points + 7.0, LaplacianOptions())
+    np.testing.assert_allclose(moved.neighborhoods.lengths, plain.neighborhoods.lengths, rtol=1e-9)
     assert moved.scaled.scale == pytest.approx(1e3 * plain.scaled.scale, rel=1e-9)
-    assert np.sqrt(np.mean(np.sum(plain.points**2, axis=1))) == pytest.approx(1.0, rel=1e-12)
+    assert np.sqrt(np.mean(np.sum(plain.scaled.points**2, axis=1))) == pytest.approx(1.0, rel=1e-12)

@@ -6,15 +6,17 @@ import pytest
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, uneven_sphere
 from core.areas import TAU, KernelMatrix, constrained_areas, regularized_areas
-from core.neighbors import find_neighborhoods
+from core.cloud import read_cloud
 from core.options import LaplacianOptions
 from core.reference import algorithm_1, unsymmetrized_operator
+from core.rims import no_rim
 
 
 @pytest.fixture(scope="module")
 def problem():
-    neighborhoods = find_neighborhoods(uneven_sphere(400), LaplacianOptions(bandwidth="global"))
-    matrix, target = KernelMatrix(neighborhoods, neighborhoods.distance), np.ones(400)
+    options = LaplacianOptions(bandwidth="global", rims="off", sheets=False)
+    neighborhoods = read_cloud(uneven_sphere(400), options).neighborhoods
+    matrix, target = KernelMatrix(neighborhoods, neighborhoods.distance, no_rim(400)), np.ones(400)
     return matrix, target, regularized_areas(matrix, target, 1e-3).areas
 
 
@@ -56,8 +58,8 @@ class TestAlgorithm1:
 
     def test_feasible_start_is_kept(self):
         # The paper: on the uniform sphere the solution of eq. (7) is positive, and no iteration is made.
-        neighborhoods = find_neighborhoods(fibonacci_sphere(500), LaplacianOptions.paper())
-        matrix, target = KernelMatrix(neighborhoods, neighborhoods.distance), np.ones(500)
+        neighborhoods = read_cloud(fibonacci_sphere(500), LaplacianOptions.paper()).neighborhoods
+        matrix, target = KernelMatrix(neighborhoods, neighborhoods.distance, no_rim(500)), np.ones(500)
         start = regularized_areas(matrix, target, 1e-3).areas
         np.testing.assert_allclose(algorithm_1(matrix, target, start).areas, start, rtol=1e-5)
 
@@ -70,10 +72,10 @@ class TestAlgorithm1:
 
 def eq_5_on_the_sphere(count):
     """The matrix of eq. (5), and -x / 2 of the unit sphere whose Laplacian is x."""
-    options = LaplacianOptions(bandwidth="global", curvature_correction=False)
+    options = LaplacianOptions(bandwidth="global", bandwidth_factor=0.55, curvature_correction=False)
     points = fibonacci_sphere(count)
-    neighborhoods = find_neighborhoods(points, options)
-    scaled = neighborhoods.scaled
+    cloud = read_cloud(points, options)
+    scaled, neighborhoods = cloud.scaled, cloud.neighborhoods
     areas = core.estimate_areas(points, options=options)[scaled.first] / scaled.scale**2
     matrix = unsymmetrized_operator(neighborhoods, points[scaled.first], areas) / scaled.scale**2
     return matrix, points[scaled.first, 0]
@@ -95,8 +97,8 @@ class TestUnsymmetrizedOperator:
     def test_is_not_symmetric_for_the_areas_where_normals_differ(self):
         options = LaplacianOptions(curvature_correction=False)
         points = random_sphere(600) * [1.0, 0.7, 0.4]
-        neighborhoods = find_neighborhoods(points, options)
-        scaled = neighborhoods.scaled
+        cloud = read_cloud(points, options)
+        scaled, neighborhoods = cloud.scaled, cloud.neighborhoods
         laplacian = core.build_laplacian(points, options=options)
         areas = laplacian.areas[scaled.first] / scaled.scale**2
         weak = unsymmetrized_operator(neighborhoods, laplacian.normals[scaled.first], areas).multiply(areas[:, None])
@@ -140,7 +142,7 @@ class TestTheorem1:
 
     def test_two_parts_and_narrow_kernels_are_concerns(self):
         sphere = fibonacci_sphere(300)
-        options = LaplacianOptions(neighbors=12, bandwidth_factor=0.4)
+        options = LaplacianOptions(bandwidth="local", neighbors=12, bandwidth_factor=0.4)
         laplacian = core.build_laplacian(np.concatenate([sphere, sphere + [9.0, 0.0, 0.0]]), options=options)
         concerns = " ".join(core.check_stability(laplacian).concerns())
         assert "2 parts" in concerns

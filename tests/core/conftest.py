@@ -1,0 +1,50 @@
+"""Operators of large clouds, built once for all tests of the core."""
+
+import functools
+
+import pytest
+
+import core
+from benchmarks.samplings import (
+    edge_collapsed_sphere,
+    fibonacci_sphere,
+    marching_cubes_sphere,
+    random_sphere,
+    torus_low_discrepancy,
+    torus_points,
+    uneven_sphere,
+)
+
+CLOUDS = {
+    "even sphere": lambda: fibonacci_sphere(4000),
+    "random sphere": lambda: random_sphere(5000),
+    "another random sphere": lambda: random_sphere(3500, 11),
+    "marching cubes": lambda: marching_cubes_sphere(39),
+    "edges collapsed": lambda: edge_collapsed_sphere(4000),
+    "density jump": lambda: uneven_sphere(4500),
+    "random torus": lambda: torus_points(5000),
+    "coarse torus": lambda: torus_low_discrepancy(2000),
+    "fine torus": lambda: torus_low_discrepancy(8000),
+}
+
+
+@pytest.fixture(scope="session")
+def operators():
+    """Function from the name of a cloud to its operator with default options; nobody may change it."""
+
+    @functools.cache
+    def build(name):
+        return core.build_laplacian(CLOUDS[name]())
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def eigenvalues(operators):
+    """Function from the name of a cloud and a count to the first eigenvalues of its operator."""
+
+    @functools.cache
+    def solve(name, count):
+        return operators(name).eigenpairs(count).eigenvalues
+
+    return solve

@@ -1,0 +1,140 @@
+"""Smoothing lengths: what makes them wide and what narrow."""
+
+import numpy as np
+import pytest
+
+from benchmarks.samplings import (
+    fibonacci_sphere,
+    random_sphere,
+    square_grid,
+    square_random,
+    torus_area,
+    torus_low_discrepancy,
+    torus_points,
+    uneven_sphere,
+)
+from core.bandwidth import irregularity
+from core.cloud import read_cloud
+from core.nearest import find_nearest
+from core.options import LaplacianOptions
+
+
+def lengths(points, **settings):
+    """Smoothing lengths of the caller's points, in their unit."""
+    cloud = read_cloud(points, LaplacianOptions(**settings))
+    return cloud.scaled.hand_out(cloud.neighborhoods.lengths * cloud.scaled.scale, 0.0)
+
+
+def spread(values):
+    return values.std() / values.mean()
+
+
+class TestAdaptive:
+    @pytest.mark.parametrize("seed", range(2))
+    def test_constant_where_the_density_is(self, seed):
+        points = random_sphere(2500, seed)
+        adaptive = lengths(points)
+        assert spread(adaptive) < 0.03
+        assert np.abs(adaptive / adaptive.mean() - 1.0).max() < 0.1
+        assert spread(adaptive) < 0.5 * spread(lengths(points, bandwidth="local", bandwidth_factor=0.55))
+
+    @pytest.mark.parametrize("seed", range(2))
+    def test_follows_a_density_jump(self, seed):
+        points = uneven_sphere(4000, seed)
+        adaptive = lengths(points)
+        coarse, dense = (adaptive[side * points[:, 2] > 0.5].mean() for side in (-1.0, 1.0))
+        assert 1.7 < coarse / dense < 3.3  # the spacing changes threefold
+
+    def test_varies_slowly(self):
+        for points, most in ((random_sphere(2000), 0.15), (uneven_sphere(2500), 0.9)):
+            pairs = read_cloud(points, LaplacianOptions()).neighborhoods
+            assert np.abs(np.log(pairs.lengths[pairs.first] / pairs.lengths[pairs.second])).max() < most
+
+    def test_shrinks_with_the_radius_of_curvature(self):
+        # The same irregularity; in spacings, thin tubes are narrower than thick ones, and these than the sphere.
+        widths = [
+            lengths(torus_points(3000, minor=minor)).mean() / np.sqrt(torus_area(1.0, minor) / 3000)
+            for minor in (0.05, 0.2, 0.8)
+        ]
+        widths.append(lengths(random_sphere(3000)).mean() / np.sqrt(4.0 * np.pi / 3000))
+        assert np.all(np.diff(widths) > 0.0)
+        assert widths[-1] > 1.4 * widths[0]
+
+    def test_never_narrower_than_the_points_demand(self):
+        points = torus_low_discrepancy(4000, minor=0.05)
+        spacing = np.sqrt(torus_area(1.0, 0.05) / 4000)
+        assert lengths(points).min() > 1.2 * spacing
+
+    def test_widens_with_irregularity(self):
+        spacing = np.sqrt(4.0 * np.pi / 2500)
+        even, random = (lengths(sphere(2500)).mean() / spacing for sphere in (fibonacci_sphere, random_sphere))
+        assert random > 1.5 * even
+
+    @pytest.mark.parametrize("side", [40, 60])
+    def test_no_other_at_the_rim_of_a_grid(self, side):
+        points = square_grid(side)
+        adaptive = lengths(points)
+        middle = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.25
+        np.testing.assert_allclose(adaptive, adaptive[middle].mean(), rtol=0.04)
+
+    def test_hardly_any_other_at_the_rim_of_a_random_square(self):
+        points = square_random(2500)
+        adaptive = lengths(points)
+        middle = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.25
+        np.testing.assert_allclose(adaptive, adaptive[middle].mean(), rtol=0.08)
+        # Without the rim, neighbourhoods there would look sparse.
+        unaware = lengths(points, rims="off")
+        assert unaware.max() > 1.1 * unaware[middle].mean()
+
+    def test_a_factor_scales_them(self):
+        points = random_sphere(900)
+        np.testing.assert_allclose(lengths(points, bandwidth_factor=1.3), 1.3 * lengths(points), rtol=1e-9)
+
+    def test_fewer_neighbors_make_them_narrower(self):
+        points = random_sphere(2000)
+        ratio = lengths(points, neighbors=50).mean() / lengths(points).mean()
+        assert ratio == pytest.approx(np.sqrt(0.5), rel=0.05)
+
+
+class TestAny:
+    @pytest.mark.parametrize("bandwidth", ["adaptive", "local", "global"])
+    def test_pairs_are_those_within_three_mean_lengths(self, bandwidth):
+        options = LaplacianOptions(bandwidth=bandwidth, sheets=False)
+        pairs = read_cloud(uneven_sphere(900), options).neighborhoods
+        reach = 3.0 * pairs.mean(pairs.lengths)
+        assert np.all(pairs.distance <= reach * (1.0 + 1e-12))
+        between = np.linalg.norm(pairs.points[:, None] - pairs.points, axis=2)
+        inside = between <= 1.5 * (pairs.lengths[:, None] + pairs.lengths)
+        assert len(pairs.first) == (np.count_nonzero(inside) - len(inside)) // 2
+        assert len({frozenset(pair) for pair in zip(pairs.first.tolist(), pairs.second.tolist(), strict=True)}) == len(
+            pairs.first
+        )
+
+    @pytest.mark.parametrize("bandwidth", ["adaptive", "local", "global"])
+    def test_free_of_units_position_and_order(self, bandwidth):
+        points = uneven_sphere(1200)
+        order = np.random.default_rng(1).permutation(len(points))
+        turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+        before = lengths(points, bandwidth=bandwidth)
+        moved = lengths((17.0 * points @ turn + 5.0)[order], bandwidth=bandwidth)
+        np.testing.assert_allclose(moved, 17.0 * before[order], rtol=1e-9)
+        np.testing.assert_allclose(lengths(1e-6 * points, bandwidth=bandwidth), 1e-6 * before, rtol=1e-9)
+
+    def test_global_ones_are_all_the_same(self):
+        assert np.ptp(lengths(uneven_sphere(900), bandwidth="global")) == 0.0
+
+
+class TestIrregularity:
+    @pytest.mark.parametrize(
+        ("points", "least", "most"),
+        [
+            (square_grid(40), 0.0, 0.02),
+            (fibonacci_sphere(3000), 0.0, 0.06),
+            (random_sphere(3000), 0.2, 0.4),
+            (uneven_sphere(3000), 0.2, 0.4),
+        ],
+        ids=["grid", "even", "random", "density jump"],
+    )
+    def test_known_samplings(self, points, least, most):
+        nearest = find_nearest(points)
+        assert least <= irregularity(nearest, nearest.averaging()) <= most

@@ -1,0 +1,176 @@
+"""Noise: its measure, its smoothing within the operator, and what that leaves alone."""
+
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import (
+    closed_plate,
+    fibonacci_sphere,
+    noisy_sphere,
+    open_cylinder,
+    parallel_sheets,
+    random_sphere,
+    sausage,
+    square_random,
+    torus_points,
+    uneven_sphere,
+)
+from core.cloud import read_cloud
+from core.nearest import find_nearest
+from core.noise import noise_level, project_points
+from core.options import LaplacianOptions
+from core.sheets import fit_sheets
+
+COUNT = 2000
+SPACING = np.sqrt(4.0 * np.pi / COUNT)
+CLEAN = {
+    "even sphere": fibonacci_sphere(1500),
+    "random sphere": random_sphere(1500),
+    "density jump": uneven_sphere(2000),
+    "torus": torus_points(1500),
+    "thin torus": torus_points(2500, minor=0.1),
+    "coarse torus": torus_points(400),
+    "parallel sheets": parallel_sheets(25)[0],
+    "box": closed_plate(20, 8)[0],
+    "plate": closed_plate(25)[0],
+    "bent capsule": sausage(2000, bent=True)[0],
+    "cylinder": open_cylinder()[::3],
+    "square": square_random(1500),
+}
+
+
+def measured(points):
+    """The noise as the operator measures it."""
+    surface, nearest = fit_sheets(find_nearest(points))
+    return noise_level(nearest.tree, np.median(surface.misfit / nearest.spacing))
+
+
+def off_sphere(points):
+    """Root mean square distance from the unit sphere, in spacings."""
+    return np.sqrt(np.mean((np.linalg.norm(points, axis=1) - 1.0) ** 2)) / SPACING
+
+
+def degrees_off(normals, points):
+    """Root mean square angle between normals and those of the sphere."""
+    cosine = np.abs(np.einsum("ij,ij->i", normals, points)) / np.linalg.norm(points, axis=1)
+    return np.degrees(np.sqrt(np.mean(np.arccos(np.minimum(cosine, 1.0)) ** 2)))
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    return noisy_sphere(COUNT, 0.5)
+
+
+@pytest.fixture(scope="module")
+def laplacian(noisy):
+    return core.build_laplacian(noisy.copy())
+
+
+class TestLevel:
+    @pytest.mark.parametrize("name", CLEAN)
+    def test_nothing_on_clean_surfaces(self, name):
+        assert measured(CLEAN[name]) < 0.03
+        assert read_cloud(CLEAN[name], LaplacianOptions()).notices == []
+
+    @pytest.mark.parametrize("level", [0.1, 0.25, 0.5])
+    def test_about_right_on_noisy_ones(self, level):
+        # The fit follows some of the noise.
+        assert 0.5 * level < measured(noisy_sphere(COUNT, level)) < 1.1 * level
+
+    def test_free_of_units(self, noisy):
+        assert measured(1e-3 * noisy) == pytest.approx(measured(noisy), rel=1e-9)
+
+    @pytest.mark.parametrize("count", [50, 61, 80])
+    def test_few_points(self, count):
+        assert measured(fibonacci_sphere(count)) < 0.05
+
+
+class TestProjection:
+    def test_quadrics_bring_the_points_back(self, noisy):
+        once = project_points(noisy, "quadric")
+        assert off_sphere(once) < 0.35 * off_sphere(noisy)
+        assert off_sphere(project_points(once, "quadric")) < 0.9 * off_sphere(once)
+
+    def test_planes_too_but_they_cut_the_bend(self):
+        noisy = 3.0 * noisy_sphere(COUNT, 0.5)
+        flat = project_points(noisy, "plane") / 3.0
+        assert off_sphere(flat) < 0.7 * off_sphere(noisy / 3.0)
+        radius = np.linalg.norm(flat, axis=1)
+        assert radius.mean() < 1.0 - 3e-3
+
+    @pytest.mark.parametrize("method", ["quadric", "plane"])
+    def test_points_of_a_plane_stay_where_they_are(self, method):
+        points = square_random(800)
+        np.testing.assert_allclose(project_points(points, method), points, atol=1e-9)
+
+    def test_a_quadric_hardly_moves_clean_points(self):
+        points = torus_points(3000)
+        spacing = np.sqrt(4.0 * np.pi**2 * 0.4 / 3000)
+        assert np.linalg.norm(project_points(points, "quadric") - points, axis=1).max() < 0.1 * spacing
+
+
+class TestOperator:
+    def test_the_callers_points_are_left_alone(self, noisy):
+        given = noisy.copy()
+        result = core.build_laplacian(given)
+        np.testing.assert_array_equal(given, noisy)
+        np.testing.assert_array_equal(result.points, noisy)
+
+    def test_a_notice_tells_how_strong_it_is(self, laplacian):
+        notices = [notice for notice in laplacian.notices if "Noise" in notice]
+        assert len(notices) == 1
+        level = float(notices[0].split()[2])
+        assert 0.25 < level < 0.55
+
+    def test_the_operators_own_points_are_near_the_surface(self, noisy):
+        cloud = read_cloud(noisy, LaplacianOptions())
+        off = read_cloud(noisy, LaplacianOptions(projection="off"))
+        center = noisy.mean(axis=0)
+        for result, least, most in ((cloud, 0.0, 0.25), (off, 0.4, 0.6)):
+            assert least < off_sphere(result.neighborhoods.points * result.scaled.scale + center) < most
+
+    def test_normals_are_within_a_few_degrees(self, noisy, laplacian):
+        own = degrees_off(laplacian.normals, noisy)
+        assert own < 6.0
+        assert own < 0.5 * degrees_off(core.estimate_normals(noisy, LaplacianOptions(projection="off")), noisy)
+
+    def test_area(self, noisy, laplacian):
+        areas = {
+            projection: core.estimate_areas(noisy, options=LaplacianOptions(projection=projection)).sum()
+            for projection in ("quadric", "plane", "off")
+        }
+        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
+        assert areas["quadric"] == pytest.approx(4.0 * np.pi, rel=1e-2)
+        assert areas["plane"] == pytest.approx(4.0 * np.pi, rel=6e-2)
+        assert areas["off"] > 1.15 * 4.0 * np.pi
+
+    def test_clean_points_are_taken_as_they_are(self):
+        points = torus_points(1500)
+        automatic, off = (core.build_laplacian(points, options=LaplacianOptions(projection=p)) for p in ("auto", "off"))
+        np.testing.assert_array_equal(automatic.areas, off.areas)
+        np.testing.assert_array_equal(automatic.stiffness.data, off.stiffness.data)
+
+    def test_always_if_asked_for(self):
+        points = random_sphere(900)
+        plain, quadric, plane = (
+            core.build_laplacian(points, options=LaplacianOptions(projection=p)) for p in ("off", "quadric", "plane")
+        )
+        assert np.any(quadric.areas != plain.areas)
+        np.testing.assert_allclose(quadric.areas.sum(), plain.areas.sum(), rtol=4e-3)
+        # Planes lie inside the sphere.
+        assert plane.areas.sum() < 0.99 * plain.areas.sum()
+        assert quadric.notices == plane.notices == []
+
+    def test_given_normals_are_kept(self, noisy):
+        laplacian = core.build_laplacian(noisy, normals=noisy)
+        np.testing.assert_allclose(laplacian.normals, noisy / np.linalg.norm(noisy, axis=1)[:, None], atol=1e-12)
+
+    def test_a_noisy_open_surface_keeps_its_rim(self):
+        points = square_random(1600)
+        points[:, 2] = 0.3 / 40.0 * np.random.default_rng(1).standard_normal(1600)
+        laplacian = core.build_laplacian(points)
+        assert laplacian.areas.sum() == pytest.approx(1.0, rel=5e-2)
+        distance = np.minimum(points[:, :2], 1.0 - points[:, :2]).min(axis=1)
+        assert np.count_nonzero(laplacian.boundary) > 100
+        assert np.mean(distance[laplacian.boundary] < 3.0 / 40.0) > 0.95

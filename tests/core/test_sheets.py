@@ -1,0 +1,220 @@
+"""Close sheets: told apart by their normals, so that no pair joins them through the gap."""
+
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import (
+    closed_plate,
+    grid_points,
+    parallel_sheets,
+    random_sphere,
+    sausage,
+    sausage_bend,
+    torus_points,
+)
+from core.cloud import read_cloud
+from core.components import label_sheets
+from core.nearest import find_nearest
+from core.options import LaplacianOptions
+from core.sheets import fit_sheets, same_sheet
+
+
+def pair(first, second, normal, other):
+    """Arguments of `same_sheet` for two points and their normals, at unit spacing."""
+    chord = np.subtract(second, first)
+    return chord @ normal, chord @ other, np.dot(normal, other), np.linalg.norm(chord), 1.0
+
+
+class TestSameSheet:
+    UP, DOWN = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
+
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    @pytest.mark.parametrize(("x", "expected"), [(0.0, False), (0.5, False), (1.0, False), (3.0, False)])
+    def test_one_above_the_other(self, side, x, expected):
+        assert same_sheet(*pair([0, 0, 0], [x, 0, 1.5], self.UP, side * self.UP)) == expected
+
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_next_to_each_other(self, side):
+        assert same_sheet(*pair([0, 0, 0], [3.0, 0, 0.0], self.UP, side * self.UP))
+        assert same_sheet(*pair([0, 0, 0], [3.0, 0, 0.3], self.UP, side * self.UP))
+
+    @pytest.mark.parametrize("angle", [0.1, 0.4, 0.75])
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_along_a_circle(self, angle, side):
+        # The chord of an arc is orthogonal to the mean of the normals at its ends.
+        normal, other = ([np.sin(a), 0.0, np.cos(a)] for a in (-angle, angle))
+        first, second = 10.0 * np.array(normal), 10.0 * np.array(other)
+        assert same_sheet(*pair(first, second, np.array(normal), side * np.array(other)))
+
+    def test_arrays(self):
+        left = np.array([0.0, 1.5, 0.0])
+        np.testing.assert_array_equal(
+            same_sheet(left, left, np.array([1.0, 1.0, -1.0]), np.full(3, 2.0), np.ones(3)), [True, False, True]
+        )
+
+
+class TestFitSheets:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def parallel(cls):
+        points, sheet, _ = parallel_sheets(30)
+        nearest = find_nearest(points)
+        surface, kept = fit_sheets(nearest)
+        return nearest, surface, kept, sheet
+
+    def test_no_neighbor_across_is_kept_and_all_others_are(self, parallel):
+        nearest, _, kept, sheet = parallel
+        across = sheet[nearest.index] != sheet[:, None]
+        assert np.any(nearest.weight[across] > 0.0)
+        assert not np.any(kept.weight[across] > 0.0)
+        np.testing.assert_array_equal(kept.weight[~across], nearest.weight[~across])
+
+    def test_its_normals_and_curvatures_are_those_of_planes(self, parallel):
+        surface = parallel[1]
+        np.testing.assert_allclose(np.abs(surface.normals[:, 2]), 1.0, atol=1e-9)
+        np.testing.assert_allclose(surface.gaussian, 0.0, atol=1e-9)
+        np.testing.assert_allclose(surface.height, 0.0, atol=1e-9)
+
+    def test_random_sheets(self):
+        # Random points leave gaps as wide as that between the sheets, so a few neighbours are told wrong.
+        rng = np.random.default_rng(0)
+        sheet = np.repeat([0, 1], 900)
+        points = np.column_stack([30.0 * rng.random((1800, 2)), 1.5 * sheet])
+        nearest = find_nearest(points)
+        surface, kept = fit_sheets(nearest)
+        across = (sheet[nearest.index] != sheet[:, None]) & (nearest.weight > 0.0)
+        assert np.count_nonzero(kept.weight[across]) < 0.05 * np.count_nonzero(across)
+        assert np.mean(np.abs(surface.normals[:, 2]) > 0.99) > 0.95
+
+    @pytest.mark.parametrize("points", [random_sphere(2000), torus_points(2000)], ids=["sphere", "torus"])
+    def test_a_single_sheet_keeps_all(self, points):
+        nearest = find_nearest(points)
+        assert np.array_equal(fit_sheets(nearest)[1].weight, nearest.weight)
+
+
+class TestPairs:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def plate(cls):
+        points, face, inset, _ = closed_plate(30)
+        return points, face, inset
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def capsule(cls):
+        return sausage(bent=True)
+
+    @staticmethod
+    def through_the_plate(plate, options):
+        points, face, inset = plate
+        cloud = read_cloud(points, options)
+        face, inset, pairs = face[cloud.scaled.first], inset[cloud.scaled.first], cloud.neighborhoods
+        faces = face[pairs.first] * face[pairs.second] == 0
+        opposite = faces & (face[pairs.first] + face[pairs.second] == 1)
+        around = inset[pairs.first] + inset[pairs.second] + 2.0
+        reach = 3.0 * pairs.mean(pairs.lengths) * cloud.scaled.scale
+        return np.count_nonzero(opposite & (around > reach)), cloud
+
+    @staticmethod
+    def across_the_arms(capsule, options):
+        points, along = capsule
+        cloud = read_cloud(points, options)
+        along, pairs = along[cloud.scaled.first], cloud.neighborhoods
+        bend = sausage_bend(len(points))
+        arm = 0.5 * (6.0 - np.pi * bend)
+        low = np.minimum(along[pairs.first], along[pairs.second])
+        high = np.maximum(along[pairs.first], along[pairs.second])
+        # The way around the bend is shortest on its inside.
+        around = (arm - low) + np.pi * (bend - 0.25) + (high - arm - np.pi * bend)
+        reach = 3.0 * pairs.mean(pairs.lengths) * cloud.scaled.scale
+        return np.count_nonzero((low < arm) & (high > arm + np.pi * bend) & (around > 1.5 * reach)), cloud
+
+    def test_none_through_a_closed_plate(self, plate):
+        count, cloud = self.through_the_plate(plate, LaplacianOptions())
+        assert count == 0
+        assert not cloud.definite
+
+    def test_none_from_arm_to_arm_of_a_bent_capsule(self, capsule):
+        count, cloud = self.across_the_arms(capsule, LaplacianOptions())
+        assert count == 0
+        assert not cloud.definite
+
+    def test_there_would_be_many_without_the_option(self, plate, capsule):
+        options = LaplacianOptions(sheets=False)
+        for count, cloud in (self.through_the_plate(plate, options), self.across_the_arms(capsule, options)):
+            assert count > 1000
+            assert cloud.definite
+
+    @pytest.mark.parametrize("points", [random_sphere(1500), torus_points(4000)], ids=["sphere", "torus"])
+    def test_none_is_left_out_where_no_sheets_are_close(self, points):
+        apart = read_cloud(points, LaplacianOptions())
+        assert apart.definite
+        assert len(apart.neighborhoods.first) == len(
+            read_cloud(points, LaplacianOptions(sheets=False)).neighborhoods.first
+        )
+
+
+class TestOrientation:
+    def test_outward_on_a_closed_plate(self):
+        points, face, inset, _ = closed_plate(30)
+        normals = core.estimate_normals(points, LaplacianOptions(orient=True))
+        outward = np.where(face == 1, 1.0, -1.0) * normals[:, 2]
+        assert np.all(outward[(face >= 0) & (inset > 0.0)] > 0.0)
+        np.testing.assert_allclose(outward[(face >= 0) & (inset > 3.0)], 1.0, atol=1e-6)
+        center = normals[face < 0] * (points[face < 0] - [15.0, 15.0, 1.0])
+        assert np.all(center.sum(axis=1) > 0.0)
+
+    @pytest.mark.parametrize("radius", [0.25, 0.1, 0.05])
+    def test_outward_on_a_thin_capsule(self, radius):
+        points, along = sausage(3000, radius=radius)
+        axis = np.column_stack([np.clip(along, 0.0, 6.0), 0.0 * along, 0.0 * along])
+        normals = core.estimate_normals(points, LaplacianOptions(orient=True))
+        assert np.einsum("ij,ij->i", normals, points - axis).min() > 0.9 * radius
+
+    def test_outward_on_a_bent_capsule(self):
+        points, along = sausage(bent=True)
+        bend = sausage_bend(len(points))
+        arm = 0.5 * (6.0 - np.pi * bend)
+        turn = np.clip((along - arm) / bend, 0.0, np.pi)
+        inside = np.clip(along, 0.0, 6.0)
+        straight = np.minimum(inside - arm, 0.0) - np.maximum(inside - arm - np.pi * bend, 0.0)
+        axis = np.column_stack([straight + bend * np.sin(turn), bend * np.cos(turn), 0.0 * along])
+        normals = core.estimate_normals(points, LaplacianOptions(orient=True))
+        assert np.einsum("ij,ij->i", normals, points - axis).min() > 0.7 * 0.25
+
+
+class TestLabels:
+    def test_parallel_sheets_are_two(self):
+        points, sheet, _ = parallel_sheets(30)
+        surface, nearest = fit_sheets(find_nearest(points))
+        label = label_sheets(nearest, surface.normals, np.zeros(len(points), dtype=int))
+        assert len(np.unique(label)) == 2
+        assert len({(a, b) for a, b in zip(label.tolist(), sheet.tolist(), strict=True)}) == 2
+
+    def test_the_sheets_of_islands_are_parts_of_their_own(self):
+        points, sheet, _ = parallel_sheets(20)
+        points = np.concatenate([points, points + [100.0, 0.0, 0.0], grid_points(range(30), range(30), [50.0])])
+        laplacian = core.build_laplacian(points)
+        np.testing.assert_array_equal(np.bincount(laplacian.component), [900, 400, 400, 400, 400])
+        expected = np.concatenate([sheet, 2 + sheet, np.full(900, 4)])
+        assert len(set(zip(laplacian.component.tolist(), expected.tolist(), strict=True))) == 5
+        sizes = np.bincount(laplacian.component, laplacian.areas)
+        np.testing.assert_allclose(sizes, [29.0**2, 19.0**2, 19.0**2, 19.0**2, 19.0**2], rtol=0.05)
+
+    @pytest.mark.parametrize(
+        "points",
+        [closed_plate(30)[0], sausage(bent=True)[0], random_sphere(2000), torus_points(2000, minor=0.2)],
+        ids=["plate", "capsule", "sphere", "torus"],
+    )
+    def test_what_hangs_together_is_one(self, points):
+        assert np.all(core.build_laplacian(points).component == 0)
+
+    def test_parts_are_components_of_the_operator(self):
+        points = parallel_sheets(30)[0]
+        laplacian = core.build_laplacian(points)
+        assert set(np.unique(laplacian.component)) == {0, 1}
+        assert laplacian.stiffness[laplacian.component == 0][:, laplacian.component == 1].count_nonzero() == 0
+        values = laplacian.eigenpairs(3).eigenvalues
+        assert np.all(values[:2] < 1e-9)
+        assert values[2] > 1e-4
