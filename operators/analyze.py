@@ -1,4 +1,4 @@
-"""Areas, normals and mean curvature of the active object's points."""
+"""Areas, normals, curvature, rim and connected parts of the active object's points."""
 
 from dataclasses import dataclass
 
@@ -6,10 +6,11 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ..core import LaplaceBeltrami, PointCloudError, Spectrum, UnresolvedModesError, mean_curvature
+from ..core import LaplaceBeltrami, PointCloudError, Spectrum, UnresolvedModesError
 from . import cache
 from .options import laplacian_options
-from .reading import obstacle, read_points
+from .reading import read_points
+from .ready import ReadyOperator
 from .result import area_text, check_writable, write_result
 from .stages import Stages
 
@@ -32,14 +33,22 @@ class Analysis:
         """Area of the whole surface."""
         return float(self.laplacian.areas.sum())
 
+    @property
+    def counts(self) -> dict:
+        """Connected parts, points at a rim and points left out, by the names of the settings that keep them."""
+        component = self.laplacian.component
+        return {
+            "part_count": int(component.max()) + 1,
+            "rim_count": int(np.count_nonzero(self.laplacian.boundary)),
+            "left_out_count": int(np.count_nonzero(component < 0)),
+        }
+
 
 def analyze_object(context, obj, modes: int = 0) -> Analysis:
-    """Compute areas, normals, mean curvature and the lowest modes, if any are asked for; write nothing."""
+    """Compute all that an analysis gives, with the lowest modes if any are asked for; write nothing."""
     reading = read_points(context, obj)
     with Stages(context.window_manager) as stages:
-        laplacian = cache.laplacian_for(reading.points, laplacian_options(obj.meshfree), stages)
-        stages("Curvature", 0.0)
-        curvature = mean_curvature(laplacian)
+        laplacian, curvature = cache.build(reading.points, laplacian_options(obj.meshfree), reading.rim, stages)
         spectrum, unresolved = resolved_modes(laplacian, modes, stages) if modes else (None, [])
     notices = reading.notices + laplacian.notices + unresolved
     local_normals = reading.local_normals(laplacian.normals)
@@ -57,10 +66,8 @@ def resolved_modes(laplacian, modes, progress):
         return laplacian.eigenpairs(error.resolved, progress=progress), [notice]
 
 
-class AnalysisOperator:
+class AnalysisOperator(ReadyOperator):
     """What the operators that analyze the active object have in common."""
-
-    bl_options = {"REGISTER", "UNDO"}
 
     write_limit: IntProperty(
         name="Modes to Write",
@@ -76,13 +83,6 @@ class AnalysisOperator:
         options={"SKIP_SAVE"},
     )
     show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
-
-    @classmethod
-    def poll(cls, context):
-        reason = obstacle(context.object)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
 
     def run(self, context, modes: int, shown: str):
         """Analyze the active object, write the result, then show the attribute `shown`; empty for the one on show."""
@@ -107,7 +107,7 @@ class AnalysisOperator:
 
 
 class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
-    """Compute area, normal and mean curvature of each point, and the total area"""
+    """Compute area, normal and curvatures of each point, the rim, the connected parts and the total area"""
 
     bl_idname = "meshfree.analyze"
     bl_label = "Analyze Points"

@@ -23,8 +23,19 @@ _STORAGE = {
 AREA = "lb_area"
 NORMAL = "lb_normal"
 MEAN_CURVATURE = "lb_mean_curvature"
+GAUSSIAN_CURVATURE = "lb_gaussian_curvature"
+BOUNDARY = "lb_boundary"
+COMPONENT = "lb_component"
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
-_TYPES = {AREA: "FLOAT", NORMAL: "FLOAT_VECTOR", MEAN_CURVATURE: "FLOAT"}
+_TYPES = {
+    AREA: "FLOAT",
+    NORMAL: "FLOAT_VECTOR",
+    MEAN_CURVATURE: "FLOAT",
+    GAUSSIAN_CURVATURE: "FLOAT",
+    BOUNDARY: "BOOLEAN",
+    COMPONENT: "INT",
+}
+RESULTS = tuple(_TYPES)  # what every analysis writes, in the order of the panel
 
 
 def eigenvector_name(mode: int) -> str:

@@ -2,25 +2,50 @@
 
 import hashlib
 from collections import OrderedDict
+from typing import NamedTuple
 
-from ..core import build_laplacian
+import numpy as np
+
+from ..core import LaplaceBeltrami, build_laplacian, mean_curvature
 
 _LIMIT = 2  # each holds all pairs of neighbours: 1 GB and more for large scans
-_laplacians = OrderedDict()
+_built = OrderedDict()
 
 
-def laplacian_for(points, options, progress):
-    """Return the operator of these points and options, built only if it is not among the last ones."""
-    key = (hashlib.blake2b(points).digest(), options)
-    laplacian = _laplacians.pop(key, None)
-    if laplacian is None:
-        while len(_laplacians) >= _LIMIT:
-            _laplacians.popitem(last=False)
-        laplacian = build_laplacian(points, options=options, progress=progress)
-    _laplacians[key] = laplacian
-    return laplacian
+class Built(NamedTuple):
+    """An operator and the mean curvature computed by it."""
+
+    laplacian: LaplaceBeltrami
+    mean_curvature: np.ndarray
+
+
+def build(points, options, rim, progress) -> Built:
+    """Return the operator of these points, options and rim, built only if it is not among the last ones.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+    options : LaplacianOptions
+    rim : ndarray, (n,) bool, or None
+        The points at the rim; None leaves it to the options.
+    progress : callable
+        Called as ``progress(stage, fraction)``.
+    """
+    checksum = hashlib.blake2b(points)
+    if rim is not None:
+        checksum.update(rim)
+    key = (checksum.digest(), options)
+    built = _built.pop(key, None)
+    if built is None:
+        while len(_built) >= _LIMIT:
+            _built.popitem(last=False)
+        laplacian = build_laplacian(points, options=options, boundary=rim, progress=progress)
+        progress("Curvature", 1.0)
+        built = Built(laplacian, mean_curvature(laplacian))
+    _built[key] = built
+    return built
 
 
 def clear():
     """Give the memory back."""
-    _laplacians.clear()
+    _built.clear()

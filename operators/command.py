@@ -58,9 +58,10 @@ def _parse(argv):
     parser = argparse.ArgumentParser(prog="blender --command meshfree")
     analyze = parser.add_subparsers(dest="command", required=True).add_parser(
         "analyze",
-        help="areas, normals, mean curvature and vibration modes of point clouds",
-        description="Analyze point clouds. Writes one JSON line per input: points, total area, eigenvalues, seconds"
-        " per stage, notices; or the error. The exit code is 1 if any input failed.",
+        help="areas, normals, curvature, rims and vibration modes of point clouds",
+        description="Analyze point clouds. Writes one JSON line per input: points, total area, connected parts, points"
+        " at a rim, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1 if any"
+        " input failed.",
     )
     analyze.add_argument(
         "inputs",
@@ -81,7 +82,7 @@ def _parse(argv):
     )
     analyze.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
     settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
-    for name in (*options.NAMES, "use_modifiers"):
+    for name in options.ALL_NAMES:
         _add_setting(analyze, settings[name])
 
     arguments = parser.parse_args(argv)
@@ -104,6 +105,8 @@ def _add_setting(parser, setting):
         kind.update(type=str.upper, choices=setting.enum_items.keys())
     elif setting.type == "BOOLEAN":
         kind.update(action=argparse.BooleanOptionalAction)
+    elif setting.type == "STRING":
+        kind.update(metavar="NAME")
     else:
         kind.update(type=int if setting.type == "INT" else float, metavar=setting.type)
     parser.add_argument(f"--{setting.identifier.replace('_', '-')}", **kind)
@@ -124,7 +127,7 @@ def _process(path, arguments) -> dict:
     reason = obstacle(obj)
     if reason:
         raise PointCloudError(reason)
-    for name in (*options.NAMES, "use_modifiers"):
+    for name in options.ALL_NAMES:
         value = getattr(arguments, name)
         if value is not None:
             setattr(obj.meshfree, name, value)
@@ -136,6 +139,7 @@ def _process(path, arguments) -> dict:
     return {
         "points": len(analysis.laplacian.areas),
         "total_area": analysis.total_area,
+        **analysis.counts,
         "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
         "seconds": {name: round(seconds, 3) for name, seconds in analysis.seconds.items()},
         "notices": analysis.notices,

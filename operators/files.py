@@ -118,7 +118,7 @@ def save(path, obj, analysis):
 
 
 def _save_arrays(path, obj, analysis):
-    """Write all arrays in double precision: points and normals in the world, lengths and areas too."""
+    """Write all arrays, numbers in double precision: points and normals in the world, lengths and areas too."""
     laplacian, spectrum = analysis.laplacian, analysis.spectrum
     np.savez(
         path,
@@ -126,6 +126,9 @@ def _save_arrays(path, obj, analysis):
         areas=laplacian.areas,
         normals=laplacian.normals,
         mean_curvature=analysis.mean_curvature,
+        gaussian_curvature=laplacian.gaussian_curvature,
+        boundary=laplacian.boundary,
+        component=laplacian.component,
         smoothing_lengths=laplacian.smoothing_lengths,
         eigenvalues=np.empty(0) if spectrum is None else spectrum.eigenvalues,
         eigenvectors=np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,

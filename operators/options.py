@@ -11,6 +11,9 @@ DEFAULTS = LaplacianOptions()
 # The options that are settings of an object by the same name; normals are always oriented.
 NAMES = tuple(option.name for option in fields(LaplacianOptions) if option.name != "orient")
 
+# Those, and the settings that say what of the object is read.
+ALL_NAMES = (*NAMES, "rim_group", "use_modifiers")
+
 
 def settings_values(settings) -> dict:
     """Values of the settings that change results, as core writes them."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core import PointCloudError, check_points
+from .rim import rim_checksum, rim_points
 
 DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
 
@@ -44,12 +45,15 @@ class Reading:
         Positions with the object's scale, rotation and shear, but not its location: float64 of small numbers.
     matrix : ndarray, (3, 3) float64
         The linear part of the object's matrix: points = local positions @ matrix.T.
+    rim : ndarray, (n,) bool, or None
+        Points at the rim, where the user's vertex group names them.
     notices : list of str
         What the user should know about how the object was read.
     """
 
     points: np.ndarray
     matrix: np.ndarray
+    rim: np.ndarray | None = None
     notices: list = field(default_factory=list)
 
     def local_normals(self, normals):
@@ -81,7 +85,7 @@ def read_points(context, obj) -> Reading:
     notices = []
     if mesh.polygons:
         notices.append(f"The mesh has {len(mesh.polygons)} faces: it is taken as its {len(mesh.vertices)} vertices.")
-    return Reading(check_points(positions) @ matrix.T, matrix, notices)
+    return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
 
 
 def mesh_positions(mesh):
@@ -129,10 +133,11 @@ def metric(obj):
     return matrix.T @ matrix
 
 
-def fingerprint(obj) -> str:
-    """Checksum of the positions and shape keys, quick enough for a panel: 1 million points take a few milliseconds.
+def fingerprint(obj, glance=False) -> str:
+    """Checksum of the positions, shape keys and rim group.
 
-    Of modifiers, if they are used, it sees which ones there are, not their settings.
+    A glance is quick enough for a panel, a few milliseconds for 1 million points, and may see a change of the rim
+    group some seconds late. Of modifiers, if they are used, both see which ones there are, not their settings.
     """
     mesh = obj.data
     checksum = zlib.crc32(mesh_positions(mesh))
@@ -148,6 +153,8 @@ def fingerprint(obj) -> str:
     if obj.meshfree.use_modifiers:
         state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_display(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
+    if obj.meshfree.rim_group:
+        checksum = zlib.crc32(repr(rim_checksum(obj, glance)).encode(), checksum)
     return f"{checksum:08x}"
 
 

@@ -6,8 +6,12 @@ import numpy as np
 from ..core import PointCloudError
 from .attributes import (
     AREA,
+    BOUNDARY,
+    COMPONENT,
+    GAUSSIAN_CURVATURE,
     MEAN_CURVATURE,
     NORMAL,
+    RESULTS,
     check_names,
     eigenvector_name,
     remove_eigenvectors,
@@ -27,7 +31,7 @@ def check_writable(obj, modes: int, make_single_user: bool):
         raise PointCloudError(
             f'"{obj.name}" shares its mesh with {shown}. Turn on Make Single User to give it a mesh of its own.'
         )
-    check_names(obj, [AREA, NORMAL, MEAN_CURVATURE, *map(eigenvector_name, range(1, modes + 1))])
+    check_names(obj, [*RESULTS, *map(eigenvector_name, range(1, modes + 1))])
 
 
 def write_result(obj, analysis, write_limit: int):
@@ -45,13 +49,19 @@ def write_result(obj, analysis, write_limit: int):
     elif is_stale(obj):
         remove_eigenvectors(mesh, beyond=0)
         obj.pop(EIGENVALUES, None)
-    write_attribute(mesh, AREA, analysis.laplacian.areas)
+    laplacian = analysis.laplacian
+    write_attribute(mesh, AREA, laplacian.areas)
     write_attribute(mesh, NORMAL, analysis.local_normals)
     write_attribute(mesh, MEAN_CURVATURE, analysis.mean_curvature)
+    write_attribute(mesh, GAUSSIAN_CURVATURE, laplacian.gaussian_curvature)
+    write_attribute(mesh, BOUNDARY, laplacian.boundary)
+    write_attribute(mesh, COMPONENT, laplacian.component)
 
     kept = obj.meshfree
     kept.total_area = analysis.total_area
     kept.point_count = len(mesh.vertices)
+    for name, count in analysis.counts.items():
+        setattr(kept, name, count)
     kept.stages.clear()
     for name, seconds in analysis.seconds.items():
         stage = kept.stages.add()
@@ -67,10 +77,13 @@ def is_analyzed(obj) -> bool:
     return obj.meshfree.fingerprint != ""
 
 
-def is_stale(obj) -> bool:
-    """Whether points, scale or settings have changed since the analysis, or the object never had one."""
+def is_stale(obj, glance=False) -> bool:
+    """Whether points, scale or settings have changed since the analysis, or the object never had one.
+
+    A glance is quick enough for a panel; see `fingerprint`.
+    """
     kept = obj.meshfree
-    if kept.fingerprint != fingerprint(obj) or kept.settings_used != repr(settings_values(kept)):
+    if kept.fingerprint != fingerprint(obj, glance) or kept.settings_used != repr(settings_values(kept)):
         return True
     now = metric(obj).reshape(-1)
     return not np.allclose(now, kept.metric, rtol=0.0, atol=1e-5 * np.abs(now).max())

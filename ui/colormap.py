@@ -4,16 +4,15 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError
-from ..operators.reading import obstacle
+from ..operators.ready import ReadyOperator
 from .display import show_attribute
 
 
-class MESHFREE_OT_colormap(bpy.types.Operator):
+class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
     """Show an attribute as colors on round points"""
 
     bl_idname = "meshfree.colormap"
     bl_label = "Show as Colors"
-    bl_options = {"REGISTER", "UNDO"}
 
     attribute: StringProperty(
         name="Attribute", description="Name of the attribute; empty for the one on show, or the mean curvature"
@@ -30,13 +29,6 @@ class MESHFREE_OT_colormap(bpy.types.Operator):
         description="Switch this viewport from Solid, where such points are gray, to Material Preview",
         default=True,
     )
-
-    @classmethod
-    def poll(cls, context):
-        reason = obstacle(context.object)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
 
     def execute(self, context):
         try:

@@ -12,6 +12,10 @@ _COOL_WARM = (
     " b40426"
 )
 _MAPS = {"VIRIDIS": _VIRIDIS, "COOL_WARM": _COOL_WARM}
+# For -1 as "none", then 0 to 6, which any colour vision tells apart: M. Okabe, K. Ito, Color Universal Design, 2008.
+_CLASSES = ("555555", "0072b2", "e69f00", "009e73", "d55e00", "56b4e9", "cc79a7", "f0e442")
+_MOST = len(_CLASSES) - 1
+_FALSE, _TRUE = "bdbdbd", "d55e00"
 
 
 def fit(values, coverage: float, name: str = "AUTO"):
@@ -25,14 +29,22 @@ def fit(values, coverage: float, name: str = "AUTO"):
         Percentage of the values inside the range, so that a few outliers do not wash the rest out; all of them for
         whole numbers and truth values.
     name : {"AUTO", "VIRIDIS", "COOL_WARM"}
-        AUTO takes the diverging map if the values reach clearly to both sides of zero.
+        AUTO takes two colours for truth values, one for each of few whole numbers, and the diverging map if the values
+        reach clearly to both sides of zero.
 
     Returns
     -------
     name : str
+        As given, or what AUTO came to: also "TRUTH" or "CLASSES".
     low, high : float
         Symmetric about zero for the diverging map of signed values.
     """
+    if name == "AUTO" and values.dtype.kind == "b":
+        return "TRUTH", 0.0, 1.0
+    if name == "AUTO" and values.dtype.kind == "i" and len(values) and values.min() >= -1:
+        if values.max() < _MOST:
+            return "CLASSES", float(values.min()), float(values.max())
+        name = "VIRIDIS"
     outside = 0.5 * (100.0 - coverage) if values.dtype.kind == "f" else 0.0  # whole numbers have no outliers
     values = values[np.isfinite(values)].astype(np.float64)
     low, high = np.percentile(values, (outside, 100.0 - outside)) if len(values) else (0.0, 1.0)
@@ -49,9 +61,22 @@ def fit(values, coverage: float, name: str = "AUTO"):
     return name, float(low), float(high)
 
 
+def step_colors(name: str, low: float, high: float) -> list:
+    """Colours of the whole numbers from low to high as linear (r, g, b, 1); none for maps without steps."""
+    if name == "TRUTH":
+        return [_color(_FALSE), _color(_TRUE)]
+    if name == "CLASSES":
+        return [_color(code) for code in _CLASSES[int(low) + 1 : int(high) + 2]]
+    return []
+
+
 def linear_colors(name: str) -> list:
     """Colours of a map, low to high, as linear (r, g, b, 1): what shaders and colour ramps take."""
-    return [(*(_linear(int(code[i : i + 2], 16) / 255.0) for i in (0, 2, 4)), 1.0) for code in _MAPS[name].split()]
+    return [_color(code) for code in _MAPS[name].split()]
+
+
+def _color(code):
+    return (*(_linear(int(code[i : i + 2], 16) / 255.0) for i in (0, 2, 4)), 1.0)
 
 
 def _linear(value):

@@ -2,11 +2,12 @@
 
 import bpy
 
-from ..operators.attributes import MEAN_CURVATURE, read_attribute
+from ..operators.attributes import BOUNDARY, COMPONENT, MEAN_CURVATURE, read_attribute
 from ..operators.reading import DISPLAY_TAG, is_display, spacing
 from .nodes import ATTRIBUTE, COLORS, RANGE, color_by, display_group
 
 NAME = "Mesh-Free Display"
+_TITLES = {BOUNDARY: "Rim", COMPONENT: "Connected Part"}
 
 
 def find_display(obj):
@@ -37,6 +38,20 @@ def color_node(obj):
     return _find_node(obj, COLORS)
 
 
+def step_colors(obj) -> dict:
+    """Return the colour of each whole number by its name, if each has one of its own; else nothing."""
+    node = color_node(obj)
+    if node is None or node.color_ramp.interpolation != "CONSTANT":
+        return {}
+    colors = [tuple(element.color) for element in node.color_ramp.elements]
+    first = round(range_node(obj).inputs["From Min"].default_value + 0.5)
+    attribute = obj.data.attributes.get(shown_attribute(obj))
+    names = [str(first + index) for index in range(len(colors))]
+    if attribute is not None and attribute.data_type == "BOOLEAN" and names == ["0", "1"]:
+        names = ["No", "Yes"]
+    return dict(zip(names, colors, strict=True))
+
+
 def _find_node(obj, name):
     material = find_material(obj)
     return material and material.node_tree.nodes.get(name)
@@ -44,6 +59,8 @@ def _find_node(obj, name):
 
 def label(name: str) -> str:
     """Title of an attribute for people: "Mode 3" for lb_eigenvector_003."""
+    if name in _TITLES:
+        return _TITLES[name]
     words = name.removeprefix("lb_").replace("eigenvector", "mode").split("_")
     return " ".join(word.lstrip("0").title() for word in words)
 

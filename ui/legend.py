@@ -2,7 +2,7 @@
 
 import bpy
 
-from .display import color_node, label, range_node, shown_attribute
+from .display import color_node, label, range_node, shown_attribute, step_colors
 from .nodes import add_node, direction_color, new_tree
 
 NAME = "Mesh-Free Legend"
@@ -43,11 +43,14 @@ def make_legend(scene, obj, camera, title: str = ""):
     legend.text(title or label(shown_attribute(obj)), 0.08, 0.94, width=0.84)
     low, high, bottom, top = 0.1, 0.32, 0.05, 0.86
     bounds = range_node(obj)
+    boxes = step_colors(obj)
     if bounds is None:
-        height = (top - bottom) / len(_DIRECTIONS)
-        for index, (name, direction) in enumerate(_DIRECTIONS.items()):
+        boxes = {name: direction_color(direction) for name, direction in _DIRECTIONS.items()}
+    if boxes:
+        height = (top - bottom) / max(len(boxes), len(_DIRECTIONS))
+        for index, (name, color) in enumerate(boxes.items()):
             y = top - (index + 1) * height
-            legend.rectangle((low, y, high, y + 0.85 * height), [direction_color(direction)] * 2)
+            legend.rectangle((low, y, high, y + 0.85 * height), [color] * 2)
             legend.text(name, high + 0.1, y + 0.42 * height)
         return legend.collection
     ramp = color_node(obj).color_ramp

@@ -82,20 +82,32 @@ def color_by(material, name, values, settings):
 def _number_color(tree, number, values, settings):
     """Colour numbers by a map over their range."""
     color_map, low, high = colormaps.fit(values, settings.coverage, settings.color_map)
+    steps = colormaps.step_colors(color_map, low, high)
+    if steps:
+        low, high = low - 0.5, high + 0.5
     bounds = add_node(tree, "ShaderNodeMapRange", 2, 0, name=RANGE)
     bounds.inputs["From Min"].default_value = low
     bounds.inputs["From Max"].default_value = high
     ramp = add_node(tree, "ShaderNodeValToRGB", 3, 0, name=COLORS)
-    colors = colormaps.linear_colors(color_map)
-    elements = ramp.color_ramp.elements
-    while len(elements) < len(colors):
-        elements.new(1.0)
-    for index, color in enumerate(colors):
-        elements[index].position = index / (len(colors) - 1)
-        elements[index].color = color
+    if steps:
+        ramp.color_ramp.interpolation = "CONSTANT"
+        _set_colors(ramp.color_ramp.elements, steps, last=len(steps))  # the last one is as wide as the others
+    else:
+        colors = colormaps.linear_colors(color_map)
+        _set_colors(ramp.color_ramp.elements, colors, last=len(colors) - 1)
     tree.links.new(number, bounds.inputs["Value"])
     tree.links.new(bounds.outputs["Result"], ramp.inputs[0])
     return ramp.outputs["Color"]
+
+
+def _set_colors(elements, colors, last):
+    while len(elements) > len(colors):
+        elements.remove(elements[-1])
+    while len(elements) < len(colors):
+        elements.new(1.0)
+    for index, color in enumerate(colors):
+        elements[index].position = index / last
+        elements[index].color = color
 
 
 def _direction_color(tree, vector):

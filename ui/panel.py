@@ -2,13 +2,18 @@
 
 import bpy
 
-from ..operators import options
-from ..operators.attributes import AREA, MEAN_CURVATURE, NORMAL, eigenvector_name, mode_number
+from ..operators.attributes import NORMAL, RESULTS, eigenvector_name, mode_number
 from ..operators.reading import is_display, obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
-from .display import find_display, input_property, label, range_node, shown_attribute
+from .display import find_display, input_property, label, range_node, shown_attribute, step_colors
 
 _LISTED = 20  # eigenvalues in the panel
+_SETTINGS = (  # what belongs together
+    ("rims", "rim_group", "sheets", "projection"),
+    ("bandwidth", "neighbors", "bandwidth_factor"),
+    ("normals", "areas", "regularization"),
+    ("curvature_correction", "symbol_correction"),
+)
 
 
 class _Panel:
@@ -46,11 +51,25 @@ class MESHFREE_PT_main(_Panel, bpy.types.Panel):
         row.operator("meshfree.analyze").modes = obj.meshfree.modes
         row.prop(obj.meshfree, "modes")
         if is_analyzed(obj):
-            row = layout.row()
-            row.label(text="Total Area")
-            row.label(text=area_text(obj.meshfree.total_area))
-            if is_stale(obj):
+            _draw_result(layout, obj.meshfree)
+            if is_stale(obj, glance=True):
                 layout.label(text="Points or settings changed: analyze again", icon="ERROR")
+
+
+def _draw_result(layout, result):
+    """Draw the total area, and of parts, rims and points left out what is worth telling."""
+    lines = [("Total Area", area_text(result.total_area))]
+    if result.part_count > 1:
+        lines.append(("Connected Parts", f"{result.part_count:,}"))
+    if result.rim_count:
+        lines.append(("Rim Points", f"{result.rim_count:,}"))
+    if result.left_out_count:
+        lines.append(("Points Left Out", f"{result.left_out_count:,}"))
+    column = layout.column(align=True)
+    for name, value in lines:
+        row = column.row()
+        row.label(text=name)
+        row.label(text=value)
 
 
 def _draw_summary(layout, obj):
@@ -84,8 +103,16 @@ class MESHFREE_PT_settings(_ReadyPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        for name in options.NAMES:
-            layout.prop(context.object.meshfree, name)
+        obj = context.object
+        for group in _SETTINGS:
+            column = layout.column(align=True)
+            for name in group:
+                row = column.row(align=True)
+                if name == "rim_group":
+                    row.prop_search(obj.meshfree, name, obj, "vertex_groups")
+                else:
+                    row.active = name != "rims" or not obj.meshfree.rim_group  # a named rim is not looked for
+                    row.prop(obj.meshfree, name)
 
 
 class MESHFREE_PT_spectrum(_ReadyPanel, bpy.types.Panel):
@@ -125,7 +152,7 @@ class MESHFREE_PT_display(_ReadyPanel, bpy.types.Panel):
         shown = shown_attribute(obj)
         attributes = obj.data.attributes
         column = layout.column(align=True)
-        for name in (AREA, NORMAL, MEAN_CURVATURE):
+        for name in RESULTS:
             row = column.row(align=True)
             row.enabled = name in attributes
             row.operator("meshfree.colormap", text=label(name), depress=name == shown).attribute = name
@@ -142,7 +169,7 @@ class MESHFREE_PT_display(_ReadyPanel, bpy.types.Panel):
         column.operator("meshfree.colormap", text="Update Colors")
         column = layout.column(align=True)
         bounds = range_node(obj)
-        if bounds is not None:
+        if bounds is not None and not step_colors(obj):
             column.prop(bounds.inputs["From Min"], "default_value", text="Range From")
             column.prop(bounds.inputs["From Max"], "default_value", text="To")
         layout.prop(*input_property(find_display(obj), "Radius"), text="Point Radius")

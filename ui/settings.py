@@ -29,7 +29,8 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         name="Bandwidth",
         description="How far the kernel of each point reaches",
         items=(
-            ("LOCAL", "Local", "Follows the spacing of the points: for scans of uneven density and thin parts"),
+            ("ADAPTIVE", "Adaptive", "As far as uneven spacing demands and bends permit, point by point"),
+            ("LOCAL", "Local", "Follows the spacing of the points alone"),
             ("GLOBAL", "Global", "The same for all points, as in the paper: for even samples"),
         ),
         default=DEFAULTS.bandwidth.upper(),
@@ -43,11 +44,12 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     bandwidth_factor: FloatProperty(
         name="Bandwidth Factor",
-        description="Smoothing length as a multiple of the distance to the neighbor above",
+        description="Smoothing length as a multiple of the distance to the neighbor above; with Adaptive, as a"
+        " multiple of the length that is chosen",
         default=DEFAULTS.bandwidth_factor,
         min=0.05,
         soft_min=0.3,
-        soft_max=1.0,
+        soft_max=2.0,
         max=5.0,
         step=5,
     )
@@ -80,15 +82,46 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         soft_max=1.0,
         precision=6,
     )
+    rims: EnumProperty(
+        name="Rims",
+        description="Where the surface ends, if no Rim Group is named",
+        items=(
+            ("AUTO", "Automatic", "Find the points at a rim, and continue the surface beyond it as in a mirror"),
+            ("OFF", "Off (Closed Surface)", "Take the surface as closed, whatever it looks like"),
+        ),
+        default=DEFAULTS.rims.upper(),
+    )
+    sheets: BoolProperty(
+        name="Keep Close Sheets Apart",
+        description="Never take points of two close sheets as neighbors, such as the two sides of a thin wall",
+        default=DEFAULTS.sheets,
+    )
+    projection: EnumProperty(
+        name="Noise",
+        description="Whether noise is smoothed within the computation; your points stay where they are, but sharp"
+        " edges count as rounded",
+        items=(
+            ("AUTO", "Automatic", "Smooth if the measured noise asks for it"),
+            ("OFF", "Off", "Take every point where it is"),
+            ("QUADRIC", "Always", "Take every point onto a curved surface fitted to its neighbors"),
+            ("PLANE", "Tangent Planes (Paper)", "Take every point onto a plane through its neighbors, as in the paper"),
+        ),
+        default=DEFAULTS.projection.upper(),
+    )
     curvature_correction: BoolProperty(
         name="Curvature Correction",
-        description="Measure distances along the surface and correct areas and weights for its curvature",
+        description="Measure distances along the surface and correct areas and weights for its Gaussian curvature,"
+        " which is 0 everywhere without this",
         default=DEFAULTS.curvature_correction,
     )
     symbol_correction: BoolProperty(
         name="Symbol Correction",
         description="Correct eigenvalues and curvature for the known effect of the kernel's width",
         default=DEFAULTS.symbol_correction,
+    )
+    rim_group: StringProperty(
+        name="Rim Group",
+        description="Vertex group with the points of the rim, instead of finding them; weights above 0 count",
     )
     use_modifiers: BoolProperty(
         name="Use Modifiers",
@@ -113,7 +146,12 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         name="Color Map",
         description="Colors from low to high values",
         items=(
-            ("AUTO", "Automatic", "Cool to Warm for values on both sides of zero, Viridis otherwise"),
+            (
+                "AUTO",
+                "Automatic",
+                "Cool to Warm for values on both sides of zero, a color each for few whole numbers and for true or"
+                " false, Viridis otherwise",
+            ),
             ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
             ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
         ),
@@ -142,6 +180,11 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     # Results of the last analysis, for the panel and for scripts.
     total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
     point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
+    part_count: IntProperty(name="Connected Parts", description="How many parts the surface falls into", min=0)
+    rim_count: IntProperty(name="Rim Points", description="How many points lie at a rim of the surface", min=0)
+    left_out_count: IntProperty(
+        name="Points Left Out", description="How many points lie too far apart from others to take part", min=0
+    )
     stages: CollectionProperty(
         type=MESHFREE_PG_stage, name="Stages", description="How long each stage of the last analysis took"
     )

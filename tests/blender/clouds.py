@@ -3,12 +3,26 @@
 import bpy
 import numpy as np
 
-_KEYS = {"FLOAT_VECTOR": ("vector", 3, np.float32), "FLOAT": ("value", 1, np.float32)}
+RESULTS = ["lb_area", "lb_boundary", "lb_component", "lb_gaussian_curvature", "lb_mean_curvature", "lb_normal"]
+_KEYS = {
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT": ("value", 1, np.float32),
+    "BOOLEAN": ("value", 1, np.bool_),
+    "INT": ("value", 1, np.int32),
+}
 
 
 def sphere_points(count=1000, seed=0):
     points = np.random.default_rng(seed).normal(size=(count, 3))
     return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def grid_points(columns=40, rows=30, step=0.1, jitter=0.2):
+    """Points of a flat rectangle, off their grid at random by a share of its step, and which are outermost."""
+    column, row = (index.ravel() for index in np.meshgrid(np.arange(columns), np.arange(rows)))
+    shift = np.random.default_rng(0).uniform(-jitter, jitter, (len(column), 2))
+    points = step * np.stack([column + shift[:, 0], row + shift[:, 1], 0.0 * column], axis=1)
+    return points, (column == 0) | (column == columns - 1) | (row == 0) | (row == rows - 1)
 
 
 def add_object(points, name="Cloud", faces=()):
@@ -19,6 +33,14 @@ def add_object(points, name="Cloud", faces=()):
     bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.objects.active = obj
     return obj
+
+
+def add_group(obj, name, members, weight=1.0):
+    """Add a vertex group with some vertices, given as indices or as a mask."""
+    members = np.asarray(members)
+    group = obj.vertex_groups.new(name=name)
+    group.add((np.flatnonzero(members) if members.dtype == bool else members).tolist(), weight, "REPLACE")
+    return group
 
 
 def local_points(obj):
@@ -51,6 +73,7 @@ def everything(obj):
     }
     if obj.type == "MESH":
         record["attributes"] = {layer.name: (layer.domain, layer.data_type, _bytes(layer)) for layer in data.attributes}
+        record["members"] = [[(item.group, item.weight) for item in vertex.groups] for vertex in data.vertices]
         record["counts"] = (len(data.vertices), len(data.edges), len(data.polygons))
         record["keys"] = [
             (block.name, block.value, block.mute, [tuple(point.co) for point in block.data])

@@ -6,34 +6,60 @@ import pytest
 from mathutils import Matrix
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import add_object, attribute, local_points, result_names, sphere_points
+from tests.blender.clouds import RESULTS, add_object, attribute, local_points, result_names, sphere_points
 
 
 def expected(core, obj):
-    """Areas, local normals and mean curvature by core, of the object's points in the world."""
+    """What the attributes should hold, by core, of the object's points in the world."""
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     laplacian = core.build_laplacian(local_points(obj) @ matrix.T, options=core.LaplacianOptions(orient=True))
     normals = laplacian.normals @ matrix
-    return laplacian.areas, normals / np.linalg.norm(normals, axis=1)[:, None], core.mean_curvature(laplacian)
+    return {
+        "lb_area": laplacian.areas,
+        "lb_boundary": laplacian.boundary,
+        "lb_component": laplacian.component,
+        "lb_gaussian_curvature": laplacian.gaussian_curvature,
+        "lb_mean_curvature": core.mean_curvature(laplacian),
+        "lb_normal": normals / np.linalg.norm(normals, axis=1)[:, None],
+    }
 
 
 def assert_result(core, obj):
-    areas, normals, curvature = expected(core, obj)
-    assert_allclose(attribute(obj, "lb_area"), areas, rtol=1e-6)
-    assert_allclose(attribute(obj, "lb_normal"), normals, atol=1e-6)
-    assert_allclose(attribute(obj, "lb_mean_curvature"), curvature, rtol=1e-5, atol=1e-6)
-    assert obj.meshfree.total_area == pytest.approx(areas.sum(), rel=1e-6)
-    assert obj.meshfree.point_count == len(areas)
+    values = expected(core, obj)
+    assert sorted(values) == RESULTS
+    for name in RESULTS:
+        smallest = 0.0 if name == "lb_area" else 1e-6
+        assert_allclose(attribute(obj, name), values[name], rtol=1e-5, atol=smallest, err_msg=name)
+    assert obj.meshfree.total_area == pytest.approx(values["lb_area"].sum(), rel=1e-6)
+    assert obj.meshfree.point_count == len(values["lb_area"])
 
 
 def test_result_is_that_of_core(core):
     obj = add_object(sphere_points())
     assert bpy.ops.meshfree.analyze() == {"FINISHED"}
-    assert result_names(obj) == ["lb_area", "lb_mean_curvature", "lb_normal"]
+    assert result_names(obj) == RESULTS
     assert_result(core, obj)
     outwards = np.einsum("ij,ij->i", attribute(obj, "lb_normal"), local_points(obj))
     assert (outwards > 0.9).all()
     assert np.median(attribute(obj, "lb_mean_curvature")) == pytest.approx(1.0, abs=0.1)
+
+
+def test_types_of_the_attributes():
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.analyze()
+    types = {name: obj.data.attributes[name].data_type for name in RESULTS}
+    assert types.pop("lb_normal") == "FLOAT_VECTOR"
+    assert types.pop("lb_boundary") == "BOOLEAN"
+    assert types.pop("lb_component") == "INT"
+    assert set(types.values()) == {"FLOAT"}
+
+
+@pytest.mark.parametrize("radius", [1.0, 0.02])
+def test_gaussian_curvature_of_a_sphere(radius):
+    obj = add_object(sphere_points(2000))
+    obj.scale = (radius, radius, radius)
+    bpy.ops.meshfree.analyze()
+    assert_allclose(attribute(obj, "lb_gaussian_curvature"), 1.0 / radius**2, rtol=0.1)
 
 
 @pytest.mark.parametrize(
@@ -142,8 +168,9 @@ def test_attribute_of_another_kind_is_replaced(core):
     obj = add_object(sphere_points())
     obj.data.attributes.new("lb_area", "FLOAT_COLOR", "POINT")
     obj.data.attributes.new("lb_normal", "FLOAT", "EDGE")
+    obj.data.attributes.new("lb_boundary", "FLOAT", "POINT")
     bpy.ops.meshfree.analyze()
-    assert result_names(obj) == ["lb_area", "lb_mean_curvature", "lb_normal"]
+    assert result_names(obj) == RESULTS
     assert_result(core, obj)
 
 
@@ -158,7 +185,7 @@ def test_undo_and_redo():
     assert obj.meshfree.total_area == 0.0
     bpy.ops.ed.redo()
     obj = bpy.data.objects[name]
-    assert len(result_names(obj)) == 3
+    assert result_names(obj) == RESULTS
     assert len(obj.modifiers) == 1
 
 
@@ -173,7 +200,7 @@ def test_shared_mesh_becomes_single_by_choice(how):
     else:
         bpy.ops.meshfree.analyze(make_single_user=True)
     assert obj.data != other.data
-    assert len(result_names(obj)) == 3
+    assert result_names(obj) == RESULTS
     assert result_names(other) == []
 
 
@@ -218,9 +245,9 @@ class TestStale:
 
     def test_new_analysis_keeps_modes_of_the_same_points_and_removes_those_of_others(self, obj, is_stale):
         bpy.ops.meshfree.analyze()
-        assert len(result_names(obj)) == 6
+        assert len(result_names(obj)) == len(RESULTS) + 3
         obj.data.vertices[7].co.x += 0.001
         bpy.ops.meshfree.analyze()
-        assert len(result_names(obj)) == 3
+        assert result_names(obj) == RESULTS
         assert "lb_eigenvalues" not in obj
         assert not is_stale()

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, everything, local_points, sphere_points
+from tests.blender.clouds import add_group, add_object, everything, local_points, sphere_points
 
 
 def changed(points, index, value):
@@ -17,6 +17,11 @@ def far_away(points):
     return points * 1e-4 + 1e3
 
 
+def scattered(points):
+    """A hundred islands of ten points each, far from each other."""
+    return points + 1000.0 * np.repeat(points[:100], 10, axis=0)
+
+
 CLOUDS = {
     "NaN": (lambda points: changed(points, 3, np.nan), "1 of 1000 points.*Delete"),
     "infinite": (lambda points: changed(points, slice(3, 5), np.inf), "2 of 1000 points.*Delete"),
@@ -24,7 +29,7 @@ CLOUDS = {
     "collinear": (lambda points: points * (1, 0, 0), "1000 points.*line"),
     "all at one place": (lambda points: 0 * points, "there are 1 among 1000"),
     "far from the origin": (far_away, "from the origin.*Move"),
-    "island of three": (lambda points: np.vstack([points, 100 + 0.01 * np.eye(3)]), "3"),
+    "lone points only": (scattered, "of 1000 points lie apart from each other.*delete"),
 }
 
 
@@ -120,7 +125,7 @@ def test_mesh_with_a_fake_user_is_not_shared():
     assert bpy.ops.meshfree.analyze() == {"FINISHED"}
 
 
-@pytest.mark.parametrize("name", ["lb_area", "lb_eigenvector_002"])
+@pytest.mark.parametrize("name", ["lb_area", "lb_boundary", "lb_eigenvector_002"])
 def test_vertex_group_with_the_name_of_a_result(name):
     obj = add_object(sphere_points())
     obj.vertex_groups.new(name=name)
@@ -134,6 +139,29 @@ def test_vertex_group_with_the_name_of_a_mode_that_is_not_written_does_no_harm()
     obj = add_object(sphere_points())
     obj.vertex_groups.new(name="lb_eigenvector_002")
     assert bpy.ops.meshfree.analyze() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("operator", ["analyze", "spectrum"])
+@pytest.mark.parametrize(
+    ("members", "weight", "text"),
+    [
+        (None, 1.0, r'"Cloud" has no vertex group named "Rim"\. Choose another Rim Group, or clear it'),
+        ([], 1.0, r'"Rim" gives 0 of 1000 points a weight above zero.*Assign.*or clear Rim Group'),
+        ([3, 4], 1.0, "gives 2 of 1000 points"),
+        (range(100), 0.0, "gives 0 of 1000 points"),
+    ],
+    ids=["missing", "empty", "two points", "no weight"],
+)
+def test_rim_group_that_names_no_rim(operator, members, weight, text):
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.analyze(modes=3)
+    obj.meshfree.rim_group = "Rim"
+    if members is not None:
+        add_group(obj, "Rim", members, weight)
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=f"(?s)Error: .*{text}"):
+        getattr(bpy.ops.meshfree, operator)()
+    assert everything(obj) == before
 
 
 def test_scale_of_zero():

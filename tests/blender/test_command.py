@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.clouds import add_group, add_object, attribute, grid_points, sphere_points
 
 POINTS = sphere_points()
 
@@ -73,6 +73,7 @@ def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
     assert line["points"] == 1000
     assert line["total_area"] == pytest.approx(laplacian.areas.sum(), rel=1e-4)
     assert line["eigenvalues"] == pytest.approx(spectrum.eigenvalues.tolist(), rel=1e-3, abs=1e-9)
+    assert (line["part_count"], line["rim_count"], line["left_out_count"]) == (1, 0, 0)
     assert line["notices"] == []
     assert line["seconds"]["Spectrum"] >= 0.0
     with np.load(tmp_path / "out.npz") as arrays:
@@ -83,7 +84,10 @@ def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
         assert arrays["mean_curvature"].shape == (1000,)
         assert arrays["eigenvectors"].shape == (1000, 4)
         assert arrays["eigenvalues"].tolist() == line["eigenvalues"]
-        assert all(arrays[key].dtype == np.float64 for key in arrays)
+        assert_allclose(arrays["gaussian_curvature"], laplacian.gaussian_curvature, rtol=0.01)
+        assert not arrays["boundary"].any()
+        assert not arrays["component"].any()
+        assert {arrays[key].dtype for key in arrays.keys() - {"boundary", "component"}} == {np.dtype(np.float64)}
 
 
 def test_blend_output_holds_attributes_eigenvalues_and_colors(run, tmp_path):
@@ -104,8 +108,10 @@ def test_ply_output_holds_the_points_and_attributes(run, tmp_path):
     assert code == 0
     header = (tmp_path / "out.ply").read_bytes().split(b"end_header")[0].decode()
     assert "element vertex 1000" in header
-    for name in ("lb_area", "lb_normal_x", "lb_mean_curvature", "lb_eigenvector_002"):
+    for name in ("lb_area", "lb_normal_x", "lb_mean_curvature", "lb_gaussian_curvature", "lb_eigenvector_002"):
         assert f"property float {name}\n" in header
+    assert " lb_boundary\n" in header
+    assert " lb_component\n" in header
 
 
 def test_many_inputs_one_failing(run, tmp_path):
@@ -137,6 +143,31 @@ def test_settings(core, run, tmp_path):
     options = core.LaplacianOptions(neighbors=60, bandwidth="global", symbol_correction=False, orient=True)
     spectrum = core.build_laplacian(POINTS, options=options).eigenpairs(3)
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
+
+
+def test_rims_parts_and_points_left_out_are_told(run, tmp_path):
+    points, outermost = grid_points()
+    np.savetxt(tmp_path / "in.xyz", np.vstack([points, POINTS + (20.0, 0.0, 0.0), [[0.0, 0.0, 50.0]]]))
+    code, (line,) = run("analyze", tmp_path / "in.xyz", "--out", tmp_path / "out.npz")
+    assert code == 0
+    assert (line["part_count"], line["rim_count"], line["left_out_count"]) == (2, outermost.sum(), 1)
+    assert any("left out of the operator: 1" in notice for notice in line["notices"])
+    with np.load(tmp_path / "out.npz") as arrays:
+        assert (arrays["boundary"][: len(points)] == outermost).all()
+        assert arrays["component"][-1] == -1
+    code, (line,) = run("analyze", tmp_path / "in.xyz", "--rims", "off")
+    assert (code, line["rim_count"]) == (0, 0)
+
+
+def test_rim_group_of_a_blend_file(run, tmp_path):
+    points, outermost = grid_points()
+    add_group(add_object(points), "Edge", outermost)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    code, (line,) = run("analyze", tmp_path / "in.blend", "--rim-group", "Edge", "--rims", "off")
+    assert (code, line["rim_count"]) == (0, outermost.sum())
+    code, (line,) = run("analyze", tmp_path / "in.blend", "--rim-group", "Rim")
+    assert code == 1
+    assert 'no vertex group named "Rim"' in line["error"]
 
 
 def test_object_of_a_blend_file(run, tmp_path):
@@ -226,7 +257,7 @@ def test_help(extension, capfd):
     command = importlib.import_module(f"{extension.__name__}.operators.command")
     assert command.run(["analyze", "--help"]) == 0
     shown = capfd.readouterr().out
-    for text in ("--out-dir", "--modes", "--bandwidth", "one JSON line per input"):
+    for text in ("--out-dir", "--modes", "--bandwidth", "--rim-group NAME", "--no-sheets", "one JSON line per input"):
         assert text in shown
 
 

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.clouds import add_object, attribute, grid_points, sphere_points
 
 
 @pytest.fixture
@@ -170,6 +170,49 @@ def test_positive_values_are_sequential(display, obj):
     assert np.allclose(display.color_node(obj).color_ramp.evaluate(0.0)[:3], (0.0578, 0.0004, 0.0887), atol=1e-3)
 
 
+def ramp_color(display, obj, value):
+    low, high = bounds(display, obj)
+    return tuple(display.color_node(obj).color_ramp.evaluate((value - low) / (high - low)))
+
+
+def test_rim_has_two_colors(display):
+    points, _ = grid_points()
+    obj = add_object(points)
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.colormap(attribute="lb_boundary")
+    colors = display.step_colors(obj)
+    assert list(colors) == ["No", "Yes"]
+    assert [ramp_color(display, obj, value) for value in (0.0, 1.0)] == list(colors.values())
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert display.step_colors(obj) == {}
+
+
+def test_each_part_has_a_color(display):
+    spheres = [sphere_points(count) + (5.0 * index, 0.0, 0.0) for index, count in enumerate((600, 500, 400))]
+    obj = add_object(np.vstack([*spheres, [[0.0, 0.0, 40.0]]]))
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.colormap(attribute="lb_component")
+    colors = display.step_colors(obj)
+    assert list(colors) == ["-1", "0", "1", "2"]
+    assert len(set(colors.values())) == 4
+    assert [ramp_color(display, obj, float(name)) for name in colors] == list(colors.values())
+    obj.meshfree.color_map = "VIRIDIS"
+    bpy.ops.meshfree.colormap()
+    assert display.step_colors(obj) == {}
+    assert bounds(display, obj) == (-1.0, 2.0)
+
+
+def test_gaussian_curvature_of_both_signs_is_centered_on_zero(display):
+    u, v = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (2, 3000))
+    u, v = u[np.cos(u) > -0.5], v[np.cos(u) > -0.5]
+    across = 1.0 + 0.4 * np.cos(u)
+    obj = add_object(np.stack([across * np.cos(v), across * np.sin(v), 0.4 * np.sin(u)], axis=1))
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.colormap(attribute="lb_gaussian_curvature")
+    low, high = bounds(display, obj)
+    assert low == -high
+
+
 def test_settings_of_the_display(display, obj):
     values = attribute(obj, "lb_normal")[:, 0]
     obj.meshfree.coverage, obj.meshfree.component, obj.meshfree.color_map = 100.0, "X", "VIRIDIS"
@@ -196,6 +239,23 @@ def test_outliers_do_not_wash_the_colors_out(colormaps):
 
 
 @pytest.mark.parametrize(
+    ("values", "name"),
+    [
+        (np.zeros(5, bool), "TRUTH"),
+        (np.zeros(5, np.int32), "CLASSES"),
+        (np.arange(-1, 7), "CLASSES"),
+        (np.arange(-1, 8), "VIRIDIS"),
+        (np.arange(-2, 3), "COOL_WARM"),
+        (np.arange(3.0), "VIRIDIS"),
+    ],
+    ids=["truth", "one part", "parts", "many parts", "signed", "numbers"],
+)
+def test_automatic_maps(colormaps, values, name):
+    assert colormaps.fit(values, coverage=98.0)[0] == name
+    assert colormaps.fit(values, coverage=98.0, name="VIRIDIS")[0] == "VIRIDIS"
+
+
+@pytest.mark.parametrize(
     ("values", "low", "high"),
     [
         (np.full(9, 3.0), 2.7, 3.3),
@@ -214,14 +274,20 @@ def test_range_of_special_values(colormaps, values, low, high):
 
 @pytest.mark.parametrize(
     ("name", "title"),
-    [("lb_mean_curvature", "Mean Curvature"), ("lb_eigenvector_007", "Mode 7"), ("weight", "Weight")],
+    [
+        ("lb_mean_curvature", "Mean Curvature"),
+        ("lb_eigenvector_007", "Mode 7"),
+        ("lb_boundary", "Rim"),
+        ("lb_component", "Connected Part"),
+        ("weight", "Weight"),
+    ],
 )
 def test_titles(display, name, title):
     assert display.label(name) == title
 
 
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
-@pytest.mark.parametrize(("name", "texts"), [("lb_area", 6), ("lb_normal", 7)])
+@pytest.mark.parametrize(("name", "texts"), [("lb_area", 6), ("lb_normal", 7), ("lb_boundary", 3), ("lb_component", 2)])
 def test_legend_lies_inside_the_picture_and_is_made_once(extension, obj, kind, name, texts):
     legend = importlib.import_module(f"{extension.__name__}.ui.legend")
     scene = bpy.context.scene

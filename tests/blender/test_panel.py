@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, sphere_points
+from tests.blender.clouds import add_object, grid_points, sphere_points
 
 OPERATORS = ("analyze", "spectrum", "colormap")
 
@@ -31,6 +31,10 @@ class Layout:
     def prop(self, data, path, text=None):
         data.path_resolve(path)
         self.texts.append(text or path)
+
+    def prop_search(self, data, path, search_data, search_property):
+        search_data.path_resolve(search_property)
+        self.prop(data, path)
 
     def operator(self, idname, text=None, icon="NONE", depress=False):
         kind = getattr(bpy.ops.meshfree, idname.removeprefix("meshfree.")).get_rna_type()
@@ -104,14 +108,36 @@ def test_panel_names_scale_faces_modifiers_and_sharing():
         assert text in texts
 
 
-@pytest.mark.parametrize("name", ["lb_normal", "lb_area", "lb_eigenvector_001", "lb_eigenvector_003"])
+def test_panel_tells_of_parts_rims_and_points_left_out_where_there_are_any():
+    points, outermost = grid_points()
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.analyze()
+    assert not {"Connected Parts", "Rim Points", "Points Left Out"} & set(draw())
+    obj = add_object(np.vstack([points, sphere_points() + (20.0, 0.0, 0.0), [[0.0, 0.0, 50.0]]]))
+    bpy.ops.meshfree.analyze()
+    assert (obj.meshfree.part_count, obj.meshfree.rim_count, obj.meshfree.left_out_count) == (2, outermost.sum(), 1)
+    texts = draw()
+    found = {name: texts[texts.index(name) + 1] for name in ("Connected Parts", "Rim Points", "Points Left Out")}
+    assert found == {"Connected Parts": "2", "Rim Points": f"{outermost.sum()}", "Points Left Out": "1"}
+
+
+def test_panel_shows_every_setting_that_changes_results(extension):
+    options = importlib.import_module(f"{extension.__name__}.operators.options")
+    add_object(sphere_points()).meshfree.rim_group = "Missing"
+    texts = draw()
+    assert [name for name in (*options.NAMES, "rim_group") if texts.count(name) != 1] == []
+
+
+@pytest.mark.parametrize(
+    "name", ["lb_normal", "lb_area", "lb_boundary", "lb_component", "lb_eigenvector_001", "lb_eigenvector_003"]
+)
 def test_panel_for_each_kind_of_display(name):
     add_object(sphere_points())
     bpy.ops.meshfree.spectrum(count=3)
     bpy.ops.meshfree.colormap(attribute=name)
     texts = draw()
     assert "Point Radius" in texts
-    assert ("Range From" in texts) == (name != "lb_normal")
+    assert ("Range From" in texts) == (name not in {"lb_normal", "lb_boundary", "lb_component"})
 
 
 def described():
@@ -136,7 +162,8 @@ def test_names_and_tooltips():
     items = list(described())
     assert len(items) > 40
     for path, name, description in items:
-        assert all(word in small or word[0].isupper() for word in name.split()), f"{path}: label {name!r}"
+        words = name.replace("(", "").split()
+        assert all(word in small or word[0].isupper() for word in words), f"{path}: label {name!r}"
         assert re.match(r"[A-Z]", description), f"{path}: tooltip {description!r}"
         assert not description.endswith("."), f"{path}: tooltip {description!r}"
 

@@ -60,20 +60,22 @@ def test_fewer_modes_remove_the_surplus(obj):
 
 def test_repeating_re_uses_the_operator(extension, obj, monkeypatch):
     cache = importlib.import_module(f"{extension.__name__}.operators.cache")
-    built = []
-    build = cache.build_laplacian
+    built, curved = [], []
+    build, curve = cache.build_laplacian, cache.mean_curvature
     monkeypatch.setattr(cache, "build_laplacian", lambda *args, **rest: built.append(1) or build(*args, **rest))
+    monkeypatch.setattr(cache, "mean_curvature", lambda laplacian: curved.append(1) or curve(laplacian))
     cache.clear()
     bpy.ops.meshfree.analyze()
     bpy.ops.meshfree.spectrum(count=2)
     bpy.ops.meshfree.spectrum(count=3)
-    assert len(built) == 1
+    assert len(built) == len(curved) == 1
+    assert [stage.name for stage in obj.meshfree.stages] == ["Spectrum"]
     obj.meshfree.neighbors += 1
     bpy.ops.meshfree.spectrum(count=3)
     obj.data.vertices[0].co *= 1.01
     bpy.ops.meshfree.spectrum(count=3)
-    assert len(built) == 3
-    assert len(cache._laplacians) == 2
+    assert len(built) == len(curved) == 3
+    assert len(cache._built) == 2
 
 
 def test_scale_of_the_object_scales_eigenvalues(obj):
