@@ -6,14 +6,15 @@ import resource
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 import core
 from core.areas import KernelMatrix, constrained_areas, fast_areas, regularized_areas
+from core.cloud import read_cloud
 from core.laplacian import assemble_stiffness
-from core.neighbors import find_neighborhoods
 from core.reference import algorithm_1
 
 from .accuracy import relative
@@ -106,24 +107,18 @@ def areas_against_algorithm_1():
     """One run: effect on L x and on the eigenvalues, and the time, of every way to the areas."""
     options = core.LaplacianOptions(curvature_correction=False)
     points = uneven_sphere(12_000)
-    neighborhoods = find_neighborhoods(points, options)
-    scaled = neighborhoods.scaled
+    default = core.build_laplacian(points, options=options)
+    cloud = read_cloud(points, options)
+    scaled, neighborhoods = cloud.scaled, cloud.neighborhoods
     target = np.ones(len(points))
     x = points[:, 0]
     rows = []
 
     def judge(name, areas, seconds, steps):
         # On a sphere the mean-normal plane holds the chord, so the distance in space is the projected one.
-        stiffness = assemble_stiffness(neighborhoods, neighborhoods.distance, areas, target)
-        laplacian = core.LaplaceBeltrami(
-            points,
-            points,
-            scaled.share(areas) * scaled.scale**2,
-            neighborhoods.lengths[scaled.inverse] * scaled.scale,
-            stiffness,
-            options,
-            [],
-        )
+        stiffness = assemble_stiffness(cloud, neighborhoods.distance, areas)[0]
+        total = scaled.share(areas, 0.0) * scaled.scale**2
+        laplacian = replace(default, areas=total, stiffness=stiffness)
         values = laplacian.eigenpairs(36).eigenvalues[1:] / sphere_eigenvalues(36)[1:] - 1.0
         total = laplacian.areas.sum() / (4.0 * np.pi) - 1.0
         misfit = matrix @ areas - target
@@ -135,7 +130,7 @@ def areas_against_algorithm_1():
         )
 
     began = time.perf_counter()
-    matrix = KernelMatrix(neighborhoods, neighborhoods.distance)
+    matrix = KernelMatrix(neighborhoods, neighborhoods.distance, cloud.rim)
     assembly = time.perf_counter() - began
     density = 1.0 / (matrix @ target)
     judge("density, 1 / (A 1)", density, assembly, "1 product")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.special import jn_zeros
 
 import core
 
@@ -137,6 +138,25 @@ def disc():
             case = f"disc, {count:,} random, rim {'given' if given else 'found'}"
             goals = [percent("12 eigenvalues, mean", bound), percent("area", area)]
             yield from judge(case, goals, measure(count, given))
+
+
+def fixed():
+    """Square and disc: the first eigenvalues with the value zero fixed at the rim."""
+    k = np.arange(1, 12)
+    square_modes = np.sort(((k[:, None] ** 2 + k**2) * np.pi**2).ravel())[:12]
+    disc_modes = np.sort(np.concatenate([np.tile(jn_zeros(m, 12), 1 if m == 0 else 2) for m in range(16)]))[:12] ** 2
+    for case, points, given, exact in (
+        ("square, 60 x 60 with rim", square_grid(60), None, square_modes),
+        ("square, 3,600 random", square_random(3600, 0), None, square_modes),
+        ("disc, 8,000 random, rim given", *disc_random(8000, 0), disc_modes),
+        ("disc, 8,000 random, rim found", disc_random(8000, 0)[0], None, disc_modes),
+    ):
+
+        def measure(points=points, given=given, exact=exact):
+            values = core.build_laplacian(points, boundary_distance=given).eigenpairs(12, fixed_rim=True).eigenvalues
+            yield np.abs(values / exact - 1.0).mean()
+
+        yield from judge(f"{case}, fixed at zero", [percent("12 eigenvalues, mean")], measure())
 
 
 def rims():
@@ -332,6 +352,7 @@ def cost():
 GROUPS = [
     ("square", square),
     ("disc", disc),
+    ("fixed", fixed),
     ("rims", rims),
     ("torus", torus),
     ("sphere", sphere),
