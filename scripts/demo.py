@@ -57,11 +57,11 @@ class Coral:
         return radii[kept, None] * directions[kept]
 
 
-def make_object(shape):
-    """Add an object of loose vertices and make it active."""
+def make_object(points):
+    """Add an object of loose vertices, (n, 3), and make it active."""
     mesh = bpy.data.meshes.new("Coral")
-    mesh.vertices.add(POINTS)
-    mesh.vertices.foreach_set("co", shape.sample(POINTS).astype(np.float32).reshape(-1))
+    mesh.vertices.add(len(points))
+    mesh.vertices.foreach_set("co", points.astype(np.float32).reshape(-1))
     obj = bpy.data.objects.new("Coral", mesh)
     bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.objects.active = obj
@@ -93,7 +93,7 @@ def demonstrate(scan, up):
     """Analyze the points, print the results, and write a .blend file and a picture."""
     shape = Coral()
     with studio.silence():
-        obj = make_object(shape) if scan is None else load_scan(scan, up)
+        obj = make_object(shape.sample(POINTS)) if scan is None else load_scan(scan, up)
     print(f"points       {len(obj.data.vertices):,}", flush=True)
     timed("analyze", bpy.ops.meshfree.analyze, show=False)
     timed("spectrum", bpy.ops.meshfree.spectrum, count=MODES, show=False)
