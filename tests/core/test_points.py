@@ -93,13 +93,23 @@ def test_random_points_have_no_islands(seed):
     assert one_part(core.build_laplacian(random_sphere(2000, seed)))
 
 
-def test_an_abrupt_change_of_spacing_is_no_island():
+def abrupt_change():
     grid = np.stack(np.meshgrid(np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 41)), axis=-1).reshape(-1, 2)
     coarse = np.stack(np.meshgrid(np.arange(1.2, 4.0, 0.2), np.arange(0.0, 3.0, 0.2)), axis=-1).reshape(-1, 2)
     plane = np.concatenate([grid, coarse])
-    laplacian = core.build_laplacian(np.column_stack([plane, 0.1 * plane[:, 0] ** 2]))
+    return np.column_stack([plane, 0.1 * plane[:, 0] ** 2])
+
+
+def test_an_abrupt_change_of_spacing_is_no_island():
+    laplacian = core.build_laplacian(abrupt_change())
     assert not any("apart" in notice for notice in laplacian.notices)
     assert laplacian.areas.sum() == pytest.approx(10.0, rel=0.2)
+
+
+@pytest.mark.xfail(reason="adaptive lengths next to the fine grid are too short to reach the coarse one's points")
+def test_the_operator_falls_into_as_many_parts_as_it_has_components():
+    laplacian = core.build_laplacian(abrupt_change())
+    assert core.check_stability(laplacian).parts == laplacian.component.max() + 1
 
 
 def test_float32_far_from_the_origin_is_refused(sphere):
