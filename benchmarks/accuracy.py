@@ -65,8 +65,8 @@ def default_on_spheres():
         errors = sphere_errors(laplacian)
         try:
             spectrum = laplacian.eigenpairs(100)
-        except core.UnresolvedModesError:
-            spectrum = laplacian.eigenpairs(60)
+        except core.UnresolvedModesError as error:
+            spectrum = laplacian.eigenpairs(error.resolved)
         exact = sphere_eigenvalues(len(spectrum.eigenvalues))
         off = np.abs(spectrum.eigenvalues[1:] / exact[1:] - 1.0)
         rows.append(
