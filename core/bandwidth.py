@@ -41,8 +41,9 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None):
     averaging = nearest.averaging()
     if options.bandwidth == "local":
         return options.bandwidth_factor * _repeat(averaging, distance, 2)
-    # Neighbours on other sheets do not count.
-    own = np.log(distance) - 0.5 * np.log((nearest.weight > 0.0).sum(axis=1) / (nearest.weight.shape[1] - 1))
+    # Neighbours on other sheets do not count, nor those as far as the last one, whose weight is zero but for rounding.
+    counted = nearest.weight > 1e-12
+    own = np.log(distance) - 0.5 * np.log(counted.sum(axis=1) / (counted.shape[1] - 1))
     if inside is not None:
         own = own + 0.5 * np.log(_share_inside(inside / distance[:, None])).sum(axis=1)
     fast = _repeat(averaging, own, _FAST)
