@@ -34,6 +34,15 @@ def sphere_errors(laplacian):
     )
 
 
+def eigenvalue_errors(laplacian, exact):
+    """Relative errors of the nonzero eigenvalues, as many as are resolved."""
+    try:
+        values = laplacian.eigenpairs(len(exact)).eigenvalues
+    except core.UnresolvedModesError as error:
+        values = laplacian.eigenpairs(error.resolved).eigenvalues
+    return values[1:] / exact[1 : len(values)] - 1.0
+
+
 def paper_figure_3():
     """The first three rows of the paper's Figure 3: uniform sphere, WPCA normals."""
     laplacian = core.build_laplacian(icosahedral_sphere(28), options=core.LaplacianOptions.paper())
@@ -63,12 +72,7 @@ def default_on_spheres():
     for name, points in clouds.items():
         laplacian = core.build_laplacian(points)
         errors = sphere_errors(laplacian)
-        try:
-            spectrum = laplacian.eigenpairs(100)
-        except core.UnresolvedModesError as error:
-            spectrum = laplacian.eigenpairs(error.resolved)
-        exact = sphere_eigenvalues(len(spectrum.eigenvalues))
-        off = np.abs(spectrum.eigenvalues[1:] / exact[1:] - 1.0)
+        off = np.abs(eigenvalue_errors(laplacian, sphere_eigenvalues(100)))
         rows.append(
             [name, f"{len(points):,}", *(f"{error:.1e}" for error in errors)]
             + [f"{laplacian.areas.sum() / SPHERE - 1.0:+.1e}", f"{off.mean():.1e}", f"{off.max():.1e}", str(len(off))]

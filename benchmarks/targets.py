@@ -11,7 +11,7 @@ from scipy.special import jn_zeros
 
 import core
 
-from .accuracy import SPHERE, sphere_errors
+from .accuracy import SPHERE, eigenvalue_errors, sphere_errors
 from .samplings import (
     closed_plate,
     disc_eigenvalues,
@@ -82,15 +82,6 @@ def judge(case, goals, values):
 def area_error(laplacian, exact):
     """Relative error of the total area."""
     return laplacian.areas.sum() / exact - 1.0
-
-
-def eigenvalue_errors(laplacian, exact):
-    """Relative errors of the nonzero eigenvalues, as many as are resolved."""
-    try:
-        values = laplacian.eigenpairs(len(exact)).eigenvalues
-    except core.UnresolvedModesError as error:
-        values = laplacian.eigenpairs(error.resolved).eigenvalues
-    return values[1:] / exact[1 : len(values)] - 1.0
 
 
 def mean_size(errors, exact):

@@ -26,11 +26,11 @@ def label_islands(nearest):
     index, distance = nearest.index[:, 1 : _REACH + 1], nearest.distance[:, 1 : _REACH + 1]
     reach = _GAP * distance[:, -1]
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
-    part = _by_size(_connected(index, strict))
+    part = _by_size(label_connected(index, strict))
     large = part >= 0
     loose = large[:, None] & large[index] & (distance <= np.maximum(reach[:, None], reach[index]))
     result = np.full(len(part), -1)
-    result[large] = _by_size(_connected(index, strict | loose)[large])
+    result[large] = _by_size(label_connected(index, strict | loose)[large])
     return result
 
 
@@ -56,7 +56,7 @@ def label_sheets(nearest, normals, label):
     other = normals[index]
     side = np.where(np.einsum("ikc,ic->ik", other, normals) < 0.0, -1.0, 1.0)
     rise = np.einsum("ikc,ikc->ik", offset, normals[:, None] + side[:, :, None] * other)
-    sheet = _by_size(_connected(index, np.abs(rise) <= 2.0 * _STEEP * distance))
+    sheet = _by_size(label_connected(index, np.abs(rise) <= 2.0 * _STEEP * distance))
     # Small parts, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
     touching = nearest.distance <= _TOUCH * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
@@ -72,7 +72,8 @@ def label_sheets(nearest, normals, label):
     return result
 
 
-def _connected(index, joined):
+def label_connected(index, joined):
+    """Number the connected parts of points whose neighbours, (m, k) int, are joined to them, (m, k) bool."""
     row = np.repeat(np.arange(len(index), dtype=np.int32), index.shape[1])[joined.ravel()]
     graph = sparse.csr_array((np.ones(len(row), dtype=bool), (row, index[joined])), shape=(len(index),) * 2)
     return connected_components(graph, directed=False)[1]

@@ -40,7 +40,9 @@ def mirror(neighborhoods, distance, rim):
     near = rim.distance[:, 0] < SUPPORT * lengths  # further points have no image within reach
     known = np.isfinite(rim.distance[:, 0])
     first, second = neighborhoods.first, neighborhoods.second
-    pairs = np.flatnonzero((near[first] & known[second]) | (near[second] & known[first]))
+    pairs = np.zeros(0, dtype=np.intp)
+    if near.any():
+        pairs = np.flatnonzero((near[first] & known[second]) | (near[second] & known[first]))
     first, second = first[pairs], second[pairs]
     d, e = rim.distance[first], rim.distance[second]
     bend = 0.5 * (rim.curvature[first] + rim.curvature[second])

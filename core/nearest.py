@@ -37,8 +37,7 @@ class Nearest:
     @property
     def spacing(self):
         """Distance between points of an even sample as dense as the nearest twelve neighbours, (m,)."""
-        last = min(12, self.distance.shape[1] - 1)
-        return self.distance[:, last] * np.sqrt(np.pi / last)
+        return spacing_of(self.distance)
 
     def keep(self, kept):
         """Return the same neighbours with the weight of those not kept, (m, 41) bool, set to zero."""
@@ -57,6 +56,12 @@ def find_nearest(points):
     tree = cKDTree(points)
     distance, index = tree.query(points, k=min(COUNT, len(points)), workers=-1)
     return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance))
+
+
+def spacing_of(distance):
+    """Return the spacing of an even sample as dense as the nearest twelve neighbours, by their distances (n, k)."""
+    last = min(12, distance.shape[1] - 1)
+    return distance[:, last] * np.sqrt(np.pi / last)
 
 
 def fading_weights(distance):

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .nearest import fading_weights
+from .nearest import fading_weights, spacing_of
 from .surface import fit_surface
 
 _SAMPLE = 2000  # points at which the noise is measured
@@ -36,7 +36,7 @@ def noise_level(tree, misfit):
     if tree.n <= _MANY:
         return 0.0
     distance, index = tree.query(tree.data[rows], k=_MANY + 1, workers=-1)
-    spacing = distance[:, 12] * np.sqrt(np.pi / 12.0)
+    spacing = spacing_of(distance)
     few, many = (
         np.median(fit_surface(tree.data, index[:, :count], fading_weights(distance[:, :count]), rows).misfit / spacing)
         for count in (_FEW + 1, _MANY + 1)

@@ -100,10 +100,7 @@ def orient_normals(nearest, normals):
     """
     points = nearest.points
     n = len(points)
-    column = nearest.index[:, 1 : _ORIENTATION_NEIGHBORS + 1]
-    same = (nearest.weight[:, 1 : _ORIENTATION_NEIGHBORS + 1] > 0.0).ravel()
-    first = np.repeat(np.arange(n, dtype=np.int32), column.shape[1])[same]
-    second = column.ravel()[same]
+    first, second, _ = _edges(nearest)
     cost = 1.0 + 1e-9 - np.minimum(np.abs(_mirrored(points, normals, first, second)), 1.0)  # zero would be no edge
     graph = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
     graph = graph + graph.T
@@ -132,17 +129,23 @@ def unsure_orientation(nearest, normals):
 
     A one-sided surface has such a seam; so has a narrow gap that the orientation once leapt.
     """
-    column = nearest.index[:, 1 : _ORIENTATION_NEIGHBORS + 1]
-    close = nearest.distance[:, 1 : _ORIENTATION_NEIGHBORS + 1] < _CLOSE * nearest.spacing[:, None]
-    close &= nearest.weight[:, 1 : _ORIENTATION_NEIGHBORS + 1] > 0.0
-    first = np.repeat(np.arange(len(normals)), column.shape[1])[close.ravel()]
-    second = column[close]
+    first, second, distance = _edges(nearest)
+    close = distance < _CLOSE * nearest.spacing[first]
+    first, second = first[close], second[close]
     against = _mirrored(nearest.points, normals, first, second) < _AGAINST
     result = np.zeros(len(normals), dtype=bool)
     result[first[against]] = result[second[against]] = True
     for _ in range(2):
-        result |= result[column].any(axis=1)
+        result |= result[nearest.index[:, 1 : _ORIENTATION_NEIGHBORS + 1]].any(axis=1)
     return result
+
+
+def _edges(nearest):
+    """Return the edges from every point to its nearest neighbours on its own sheet: both ends and the length."""
+    near = slice(1, _ORIENTATION_NEIGHBORS + 1)
+    same = nearest.weight[:, near] > 0.0
+    first = np.repeat(np.arange(len(same), dtype=np.int32), np.count_nonzero(same, axis=1))
+    return first, nearest.index[:, near][same], nearest.distance[:, near][same]
 
 
 def _mirrored(points, normals, first, second):

@@ -3,12 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from .components import label_connected
 from .nearest import fading_weights
-from .sheets import same_sheet
+from .sheets import on_sheet
 from .surface import frames
 
 _BLOCK = 1 << 13  # points looked at at one time
@@ -107,9 +106,7 @@ def find_rim_points(nearest, oriented):
         return result
     distance, other = cKDTree(points[rows]).query(points[rows], k=min(9, len(rows)), workers=-1)
     linked = distance <= _LINK * nearest.spacing[rows][:, None]
-    first = np.repeat(np.arange(len(rows)), distance.shape[1])[linked.ravel()]
-    graph = sparse.csr_array((np.ones(len(first)), (first, other[linked])), shape=(len(rows),) * 2)
-    label = connected_components(graph, directed=False)[1]
+    label = label_connected(other, linked)
     result[rows[np.bincount(label)[label] >= _SHORTEST]] = True
     return result
 
@@ -117,9 +114,13 @@ def find_rim_points(nearest, oriented):
 def outward_directions(nearest, normals, rows):
     """Return unit vectors in the tangent planes of some points, away from their neighbours, (k, 3)."""
     offset = nearest.points[nearest.index[rows]] - nearest.points[rows, None]
-    outward = -np.einsum("ik,ikc->ic", nearest.weight[rows], offset)
-    outward -= np.einsum("ic,ic->i", outward, normals[rows])[:, None] * normals[rows]
-    return outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
+    return _tangents(-np.einsum("ik,ikc->ic", nearest.weight[rows], offset), normals[rows])
+
+
+def _tangents(directions, normals):
+    """Return the directions in the tangent planes as unit vectors, (k, 3)."""
+    flat = directions - np.einsum("ic,ic->i", directions, normals)[:, None] * normals
+    return flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
 
 
 def measure_rim(nearest, normals, at_rim, reach):
@@ -225,9 +226,7 @@ def _fit_course(nearest, normals, rows):
     across = outward_directions(nearest, normals, rows)
     near = other[:, :9]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
-    across = np.einsum("ik,ikc->ic", side, across[near])
-    across -= np.einsum("ic,ic->i", across, normals[rows])[:, None] * normals[rows]
-    across /= np.linalg.norm(across, axis=1)[:, None]
+    across = _tangents(np.einsum("ik,ikc->ic", side, across[near]), normals[rows])
     along = np.cross(normals[rows], across)
 
     unit = distance[:, -1:]
@@ -253,12 +252,9 @@ def _fit_course(nearest, normals, rows):
 
 
 def _on_sheet(nearest, normals, rows, other, distance):
-    """Tell which of other points lie on the sheet of some points, (k, views) each."""
-    chord = nearest.points[other] - nearest.points[rows, None]
-    cosine = np.einsum("ikc,ic->ik", normals[other], normals[rows])
-    left = np.einsum("ikc,ic->ik", chord, normals[rows])
-    right = np.einsum("ikc,ikc->ik", chord, normals[other])
-    return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], _LEANING) & (cosine > 0.0)
+    """Tell which of other points lie on the sheet of some points, and face the same way, (k, views) each."""
+    same, cosine = on_sheet(nearest, normals, rows, other, distance, _LEANING)
+    return same & (cosine > 0.0)
 
 
 def _parabola(t, e, weight):

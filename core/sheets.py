@@ -1,5 +1,7 @@
 """Keep close sheets of a surface apart: which neighbours lie on the same sheet, told by their normals."""
 
+from dataclasses import fields
+
 import numpy as np
 
 from .surface import fit_surface
@@ -31,6 +33,36 @@ def same_sheet(left, right, dot, distance, spacing, leaning=LEANING):
     ndarray of bool
     """
     return np.abs(left + np.where(dot < 0.0, -right, right)) <= 2.0 * (_CLOSE * spacing + leaning * distance)
+
+
+def on_sheet(nearest, normals, rows, other, distance, leaning=LEANING):
+    """Tell which of other points lie on the sheet of some points.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals.
+    rows : ndarray, (k,) int
+        The points.
+    other : ndarray, (k, views) int
+        Points that each of them is compared with.
+    distance : ndarray, (k, views)
+    leaning : float
+        See `same_sheet`.
+
+    Returns
+    -------
+    same : ndarray, (k, views) bool
+    cosine : ndarray, (k, views)
+        Of the angle between the normals.
+    """
+    chord = nearest.points[other] - nearest.points[rows, None]
+    cosine = np.einsum("ikc,ic->ik", normals[other], normals[rows])
+    left = np.einsum("ikc,ic->ik", chord, normals[rows])
+    right = np.einsum("ikc,ikc->ik", chord, normals[other])
+    return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], leaning), cosine
 
 
 def fit_sheets(nearest):
@@ -67,23 +99,15 @@ def fit_sheets(nearest):
     touched[mixed] = True
     touched = np.flatnonzero(touched | touched[index].any(axis=1))
     kept = np.ones(index.shape, dtype=bool)
-    offset = points[index[touched]] - points[touched, None]
-    other = normals[index[touched]]
-    kept[touched] = same_sheet(
-        np.einsum("ikc,ic->ik", offset, normals[touched]),
-        np.einsum("ikc,ikc->ik", offset, other),
-        np.einsum("ikc,ic->ik", other, normals[touched]),
-        nearest.distance[touched],
-        spacing[touched, None],
-    )
+    kept[touched] = on_sheet(nearest, normals, touched, index[touched], nearest.distance[touched])[0]
     # A quadric has six coefficients; a point that keeps fewer than a dozen neighbours keeps all of them.
     kept |= (kept & (nearest.weight > 0.0)).sum(axis=1, keepdims=True) < 12
     nearest = nearest.keep(kept)
     again = np.flatnonzero(~kept.all(axis=1))
     if len(again):
         refit = fit_surface(points, index[again], nearest.weight[again], again, normals[again])
-        for name in ("normals", "gaussian", "steepest", "height", "bending", "misfit"):
-            getattr(surface, name)[again] = getattr(refit, name)
+        for quantity in fields(surface):
+            getattr(surface, quantity.name)[again] = getattr(refit, quantity.name)
     return surface, nearest
 
 

@@ -6,8 +6,8 @@ from time import perf_counter
 import numpy as np
 
 from ..core import PointCloudError
+from ..core.rims import FEWEST
 
-_LEAST = 5  # points that a rim takes
 _PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
 _glance = {"key": None, "checksum": 0, "until": 0.0}
 
@@ -34,10 +34,10 @@ def rim_points(obj):
         )
     members = _members(obj, name)
     count = np.count_nonzero(members)
-    if count < _LEAST:
+    if count < FEWEST:
         raise PointCloudError(
             f'The vertex group "{name}" gives {count} of {len(members)} points a weight above zero, and a rim takes at'
-            f" least {_LEAST}. Assign the points of the rim to it in Edit Mode, or clear Rim Group."
+            f" least {FEWEST}. Assign the points of the rim to it in Edit Mode, or clear Rim Group."
         )
     return members
 
