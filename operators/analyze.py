@@ -11,7 +11,7 @@ from . import cache
 from .options import laplacian_options
 from .reading import read_points
 from .ready import ReadyOperator
-from .result import area_text, check_writable, write_result
+from .result import analysis_names, area_text, check_writable, write_result
 from .stages import Stages
 
 WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each takes 4 bytes per point in the file
@@ -58,12 +58,12 @@ def analyze_object(context, obj, modes: int = 0) -> Analysis:
 def resolved_modes(laplacian, modes, progress):
     """Compute the modes asked for, or as many of them as the points resolve and a notice of that."""
     try:
-        return laplacian.eigenpairs(modes, progress=progress), []
+        return cache.lowest_modes(laplacian, modes, progress), []
     except UnresolvedModesError as error:
         if error.resolved == 0:
             raise
         notice = f"Only {error.resolved} of {modes} modes were computed: the others are finer than the points resolve."
-        return laplacian.eigenpairs(error.resolved, progress=progress), [notice]
+        return cache.lowest_modes(laplacian, error.resolved, progress), [notice]
 
 
 class AnalysisOperator(ReadyOperator):
@@ -89,7 +89,7 @@ class AnalysisOperator(ReadyOperator):
         obj = context.object
         written = min(modes, self.write_limit)
         try:
-            check_writable(obj, written, self.make_single_user or obj.meshfree.make_single_user)
+            check_writable(obj, analysis_names(written), self.make_single_user or obj.meshfree.make_single_user)
             analysis = analyze_object(context, obj, modes)
         except PointCloudError as error:
             self.report({"ERROR"}, str(error))

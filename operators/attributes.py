@@ -26,16 +26,15 @@ MEAN_CURVATURE = "lb_mean_curvature"
 GAUSSIAN_CURVATURE = "lb_gaussian_curvature"
 BOUNDARY = "lb_boundary"
 COMPONENT = "lb_component"
+SEGMENT = "lb_segment"
+FIELD = "lb_field"
+DISTANCE = "lb_distance"
+DISPLACEMENT = "lb_displacement"
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
-_TYPES = {
-    AREA: "FLOAT",
-    NORMAL: "FLOAT_VECTOR",
-    MEAN_CURVATURE: "FLOAT",
-    GAUSSIAN_CURVATURE: "FLOAT",
-    BOUNDARY: "BOOLEAN",
-    COMPONENT: "INT",
-}
-RESULTS = tuple(_TYPES)  # what every analysis writes, in the order of the panel
+HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
+RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT  # of every analysis, as in the panel
+APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
+_TYPES = {NORMAL: "FLOAT_VECTOR", BOUNDARY: "BOOLEAN", COMPONENT: "INT", SEGMENT: "INT"}  # all others are FLOAT
 
 
 def eigenvector_name(mode: int) -> str:
@@ -61,7 +60,7 @@ def check_names(obj, names):
 
 def write_attribute(mesh, name: str, values):
     """Write one value per vertex, replacing an attribute of that name."""
-    data_type = "FLOAT" if name.startswith(EIGENVECTOR) else _TYPES[name]
+    data_type = _TYPES.get(name, "FLOAT")
     storage = _STORAGE[data_type]
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
     if len(values) != storage.components * len(mesh.vertices):

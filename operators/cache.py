@@ -1,15 +1,17 @@
 """The operators built last, so that a spectrum after an analysis does not build one again."""
 
 import hashlib
+import weakref
 from collections import OrderedDict
 from typing import NamedTuple
 
 import numpy as np
 
-from ..core import LaplaceBeltrami, build_laplacian, mean_curvature
+from ..core import LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature
 
 _LIMIT = 2  # each holds all pairs of neighbours: 1 GB and more for large scans
 _built = OrderedDict()
+_spectra = weakref.WeakKeyDictionary()  # of the operators that are kept, the longest one computed
 
 
 class Built(NamedTuple):
@@ -44,6 +46,14 @@ def build(points, options, rim, progress) -> Built:
         built = Built(laplacian, mean_curvature(laplacian))
     _built[key] = built
     return built
+
+
+def lowest_modes(laplacian, count: int, progress) -> Spectrum:
+    """Return the lowest modes of an operator, computed only if there are not as many from before."""
+    known = _spectra.get(laplacian)
+    if known is None or len(known.eigenvalues) < count:
+        known = _spectra[laplacian] = laplacian.eigenpairs(count, progress=progress)
+    return Spectrum(known.eigenvalues[:count], known.eigenvectors[:, :count])
 
 
 def clear():

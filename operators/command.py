@@ -10,7 +10,7 @@ from ..core import PointCloudError
 from . import files, options
 from .analyze import WRITE_LIMIT, analyze_object
 from .reading import obstacle
-from .result import check_writable, write_result
+from .result import analysis_names, check_writable, write_result
 
 _handles = []
 
@@ -131,7 +131,7 @@ def _process(path, arguments) -> dict:
         value = getattr(arguments, name)
         if value is not None:
             setattr(obj.meshfree, name, value)
-    check_writable(obj, min(arguments.modes, arguments.write_limit), obj.meshfree.make_single_user)
+    check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
     analysis = analyze_object(bpy.context, obj, arguments.modes)
     write_result(obj, analysis, arguments.write_limit)
     if output is not None:

@@ -23,15 +23,31 @@ from .reading import fingerprint, metric, sharing_objects
 EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
 
 
-def check_writable(obj, modes: int, make_single_user: bool):
-    """Refuse an object that results cannot be written to, before anything is computed."""
-    others = [other.name for other in sharing_objects(obj)]
+def check_writable(obj, names, make_single_user: bool, among=()):
+    """Refuse an object that results cannot be written to, before anything is computed.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    names : iterable of str
+        The attributes that will be written.
+    make_single_user : bool
+        Whether the object gets a mesh of its own.
+    among : sequence of bpy.types.Object
+        Objects that may share the mesh, because they are worked on too.
+    """
+    others = [other.name for other in sharing_objects(obj) if other not in among]
     if others and not make_single_user:
         shown = ", ".join(f'"{name}"' for name in others[:3]) + (", ..." if len(others) > 3 else "")
         raise PointCloudError(
             f'"{obj.name}" shares its mesh with {shown}. Turn on Make Single User to give it a mesh of its own.'
         )
-    check_names(obj, [*RESULTS, *map(eigenvector_name, range(1, modes + 1))])
+    check_names(obj, names)
+
+
+def analysis_names(modes: int) -> list:
+    """Names of the attributes of an analysis with so many modes."""
+    return [*RESULTS, *map(eigenvector_name, range(1, modes + 1))]
 
 
 def write_result(obj, analysis, write_limit: int):

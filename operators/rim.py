@@ -3,10 +3,8 @@
 import zlib
 from time import perf_counter
 
-import numpy as np
-
-from ..core import PointCloudError
 from ..core.rims import FEWEST
+from .groups import chosen_members, group_weights
 
 _PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
 _glance = {"key": None, "checksum": 0, "until": 0.0}
@@ -26,20 +24,7 @@ def rim_points(obj):
         There is no such group, or too little in it.
     """
     name = obj.meshfree.rim_group
-    if not name:
-        return None
-    if name not in obj.vertex_groups:
-        raise PointCloudError(
-            f'"{obj.name}" has no vertex group named "{name}". Choose another Rim Group, or clear it.'
-        )
-    members = _members(obj, name)
-    count = np.count_nonzero(members)
-    if count < FEWEST:
-        raise PointCloudError(
-            f'The vertex group "{name}" gives {count} of {len(members)} points a weight above zero, and a rim takes at'
-            f" least {FEWEST}. Assign the points of the rim to it in Edit Mode, or clear Rim Group."
-        )
-    return members
+    return chosen_members(obj, name, "Rim Group", FEWEST) if name else None
 
 
 def rim_checksum(obj, glance=False) -> int:
@@ -54,14 +39,7 @@ def rim_checksum(obj, glance=False) -> int:
     key = (obj.session_uid, name, len(obj.data.vertices))
     if not glance or _glance["key"] != key or perf_counter() > _glance["until"]:
         began = perf_counter()
-        checksum = zlib.crc32(_members(obj, name))
+        checksum = zlib.crc32(group_weights(obj, name) > 0.0)
         now = perf_counter()
         _glance.update(key=key, checksum=checksum, until=now + _PATIENCE * (now - began))
     return _glance["checksum"]
-
-
-def _members(obj, name):
-    """Whether each vertex is in a group with a weight above zero, (n,) bool."""
-    index = obj.vertex_groups[name].index
-    held = (any(item.group == index and item.weight > 0.0 for item in vertex.groups) for vertex in obj.data.vertices)
-    return np.fromiter(held, bool, count=len(obj.data.vertices))

@@ -1,0 +1,60 @@
+"""What the operators that apply the Laplacian have in common: read all objects, compute, and only then write."""
+
+from ..core import PointCloudError
+from . import cache
+from .options import laplacian_options
+from .reading import obstacle, read_points, sharing_objects
+from .ready import ReadyOperator
+from .result import check_writable
+from .stages import Stages
+
+
+class ApplicationOperator(ReadyOperator):
+    """An operator on the active object and on all other selected ones that can be read and written.
+
+    Of objects that share a mesh one is enough. A subclass says what to do by two methods: `plan` reads everything that
+    is needed of an object and returns a function of a progress callback that computes, without touching Blender;
+    `write` puts what that returns on the object and returns a line for the status bar.
+    """
+
+    only_active = False  # for what has one object by nature
+    writes = ()  # names of the attributes that `write` makes
+
+    def execute(self, context):
+        objects = [context.object] if self.only_active else chosen_objects(context)
+        try:
+            plans = []
+            for obj in objects:
+                check_writable(obj, self.writes, obj.meshfree.make_single_user, among=objects)
+                plans.append(self.plan(context, obj))
+            with Stages(context.window_manager) as stages:
+                results = [plan(stages) for plan in plans]
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for obj, result in zip(objects, results, strict=True):
+            if obj.meshfree.make_single_user and sharing_objects(obj):
+                obj.data = obj.data.copy()
+            self.report({"INFO"}, self.write(context, obj, result))
+        return {"FINISHED"}
+
+    def warn(self, notices):
+        """Report notices of core."""
+        for notice in notices:
+            self.report({"WARNING"}, notice)
+
+
+def chosen_objects(context):
+    """Return the active object and the other selected ones that can be read and written, one per mesh."""
+    by_mesh = {}
+    for obj in [context.object, *context.selected_objects]:
+        if not obstacle(obj):
+            by_mesh.setdefault(obj.data, obj)
+    return list(by_mesh.values())
+
+
+def operator_reader(context, obj):
+    """Read an object's points; return them, and a function of a progress callback that gives their operator."""
+    reading = read_points(context, obj)
+    options = laplacian_options(obj.meshfree)
+    return reading, lambda progress: cache.build(reading.points, options, reading.rim, progress).laplacian

@@ -1,0 +1,58 @@
+"""Vertex groups: which vertices are in one, and with what weight."""
+
+import numpy as np
+
+from ..core import PointCloudError
+
+ROLES = HANDLE, ANCHOR, FIXED, SOURCE, VALUE = "Handle", "Anchor", "Fixed", "Source", "Value"
+
+
+def group_weights(obj, name: str):
+    """Read the weight of every vertex in a group, (n,) float64; 0 for those outside."""
+    index = obj.vertex_groups[name].index
+    held = (next((item.weight for item in vertex.groups if item.group == index), 0.0) for vertex in obj.data.vertices)
+    return np.fromiter(held, np.float64, count=len(obj.data.vertices))
+
+
+def chosen_weights(obj, name: str, setting: str, least: int = 1):
+    """Read the weights in the group that a setting names.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name : str
+        The group.
+    setting : str
+        What the panel calls the setting, for the texts of errors.
+    least : int
+        How many points the group must hold.
+
+    Returns
+    -------
+    ndarray, (n,) float64
+
+    Raises
+    ------
+    PointCloudError
+        There is no such group, or too little in it.
+    """
+    if name not in obj.vertex_groups:
+        raise PointCloudError(
+            f'"{obj.name}" has no vertex group named "{name}". Choose another {setting}, or clear it.'
+            if name
+            else f'"{obj.name}" has no {setting} chosen. Choose a vertex group; Assign to Group makes one from the'
+            " points selected in Edit Mode."
+        )
+    weights = group_weights(obj, name)
+    count = np.count_nonzero(weights)
+    if count < least:
+        raise PointCloudError(
+            f'The vertex group "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting} takes'
+            f" at least {least}. Assign points to it in Edit Mode, or clear {setting}."
+        )
+    return weights
+
+
+def chosen_members(obj, name: str, setting: str, least: int = 1):
+    """Read which vertices the group that a setting names gives a weight above zero, (n,) bool; see `chosen_weights`."""
+    return chosen_weights(obj, name, setting, least) > 0.0

@@ -1,0 +1,68 @@
+"""Move the vertices of an object: in place, or by a shape key."""
+
+import numpy as np
+from bpy.props import EnumProperty
+
+from ..core import PointCloudError
+from .reading import is_display, mesh_positions
+
+TARGETS = (
+    ("SHAPE_KEY", "Shape Key", "Add a shape key, whose value mixes the result with the points as they were"),
+    ("IN_PLACE", "In Place", "Move the points themselves"),
+)
+
+
+def target_property():
+    """Return the property of an operator that says where moved points go."""
+    return EnumProperty(name="Result", description="Where the moved points go", items=TARGETS, default="SHAPE_KEY")
+
+
+def check_movable(obj, target: str):
+    """Refuse an object whose vertices cannot be moved to given places, before anything is computed."""
+    if obj.meshfree.use_modifiers and any(not is_display(item) for item in obj.modifiers):
+        raise PointCloudError(
+            f'The points of "{obj.name}" were read after its modifiers, and cannot be written back before them. Turn'
+            " off Use Modifiers, or apply the modifiers."
+        )
+    keys = obj.data.shape_keys
+    if keys is not None and target == "IN_PLACE":
+        raise PointCloudError(
+            f'"{obj.name}" has shape keys, so that moving its points in place would not be seen. Choose Shape Key as'
+            " the result, or apply the shape keys."
+        )
+    if keys is not None and not keys.use_relative:
+        raise PointCloudError(
+            f'The shape keys of "{obj.name}" are absolute. Turn on Relative, so that a key can be added to them.'
+        )
+
+
+def write_positions(obj, reading, points, target: str, name: str):
+    """Move the vertices to given places.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    reading : Reading
+        How the points were read.
+    points : ndarray, (n, 3)
+        Their new places, as `reading.points`.
+    target : str
+        One of `TARGETS`.
+    name : str
+        Of the shape key; Blender adds a number if there is one already.
+    """
+    mesh = obj.data
+    moved = (points - reading.points) @ np.linalg.inv(reading.matrix).T
+    if target == "IN_PLACE":
+        positions = mesh_positions(mesh) + moved
+        mesh.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
+    else:
+        if mesh.shape_keys is None:
+            obj.shape_key_add(name="Basis", from_mix=False)
+        basis = np.empty(3 * len(mesh.vertices), np.float32)
+        mesh.shape_keys.reference_key.points.foreach_get("co", basis)
+        key = obj.shape_key_add(name=name, from_mix=False)
+        # The points that were read already hold what the other keys add, so this key adds the rest.
+        key.points.foreach_set("co", basis + moved.astype(np.float32).reshape(-1))
+        key.value = 1.0
+    mesh.update()
