@@ -19,8 +19,8 @@ def is_display(modifier) -> bool:
     return modifier.type == "NODES" and modifier.node_group is not None and DISPLAY_TAG in modifier.node_group
 
 
-def obstacle(obj) -> str:
-    """What keeps an object from being read and written, and what to do about it; empty if nothing does."""
+def obstacle(obj, modes=("OBJECT",)) -> str:
+    """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
     if obj is None:
         return "No active object. Select a mesh with the points of a surface"
     if obj.type != "MESH":
@@ -28,7 +28,7 @@ def obstacle(obj) -> str:
         return f'"{obj.name}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
     if not obj.is_editable or not obj.data.is_editable:
         return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
-    if obj.mode != "OBJECT" or obj.data.is_editmode:
+    if obj.mode not in modes or (obj.data.is_editmode and "EDIT" not in modes):
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
     if not obj.data.vertices:
         return f'"{obj.name}" has no vertices. Add points, or select another mesh'

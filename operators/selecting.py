@@ -1,0 +1,211 @@
+"""Select points and put them into the vertex groups that the tools take, where Blender's own ways need faces."""
+
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
+
+from ..core import PointCloudError, grow_selection
+from .application import operator_reader
+from .reading import obstacle
+from .stages import Stages
+
+
+class SelectionOperator:
+    """An operator on the selected vertices of the active mesh, in Edit Mode or Object Mode."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        reason = obstacle(context.object, modes=("OBJECT", "EDIT"))
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def execute(self, context):
+        obj = context.object
+        with object_mode(obj):
+            try:
+                message = self.change(context, obj)
+            except PointCloudError as error:
+                self.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+        self.report({"INFO"}, message)
+        return {"FINISHED"}
+
+
+@contextmanager
+def object_mode(obj):
+    """Leave Edit Mode, where vertices cannot be read as arrays, and come back to it."""
+    editing = obj.mode == "EDIT"
+    if editing:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    try:
+        yield
+    finally:
+        if editing:
+            bpy.ops.object.mode_set(mode="EDIT")
+
+
+def selected(obj):
+    """Read which vertices are selected, (n,) bool."""
+    chosen = np.empty(len(obj.data.vertices), dtype=bool)
+    obj.data.vertices.foreach_get("select", chosen)
+    if not chosen.any():
+        raise PointCloudError(f'No points of "{obj.name}" are selected. Select some in Edit Mode.')
+    return chosen
+
+
+def select(obj, chosen) -> str:
+    """Select these vertices, (n,) bool, and no others."""
+    obj.data.vertices.foreach_set("select", chosen)
+    obj.data.update()
+    return f"{np.count_nonzero(chosen):,} of {len(chosen):,} points are selected"
+
+
+def analyzed(context, obj):
+    """Read the points and return them with their operator, which is kept from the last analysis if nothing changed."""
+    reading, operator = operator_reader(context, obj)
+    with Stages(context.window_manager) as stages:
+        return reading, operator(stages)
+
+
+class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
+    """Select all points within a distance along the surface from the selected ones"""
+
+    bl_idname = "meshfree.select_grow"
+    bl_label = "Grow Selection"
+
+    distance: FloatProperty(
+        name="Distance",
+        description="How far the selection grows along the surface; 0 for four times the spacing of the points",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+
+    def change(self, context, obj):
+        chosen = selected(obj)
+        reading, laplacian = analyzed(context, obj)
+        distance = self.distance or 4.0 * np.sqrt(np.median(laplacian.areas))
+        return select(obj, grow_selection(laplacian, chosen, distance))
+
+
+class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
+    """Select all points of the connected parts that hold selected points"""
+
+    bl_idname = "meshfree.select_component"
+    bl_label = "Select Connected Part"
+
+    def change(self, context, obj):
+        chosen = selected(obj)
+        component = analyzed(context, obj)[1].component
+        return select(obj, np.isin(component, component[chosen]))
+
+
+class FrontOnly:
+    """The property of selecting operators that leaves out points on the far side."""
+
+    direction: FloatVectorProperty(
+        name="Viewing Direction",
+        description="Direction in which one looks at the object; zero for that of the viewport",
+        default=(0.0, 0.0, 0.0),
+        subtype="XYZ",
+    )
+
+    def facing(self, context, obj):
+        """Tell which points face the viewer by their normals, (n,) bool."""
+        reading, laplacian = analyzed(context, obj)
+        view = np.array(self.direction, dtype=np.float64)
+        space = context.region_data if context.area is not None and context.area.type == "VIEW_3D" else None
+        if view.any():
+            rays = view
+        elif space is None:
+            raise PointCloudError("There is no 3D viewport to look from. Give a viewing direction.")
+        elif space.is_perspective:
+            eye = np.array(space.view_matrix.inverted().translation) - np.array(obj.matrix_world.translation)
+            rays = reading.points - eye
+        else:
+            rays = -np.array(space.view_matrix.inverted().col[2][:3])
+        return np.einsum("ij,ij->i", laplacian.normals, np.broadcast_to(rays, reading.points.shape)) < 0.0
+
+
+class MESHFREE_OT_select_front(SelectionOperator, FrontOnly, bpy.types.Operator):
+    """Deselect the points whose normals point away from the viewer, which Box Select takes too"""
+
+    bl_idname = "meshfree.select_front"
+    bl_label = "Front Only"
+
+    def change(self, context, obj):
+        return select(obj, selected(obj) & self.facing(context, obj))
+
+
+class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.Operator):
+    """Put the selected points into a vertex group that the tools take, such as Handle or Anchor"""
+
+    bl_idname = "meshfree.group_from_selection"
+    bl_label = "Assign to Group"
+
+    role: EnumProperty(
+        name="Group",
+        description="What the points are for",
+        items=[
+            ("HANDLE", "Handle", "Points that are moved to deform the rest"),
+            ("ANCHOR", "Anchor", "Points that stay where they are"),
+            ("FIXED", "Fixed", "The rim that a minimal surface keeps"),
+            ("SOURCE", "Source", "Points from which distances are measured"),
+            ("VALUE", "Value", "Points with given values of a field, as weights"),
+        ],
+        default="HANDLE",
+    )
+    name: StringProperty(name="Name", description="Name of the group; empty for that of its role")
+    action: EnumProperty(
+        name="Action",
+        description="What happens to points that the group holds already",
+        items=[
+            ("REPLACE", "Replace", "The group holds the selected points only"),
+            ("ADD", "Add", "The selected points come to those that the group holds"),
+            ("REMOVE", "Remove", "The selected points leave the group"),
+        ],
+        default="REPLACE",
+    )
+    weight: FloatProperty(
+        name="Weight", description="Weight of the points in the group", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
+    )
+    front_only: BoolProperty(
+        name="Front Only", description="Leave out points whose normals point away from the viewer", default=False
+    )
+
+    def change(self, context, obj):
+        chosen = selected(obj)
+        if self.front_only:
+            chosen &= self.facing(context, obj)
+        name = self.name or self.role.title()
+        if name in obj.data.attributes:
+            raise PointCloudError(
+                f'"{obj.name}" has an attribute named "{name}", and vertex groups share their names. Choose another'
+                " name, or rename the attribute."
+            )
+        group = obj.vertex_groups.get(name)
+        if group is None:
+            group = obj.vertex_groups.new(name=name)
+        if self.action == "REPLACE":
+            group.remove(range(len(chosen)))
+        members = np.flatnonzero(chosen).tolist()
+        if self.action == "REMOVE":
+            group.remove(members)
+        else:
+            group.add(members, self.weight, "REPLACE")
+        obj.vertex_groups.active = group
+        verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
+        return f'{len(members):,} points {verb} the group "{name}"'
+
+
+CLASSES = (
+    MESHFREE_OT_select_grow,
+    MESHFREE_OT_select_component,
+    MESHFREE_OT_select_front,
+    MESHFREE_OT_group_from_selection,
+)
