@@ -1,8 +1,11 @@
 """Area elements from the unit-integral condition of the kernel, eqs. (6) to (8) of the paper."""
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.special import expit
 
 from .cloud import read_cloud
 from .curvature import kernel_integral
@@ -13,9 +16,13 @@ from .kernel import kernel
 from .options import LaplacianOptions
 
 _FLOOR = 0.05  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
-_ROUNDS, _STEPS = 15, 20  # of the fast areas
-_RESOLVED = 5e-3  # eigenvalues of the scaled kernel matrix below this are left to the start
-_SQUARED = 12, 20, 3e-4  # the same three for its square
+_STEPS = 60, 40, 20, 20, 10, 10  # of the rounds of the fast areas where the kernel matrix is definite
+_INDEFINITE = (  # where it is not: its least eigenvalue, then steps of each round and what eigenvalues it resolves
+    (-0.005, ((80, 5e-3), (80, 5e-3), (20, 5e-2))),
+    (-0.02, ((80, 1e-2), (80, 1e-2), (20, 5e-2))),
+    (-1.0, ((100, 5e-2), (100, 5e-2))),
+)
+_GROWTH = 4.0  # of a squared residual, that only an eigenvalue below the expected least one can cause
 NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
 TAU = 2.0**-52  # the paper's lower bound of eq. (8), in scaled coordinates
 
@@ -129,16 +136,18 @@ class KernelMatrix:
 
 
 def fast_areas(matrix, target, definite=True):
-    """Solve A v = b by a projected Chebyshev iteration that starts at the density areas v0 = 1 / (A 1).
+    """Solve A v = b by a few projected rounds of polynomials in A, from the density areas v0 = 1 / (A 1).
 
-    With M = V0^(1/2) A V0^(1/2), whose eigenvalues lie in [0, 1] whatever the points, each round runs Chebyshev's
-    semi-iteration on M y = V0^(1/2) b for v = V0^(1/2) y, over the eigenvalues above 5e-3: the smooth part is solved
-    for, and what the kernel cannot see stays near the density areas. Between rounds areas below the floor of 0.05 v0
-    are put on it, held there, and released when the gradient turns inward. A fixed number of linear steps, unlike
-    conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order of the points.
+    M = V0^(1/2) A V0^(1/2) has its eigenvalues in [0, 1]. Each round adds p(M) times the residual to y in
+    M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue and bounded below it: the
+    smooth part is solved for, and what the kernel cannot see stays near the density areas. Between rounds areas below
+    the floor of 0.05 v0 are put on it, held there, and released when the gradient turns inward; the later rounds, which
+    are shorter, make up for what that changes at large. A fixed number of linear steps, unlike conjugate gradients,
+    does not amplify rounding: the result is the same to 1e-10 for any order of the points.
 
-    Where pairs were left out, between close sheets, or images added, next to rims, M has negative eigenvalues too; the
-    iteration then runs on M^2.
+    Where pairs were left out, between close sheets, or images added, next to rims, M has negative eigenvalues too, most
+    often next to none. What belongs to them, and to positive ones as small, is no smooth part: p leaves it alone. Where
+    they turn out to lie lower than expected, the solution starts anew with less resolved; none lies below -1.
 
     Parameters
     ----------
@@ -155,34 +164,68 @@ def fast_areas(matrix, target, definite=True):
     """
     density = 1.0 / (matrix @ np.ones(len(target)))
     root = np.sqrt(density)
+    right, floor = root * target, _FLOOR * root
+    products = 1
 
     def multiply(y):
+        nonlocal products
+        products += 1
         return root * (matrix @ (root * y))
 
-    normal = multiply if definite else lambda y: multiply(multiply(y))
-    right = root * target if definite else multiply(root * target)
-    rounds, steps, least = (_ROUNDS, _STEPS, _RESOLVED) if definite else _SQUARED
+    for least, rounds in _polynomials()[0 if definite else 1 :]:
+        y, held = root, np.zeros(len(target), dtype=bool)
+        for coefficients in rounds:
+            residual = right - multiply(y)
+            held &= residual < 0.0
+            residual[held] = 0.0
+            change = _polynomial(multiply, residual, held, least, coefficients)
+            if change is None:
+                break
+            y = np.maximum(y + change, floor)
+            held = y <= floor
+        else:
+            break
+    return AreaSolution(root * y, products, True)
+
+
+def _polynomial(multiply, residual, held, least, coefficients):
+    """Evaluate a Chebyshev series in M, over [least, 1], on the free part of a residual; None if M reaches lower."""
     center, radius = 0.5 * (1.0 + least), 0.5 * (1.0 - least)
-    y, held = root, np.zeros(len(target), dtype=bool)
-    for _ in range(rounds):
-        residual = right - normal(y)
-        held &= residual < 0.0
-        residual[held] = 0.0
-        ratio = radius / center
-        change = residual / center
-        for _ in range(steps):
-            y = y + change
-            image = normal(change)
-            image[held] = 0.0
-            residual -= image
-            following = 1.0 / (2.0 * center / radius - ratio)
-            change = following * ratio * change + (2.0 * following / radius) * residual
-            ratio = following
-        y = y + change
-        held = y <= _FLOOR * root
-        y = np.maximum(y, _FLOOR * root)
-    products = rounds * (1 + steps)
-    return AreaSolution(root * y, 1 + products if definite else 2 + 2 * products, True)
+    before, now = 0.0, residual
+    result = coefficients[0] * residual
+    for step, coefficient in enumerate(coefficients[1:]):
+        image = multiply(now)
+        image[held] = 0.0
+        before, now = now, (image - center * now) * ((2.0 if step else 1.0) / radius) - before
+        if now @ now > _GROWTH * (residual @ residual):
+            return None
+        result += coefficient * now
+    return result
+
+
+@functools.cache
+def _polynomials():
+    """Return pairs of a least eigenvalue and the Chebyshev series of each round: definite, then ever less so."""
+
+    def semi_iteration(steps, x):
+        """What `steps` of Chebyshev's semi-iteration make of 1 / x; they reduce what they resolve to a ninth."""
+        least = (1.45 / steps) ** 2
+        ends = np.array([0.0, *np.atleast_1d(x)])
+        values = chebyshev.chebval((1.0 + least - 2.0 * ends) / (1.0 - least), [0.0] * steps + [1.0])
+        return (1.0 - values[1:] / values[0]) / x
+
+    def positive(width, x):
+        """1 / x for x well above the width, with little left near zero and next to nothing below."""
+        return expit(2.0 * x / width) * x / (x * x + width * width)
+
+    def series(function, first, least, degree):
+        middle, half = 0.5 * (1.0 + least), 0.5 * (1.0 - least)
+        return chebyshev.chebinterpolate(lambda t: function(first, middle + half * t), degree)
+
+    result = [(0.0, [series(semi_iteration, steps, 0.0, steps - 1) for steps in _STEPS])]
+    for least, rounds in _INDEFINITE:
+        result.append((least, [series(positive, width, least, steps) for steps, width in rounds]))
+    return result
 
 
 def regularized_areas(matrix, target, rho, products=8000, rtol=1e-10):

@@ -7,6 +7,9 @@ _IRREGULARITY = (0.03, 0.12, 0.24, 0.30)
 _WIDEST = (0.35, 0.65, 0.70, 0.76)
 _NARROWEST = (0.30, 0.30, 0.30, 0.45)
 _BEND = 0.33  # h times the principal curvature: how far the kernel may reach around a bend
+_ACROSS = 0.4  # h over the depth of the surface, at most: images know of two rims, not of those on the other side
+_TIGHTEST = 1.2  # spacings that h keeps even there
+_STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
 _NOISE = 0.10  # changes of log d100 that may be chance
 _SLOW, _FAST, _LAST = 160, 10, 2  # rounds of averaging over the 40 nearest neighbours
 
@@ -25,7 +28,7 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None):
     steepest : ndarray, (m,), optional
         The larger principal curvature of every point; for "adaptive".
     inside : ndarray, (m, 2), optional
-        Distances to rims; a neighbourhood that it cuts counts as whole.
+        Distances to rims; a neighbourhood that it cuts counts as whole, and h stays small in a narrow surface.
 
     Returns
     -------
@@ -33,7 +36,8 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None):
         Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
         twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: the same distance
         without what may be chance, times a factor between 0.3 and 0.76 that is as large as the irregularity of the
-        spacing demands and the curvature permits.
+        spacing demands and the curvature permits. Where the surface is narrow h stays below 0.4 of the depth, the
+        distance of its middle from the rim, but not below 1.2 spacings.
     """
     distance = _neighbor_distance(nearest.tree, options.neighbors, label)
     if options.bandwidth == "global":
@@ -55,8 +59,21 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None):
     bend = np.log(_BEND / np.maximum(steepest, 1e-30))
     floor = least + np.maximum(reach, own)
     length = np.maximum(np.clip(bend, least + reach, most + reach), floor)
+    if inside is not None:
+        narrow = np.log(np.maximum(_ACROSS * depth(nearest, inside), _TIGHTEST * nearest.spacing))
+        length, floor = np.minimum(length, narrow), np.minimum(floor, narrow)
     length = np.maximum(_repeat(averaging, length, _LAST), floor)
     return options.bandwidth_factor * np.exp(_repeat(averaging, length, _LAST))
+
+
+def depth(nearest, inside):
+    """Return how far from a rim the surface around every point gets, (m,): about half the width of a narrow one."""
+    deepest = inside[:, 0]
+    if np.isfinite(deepest).any():
+        counted = nearest.weight > 1e-12
+        for _ in range(_STEPS):
+            deepest = np.max(deepest[nearest.index], axis=1, where=counted, initial=0.0)
+    return deepest
 
 
 def _neighbor_distance(tree, neighbors, label):

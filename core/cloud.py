@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .bandwidth import smoothing_lengths
+from .bandwidth import depth, smoothing_lengths
 from .components import label_islands, label_sheets, move_apart
 from .distances import pairs_on_one_sheet
 from .errors import InvalidPointsError, IslandError
@@ -19,6 +19,7 @@ from .sheets import fit_sheets
 from .surface import fit_surface
 
 _RIM_REACH = 20.0  # spacings from a rim at which no kernel sees it
+_NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,11 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
     report("Neighbors", 0.2)
     lengths = smoothing_lengths(nearest, options, label, surface.steepest, rim.distance)
+    if np.mean(lengths > _NARROW * depth(nearest, rim.distance)) > _MANY:
+        notices.append(
+            "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"
+            " 10 % and more. Add points."
+        )
     pairs = Neighborhoods(nearest.points, lengths, *find_pairs(nearest.tree, lengths))
     if normals is None and options.normals != "quadric":
         own = covariance_normals(pairs, weighted=options.normals == "wpca")

@@ -19,14 +19,17 @@ _FOLDED = 2  # neighbours on another sheet that a rim point may have
 _LINK = 4.0  # spacings between candidates of the same rim
 _SHORTEST = 16  # candidates of a rim that is found
 FEWEST = 5  # points of a rim that is given
-_CURVE = 34  # candidates that the rim's course is fitted to
+_CURVE = (12, 34)  # candidates that the rim's course is fitted to: at least, at most
+_PART = 3  # of a short rim no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a rim runs that many standard deviations outside the mean of its candidates
 _LEANING = 0.3  # what normals may be off by, as a share of the distance
 _OPPOSITE = -0.3  # cosine of the directions across two courses of the rim that do not belong together
+_HALF = (4, 6)  # a fit to one side of a corner needs more candidates than that: of a short rim, of a long one
 _KINK = (2.0, 0.1)  # a fit to one side of a corner must scatter so much less, and by so much of the spacing
 _KINKED = 1.3  # scatter over that of the neighbours at which a corner is near
 _CHANCE = 3.0  # variances of a curvature that may be chance
 _VIEWS = 48  # nearest candidates that a point looks at
+_FEW = 5  # candidates that make a second rim
 _AVERAGED = 8  # the nearest of them on one side of a corner, whose measures of the distance are averaged
 _STRAIGHT, _CORNER = 0.8, 0.75  # cosine of the directions across the rim: of one course, at least; of two, at most
 
@@ -104,11 +107,15 @@ def find_rim_points(nearest, oriented):
     rows = rows[nearest.tree.query(probe, workers=-1)[0] > _EMPTY * _PROBE * spacing]
     if len(rows) < _SHORTEST:
         return result
-    distance, other = cKDTree(points[rows]).query(points[rows], k=min(9, len(rows)), workers=-1)
-    linked = distance <= _LINK * nearest.spacing[rows][:, None]
-    label = label_connected(other, linked)
-    result[rows[np.bincount(label)[label] >= _SHORTEST]] = True
+    result[rows[_row_sizes(points[rows], _LINK * nearest.spacing[rows]) >= _SHORTEST]] = True
     return result
+
+
+def _row_sizes(points, reach):
+    """Return how many candidates, (k, 3), the row of each one has; those of a row are within reach of each other."""
+    distance, other = cKDTree(points).query(points, k=min(9, len(points)), workers=-1)
+    label = label_connected(other, distance <= reach[:, None])
+    return np.bincount(label)[label]
 
 
 def outward_directions(nearest, normals, rows):
@@ -160,7 +167,7 @@ def measure_rim(nearest, normals, at_rim, reach):
         doubt = (near + 2.0 * spacing) * np.where(course.kinked[seen], 10.0, 1.0)
         distance, bend = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
-        eligible = _on_sheet(nearest, normals, block, rows[seen], near)
+        eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
         for side in (0, 1):
             best = np.argmin(np.where(eligible, doubt, np.inf), axis=1)
             ahead = course.outward[seen[every, best]]
@@ -168,7 +175,7 @@ def measure_rim(nearest, normals, at_rim, reach):
             rank = np.argsort(np.argsort(np.where(same, doubt, np.inf), axis=1, kind="stable"), axis=1, kind="stable")
             trust = np.where(same & (rank < _AVERAGED), 1.0 / doubt, 0.0)
             total = trust.sum(axis=1)
-            known = np.count_nonzero(same, axis=1) >= (_AVERAGED if side else 1)
+            known = np.count_nonzero(same, axis=1) >= (_FEW if side else 1)
             total[~known] = 1.0
             rim.distance[block, side] = np.where(known, np.maximum((trust * distance).sum(axis=1) / total, 0), np.inf)
             rim.curvature[block, side] = (trust * bend).sum(axis=1) / total
@@ -222,28 +229,31 @@ class _Course:
 
 def _fit_course(nearest, normals, rows):
     points = nearest.points
-    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE + 1, len(rows)), workers=-1)
+    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
+    # A rim that is given may be sparse, so that its rows are found without a reach.
+    fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, *_CURVE)[:, None]
     across = outward_directions(nearest, normals, rows)
     near = other[:, :9]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
     across = _tangents(np.einsum("ik,ikc->ic", side, across[near]), normals[rows])
     along = np.cross(normals[rows], across)
 
-    unit = distance[:, -1:]
+    unit = np.take_along_axis(distance, np.minimum(fitted, distance.shape[1] - 1), axis=1)
     offset = (points[rows[other]] - points[rows, None]) / unit[:, :, None]
     t, e = np.einsum("ikc,ic->ik", offset, along), np.einsum("ikc,ic->ik", offset, across)
     # The rim on the other side of a ribbon or a slit faces the other way.
     facing = np.einsum("ikc,ic->ik", across[other], across) > _OPPOSITE
     facing &= _on_sheet(nearest, normals, rows, rows[other], distance)
-    weight = np.where(facing, fading_weights(distance), 0.0)
+    weight = np.where(facing, fading_weights(np.minimum(distance, unit)), 0.0)
     fit, scatter = _parabola(t, e, weight)
     spacing = nearest.spacing[rows] / unit[:, 0]
     for half in (t < 0.25 * spacing[:, None], t > -0.25 * spacing[:, None]):
-        enough = np.count_nonzero(half & (weight > 0.0), axis=1) > 6
+        enough = np.count_nonzero(half & (weight > 0.0), axis=1) > np.clip(fitted[:, 0] // 5, *_HALF)
         other_fit, other_scatter = _parabola(t, e, np.where(half | ~enough[:, None], weight, 0.0))
         better = enough & (scatter > _KINK[0] * other_scatter + _KINK[1] * spacing)
         fit[better], scatter[better] = other_fit[better], other_scatter[better]
-    usual = np.median(scatter[other[:, : _CURVE // 2]] * unit[other[:, : _CURVE // 2], 0], axis=1) / unit[:, 0]
+    close = np.where(np.arange(other.shape[1]) < fitted // 2, scatter[other] * unit[other, 0], np.nan)
+    usual = np.nanmedian(close, axis=1) / unit[:, 0]
     kinked = scatter > _KINKED * usual + 0.1 * spacing
     fit[:, 0] += _LEVEL * np.where(kinked, usual, scatter)
     fit *= np.concatenate([unit, np.ones_like(unit), 1.0 / unit], axis=1)

@@ -86,6 +86,13 @@ class TestAdaptive:
         unaware = lengths(points, rims="off")
         assert unaware.max() > 1.1 * unaware[middle].mean()
 
+    def test_narrower_in_a_narrow_surface(self):
+        # A square of a few spacings, and a larger one with the same spacing.
+        narrow, wide = (lengths(width * square_random(int(width**2), 1)) for width in (10.5, 30.0))
+        assert narrow.max() < 0.3 * 10.5
+        assert narrow.min() > 1.2
+        assert wide.min() > 3.5
+
     def test_a_factor_scales_them(self):
         points = random_sphere(900)
         np.testing.assert_allclose(lengths(points, bandwidth_factor=1.3), 1.3 * lengths(points), rtol=1e-9)

@@ -146,6 +146,12 @@ class TestMeasuring:
         across = rim.outward[exact[:, 1] > exact[:, 0] + 1.0, 0]
         np.testing.assert_allclose(np.abs(across[:, :2]).max(axis=1), 1.0, atol=0.05)
 
+    @pytest.mark.parametrize("side", [12, 16])
+    def test_distances_on_a_small_square_grid(self, side):
+        points = grid_points(np.arange(float(side)), np.arange(float(side)), [0.0])
+        rim, exact = flat_rim(points), side_distances(points, side - 1.0, side - 1.0)
+        np.testing.assert_allclose(rim.distance, exact, atol=0.1)
+
     @pytest.mark.parametrize("seed", range(3))
     def test_distances_and_curvature_on_a_random_disc(self, seed):
         points, exact = disc_random(2000, seed)
