@@ -15,7 +15,7 @@ from .errors import (
     TooFewPointsError,
     UnresolvedModesError,
 )
-from .filters import band, boost, chebyshev_filter, exponential, spectral_filter
+from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
 from .laplacian import LaplaceBeltrami, build_laplacian
 from .options import LaplacianOptions
 from .points import check_points
@@ -48,6 +48,7 @@ __all__ = [
     "estimate_normals",
     "exponential",
     "fair_points",
+    "fairing",
     "heat_kernel_signature",
     "mean_curvature",
     "signature_energies",

@@ -28,6 +28,23 @@ def exponential(time):
     return lambda eigenvalues: np.exp(-time * np.asarray(eigenvalues))
 
 
+def fairing(time, order=3):
+    """Return the response ``1 / (1 + (time * eigenvalue)^order)`` of an implicit step of fairing.
+
+    Parameters
+    ----------
+    time : float
+        [L^2], not negative. What has a wavelength of ``2 pi sqrt(time)`` is halved.
+    order : int
+        1 for the flow of heat, 2 or 3 for a sharper line between what stays and what goes.
+    """
+    if not 0.0 <= time < np.inf:
+        raise PointCloudError(f"The time of the fairing is {time!r}. Use a number that is not negative.")
+    if order not in (1, 2, 3):
+        raise PointCloudError(f"The order of the fairing is {order!r}. Use 1, 2 or 3.")
+    return lambda eigenvalues: 1.0 / (1.0 + (time * np.asarray(eigenvalues)) ** order)
+
+
 def band(low, high=np.inf, softness=0.1):
     """Return the response that keeps the eigenvalues from low to high and fades out on both sides.
 
