@@ -3,6 +3,7 @@
 from .areas import estimate_areas
 from .cloud import estimate_normals
 from .curvature import mean_curvature
+from .descriptors import heat_kernel_signature, signature_energies, signature_times, wave_kernel_signature
 from .errors import (
     AreaError,
     Cancelled,
@@ -14,9 +15,11 @@ from .errors import (
     TooFewPointsError,
     UnresolvedModesError,
 )
+from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
 from .laplacian import LaplaceBeltrami, build_laplacian
 from .options import LaplacianOptions
 from .points import check_points
+from .smoothing import displace_by_mode, fair_points, smooth_points
 from .spectrum import Spectrum
 from .stability import Stability, check_stability
 
@@ -34,10 +37,23 @@ __all__ = [
     "Stability",
     "TooFewPointsError",
     "UnresolvedModesError",
+    "band",
+    "boost",
     "build_laplacian",
+    "chebyshev_filter",
     "check_points",
     "check_stability",
+    "displace_by_mode",
     "estimate_areas",
     "estimate_normals",
+    "exponential",
+    "fair_points",
+    "fairing",
+    "heat_kernel_signature",
     "mean_curvature",
+    "signature_energies",
+    "signature_times",
+    "smooth_points",
+    "spectral_filter",
+    "wave_kernel_signature",
 ]

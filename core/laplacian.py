@@ -43,6 +43,10 @@ class LaplaceBeltrami:
         Points at a rim of the surface.
     near_rim : ndarray, (n,) bool
         Points whose kernel reaches beyond a rim.
+    rim_distance : ndarray, (n,)
+        Distance to the nearest rim along the surface [L]; infinite where there is none near.
+    rim_direction : ndarray, (n, 3)
+        Unit vector across that rim, out of the surface; zero where it is not known.
     component : ndarray, (n,) int
         Connected part of each point, the largest first; -1 for points that were left out.
     smoothing_lengths : ndarray, (n,)
@@ -66,6 +70,8 @@ class LaplaceBeltrami:
     gaussian_curvature: np.ndarray
     boundary: np.ndarray
     near_rim: np.ndarray
+    rim_distance: np.ndarray
+    rim_direction: np.ndarray
     component: np.ndarray
     smoothing_lengths: np.ndarray
     stiffness: sparse.csr_array
@@ -220,6 +226,8 @@ def build_laplacian(
         gaussian_curvature=scaled.hand_out(cloud.gaussian / scaled.scale**2, 0.0),
         boundary=scaled.hand_out(cloud.rim.at_rim, False),
         near_rim=scaled.hand_out(cloud.rim.distance[:, 0] < SUPPORT * pairs.lengths, False),
+        rim_distance=scaled.hand_out(cloud.rim.distance[:, 0] * scaled.scale, np.inf),
+        rim_direction=scaled.hand_out(cloud.rim.outward[:, 0], 0.0),
         component=scaled.hand_out(cloud.label, -1),
         smoothing_lengths=scaled.hand_out(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         stiffness=stiffness,

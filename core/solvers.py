@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 from scipy.sparse.linalg import splu
 
 from .errors import SolverError
 from .laplacian import build_laplacian
 
 NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that random points bear
+_STEPS = 5000  # of the conjugate gradients, at most
 
 
 def narrow_laplacian(laplacian, neighbors=NARROW):
@@ -66,3 +68,50 @@ def factorize(matrix):
             " connected part."
         ) from error
     return factors.solve
+
+
+def conjugate_gradients(multiply, right, tolerance, progress=None):
+    """Solve equations with a symmetric positive semi-definite product, each column on its own.
+
+    Parameters
+    ----------
+    multiply : callable
+        Of (m, k) arrays.
+    right : ndarray, (m, k)
+        In the range of the product.
+    tolerance : float
+        Of the residual, relative to the right-hand side.
+    progress : callable, optional
+        Called as ``progress("Solve", fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (m, k)
+
+    Raises
+    ------
+    SolverError
+        Not converged after 5,000 steps.
+    """
+    result = np.zeros_like(right)
+    residual = right.copy()
+    direction = residual.copy()
+    squared = np.einsum("ij,ij->j", residual, residual)
+    first, goal = squared.max(), tolerance**2 * squared
+    for step in range(_STEPS):
+        if np.all(squared <= goal):
+            return result
+        if progress is not None and step % 10 == 0:
+            done = np.log(max(squared.max() / first, 1e-300)) / (2.0 * np.log(tolerance))
+            progress("Solve", float(np.clip(done, 0.0, 1.0)))
+        product = multiply(direction)
+        energy = np.einsum("ij,ij->j", direction, product)
+        length = np.divide(squared, energy, out=np.zeros_like(squared), where=energy > 0.0)
+        result += length * direction
+        residual -= length * product
+        before, squared = squared, np.einsum("ij,ij->j", residual, residual)
+        direction = residual + np.divide(squared, before, out=np.zeros_like(squared), where=before > 0.0) * direction
+    raise SolverError(
+        f"The conjugate gradients on {len(right)} points did not reach {tolerance:g} in {_STEPS} steps. Use a shorter"
+        " time, or a wider tolerance."
+    )

@@ -52,6 +52,25 @@ def solve_spectrum(laplacian, stiffness, count, raw, progress=None):
     return Spectrum(values, vectors)
 
 
+def symmetric_form(laplacian, stiffness):
+    """Return a matrix with the eigenvalues of the negated operator whose eigenvectors are orthonormal.
+
+    Returns
+    -------
+    order : ndarray, (m,) int
+        The points that are not left out, neighbours near in memory, which makes the products faster.
+    root : ndarray, (m,)
+        ``root * y`` is the function on these points that the vector y stands for.
+    matrix : csr_array, (m, m)
+        Symmetric positive semi-definite [1 / L^2].
+    """
+    known = np.flatnonzero(laplacian.component >= 0)
+    order = known[cKDTree(laplacian.points[known]).indices]
+    root = 1.0 / np.sqrt(laplacian.areas[order])
+    scale = sparse.diags_array(root, format="csr")
+    return order, root, (scale @ stiffness[order][:, order] @ scale).tocsr()
+
+
 def lowest_eigenpairs(laplacian, stiffness, count, progress):
     """Solve ``K phi = lambda areas phi`` for the lowest pairs by Lanczos steps on a Chebyshev polynomial.
 
@@ -67,11 +86,7 @@ def lowest_eigenpairs(laplacian, stiffness, count, progress):
     vectors : ndarray, (n, count)
         Orthonormal for the areas.
     """
-    known = np.flatnonzero(laplacian.component >= 0)  # points left out have the value zero in every mode
-    order = known[cKDTree(laplacian.points[known]).indices]  # neighbours near in memory make the products faster
-    root = 1.0 / np.sqrt(laplacian.areas[order])
-    scale = sparse.diags_array(root, format="csr")
-    matrix = (scale @ stiffness[order][:, order] @ scale).tocsr()
+    order, root, matrix = symmetric_form(laplacian, stiffness)
     n = len(order)
     random = np.random.default_rng(0)
     products = 0

@@ -1,0 +1,332 @@
+import numpy as np
+import pytest
+from scipy.special import sph_harm_y
+
+import core
+from benchmarks.samplings import disc_random, fibonacci_sphere, hemisphere_random, open_cylinder, square_grid
+from core.smoothing import rim_places
+
+BUMP = 0.1
+
+
+def bumps(directions):
+    """Height of the bumpy shape over the unit sphere: a tenth of Y_6^3, of unit norm."""
+    z = np.clip(directions[:, 2], -1.0, 1.0)
+    around = np.arctan2(directions[:, 1], directions[:, 0])
+    return BUMP * np.sqrt(2.0) * sph_harm_y(6, 3, np.arccos(z), around).real
+
+
+def noisy(count, bumpy, level=0.03):
+    """Points over the Fibonacci sphere with noise of the radius, and the noise."""
+    directions = fibonacci_sphere(count)
+    noise = level * np.random.default_rng(0).standard_normal(count)
+    return directions * (1.0 + bumps(directions) * bumpy + noise)[:, None], noise
+
+
+def radial(points, bumpy):
+    """Radial distances from the shape, and the height of the bumps as a share of theirs."""
+    radius = np.linalg.norm(points, axis=1)
+    height = bumps(points / radius[:, None])
+    return radius - 1.0 - bumpy * height, (radius - radius.mean()) @ height / (height @ height)
+
+
+def rms(values):
+    return np.sqrt(np.mean(np.asarray(values) ** 2))
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    return {bumpy: (core.build_laplacian(noisy(4000, bumpy)[0]), noisy(4000, bumpy)[1]) for bumpy in (False, True)}
+
+
+@pytest.fixture(scope="module")
+def ellipsoid():
+    return core.build_laplacian(fibonacci_sphere(1500) * [1.0, 0.8, 0.6])
+
+
+@pytest.fixture(scope="module")
+def islands():
+    points = np.concatenate([fibonacci_sphere(900), 0.5 * fibonacci_sphere(600) + [5.0, 0.0, 0.0]])
+    lone = [[0.0, 90.0, 0.0], [0.0, 90.0, 1.0]]
+    return core.build_laplacian(np.concatenate([points, lone]))
+
+
+SMOOTHERS = {
+    "modes": lambda laplacian, **settings: core.smooth_points(laplacian, 100, **settings),
+    "fairing": core.fair_points,
+    "band": lambda laplacian, **settings: core.smooth_points(laplacian, core.band(0.0, 110.0), **settings),
+}
+
+
+@pytest.mark.parametrize("bumpy", [False, True], ids=["sphere", "bumpy sphere"])
+@pytest.mark.parametrize("name", SMOOTHERS)
+def test_noise_falls_and_the_shape_stays(clouds, name, bumpy):
+    laplacian, noise = clouds[bumpy]
+    error, height = radial(SMOOTHERS[name](laplacian), bumpy)
+    assert rms(noise) > 4.0 * rms(error)
+    assert abs(error.mean()) < 4e-3
+    if bumpy:
+        assert height > 0.88
+
+
+def test_area_of_the_result(clouds):
+    laplacian, _ = clouds[False]
+    smooth = core.smooth_points(laplacian, 100)
+    assert core.build_laplacian(smooth).areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
+
+
+@pytest.mark.parametrize("keep", ["area", "volume"])
+def test_size_is_kept_where_the_filter_shrinks(clouds, ellipsoid, keep):
+    shrinking = core.exponential(0.1)
+    for laplacian, tolerance in ((ellipsoid, 4e-3), (clouds[False][0], 1e-2)):
+        assert rms(core.smooth_points(laplacian, shrinking)) < 0.9 * rms(laplacian.points)
+        kept = core.build_laplacian(core.smooth_points(laplacian, shrinking, keep=keep))
+        sizes = [
+            operator.areas.sum()
+            if keep == "area"
+            else np.sum(operator.areas * np.einsum("ic,ic->i", operator.points, operator.normals)) / 3.0
+            for operator in (laplacian, kept)
+        ]
+        assert sizes[1] == pytest.approx(sizes[0], rel=tolerance)
+
+
+def test_kept_volume_of_the_sphere_is_its_own():
+    laplacian = core.build_laplacian(fibonacci_sphere(1500))
+    for keep in ("area", "volume"):
+        radius = np.linalg.norm(core.smooth_points(laplacian, core.exponential(0.2), keep=keep), axis=1)
+        np.testing.assert_allclose(radius, 1.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("keep", ["area", "volume"])
+def test_size_is_kept_under_a_mask(ellipsoid, keep):
+    mask = np.clip(ellipsoid.points[:, 0] + 0.3, 0.0, 1.0)
+    moved = core.smooth_points(ellipsoid, core.exponential(0.05), mask=mask, keep=keep)
+    np.testing.assert_array_equal(moved[mask == 0.0], ellipsoid.points[mask == 0.0])
+    assert np.abs(moved - ellipsoid.points).max() > 1e-3
+    kept = core.build_laplacian(moved)
+    sizes = [
+        operator.areas.sum()
+        if keep == "area"
+        else np.sum(operator.areas * np.einsum("ic,ic->i", operator.points, operator.normals)) / 3.0
+        for operator in (ellipsoid, kept)
+    ]
+    assert sizes[1] == pytest.approx(sizes[0], rel=3e-3)
+
+
+def test_exponential_shrinks_the_sphere_by_its_factor():
+    laplacian = core.build_laplacian(fibonacci_sphere(1500))
+    found = core.smooth_points(laplacian, core.exponential(0.1))
+    np.testing.assert_allclose(found, np.exp(-0.2) * laplacian.points, atol=2e-3)
+    found = core.fair_points(laplacian, 0.1, order=1)
+    np.testing.assert_allclose(found, laplacian.points / 1.2, atol=2e-3)
+    found = core.fair_points(laplacian, 0.1, order=2)
+    np.testing.assert_allclose(found, laplacian.points / 1.04, atol=2e-3)
+
+
+def test_few_modes_of_a_sphere_give_the_sphere():
+    laplacian = core.build_laplacian(fibonacci_sphere(1500) + [3.0, 0.0, -2.0])
+    np.testing.assert_allclose(core.smooth_points(laplacian, 4), laplacian.points, atol=5e-3)
+
+
+def test_details_are_boosted(clouds):
+    laplacian = core.build_laplacian(noisy(4000, True, 0.0)[0])
+    boosted = core.smooth_points(laplacian, core.boost(1.5, 15.0))
+    error, height = radial(boosted, False)
+    assert 1.35 < height < 1.6
+    assert abs(error.mean()) < 1e-2
+    spectrum = laplacian.eigenpairs(120)
+    np.testing.assert_allclose(core.smooth_points(laplacian, core.boost(1.5, 15.0), spectrum), boosted, atol=1e-2)
+
+
+def test_spectrum_given_or_computed_is_the_same(ellipsoid):
+    spectrum = ellipsoid.eigenpairs(40)
+    np.testing.assert_allclose(
+        core.smooth_points(ellipsoid, 20, spectrum), core.smooth_points(ellipsoid, 20), atol=1e-8
+    )
+
+
+def test_modes_beyond_those_resolved_serve_a_reconstruction(ellipsoid):
+    with pytest.raises(core.UnresolvedModesError):
+        ellipsoid.eigenpairs(150)
+    errors = [rms(core.smooth_points(ellipsoid, count) - ellipsoid.points) for count in (10, 50, 150)]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 2e-3
+
+
+def test_strength_and_mask_blend(ellipsoid):
+    full = core.smooth_points(ellipsoid, 10) - ellipsoid.points
+    mask = np.linspace(0.0, 1.0, 1500)
+    for strength in (0.5, 2.0, -1.0):
+        moved = core.smooth_points(ellipsoid, 10, strength=strength, mask=mask) - ellipsoid.points
+        np.testing.assert_allclose(moved, strength * mask[:, None] * full, atol=1e-9)
+    faired = core.fair_points(ellipsoid, 0.01, mask=mask > 0.5) - ellipsoid.points
+    assert np.all(faired[mask <= 0.5] == 0.0)
+    assert np.all(np.any(faired[mask > 0.5] != 0.0, axis=1))
+
+
+@pytest.mark.parametrize("smoother", [core.fair_points, lambda laplacian: core.smooth_points(laplacian, 9)])
+def test_result_moves_turns_and_grows_with_the_points(smoother):
+    points = noisy(1200, True)[0]
+    found = smoother(core.build_laplacian(points))
+    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+    other = smoother(core.build_laplacian(20.0 * points @ turn + [4.0, 5.0, 6.0]))
+    np.testing.assert_allclose(other, 20.0 * found @ turn + [4.0, 5.0, 6.0], atol=2e-3)
+
+
+def test_islands_keep_their_places_and_lone_points_stay(islands):
+    part = islands.component
+    assert part.max() == 1
+    for found in (
+        core.smooth_points(islands, core.exponential(9.0)),
+        core.smooth_points(islands, 8),
+        core.smooth_points(islands, core.exponential(0.1), keep="area"),
+        core.fair_points(islands, keep="volume"),
+    ):
+        assert np.isfinite(found).all()
+        np.testing.assert_array_equal(found[part < 0], islands.points[part < 0])
+        for number, center in enumerate(([0.0, 0.0, 0.0], [5.0, 0.0, 0.0])):
+            np.testing.assert_allclose(found[part == number].mean(axis=0), center, atol=5e-3)
+
+
+def test_each_island_keeps_its_own_size(islands):
+    found = core.smooth_points(islands, core.exponential(0.05), keep="volume")
+    for number, radius, center in ((0, 1.0, [0.0, 0.0, 0.0]), (1, 0.5, [5.0, 0.0, 0.0])):
+        inside = islands.component == number
+        np.testing.assert_allclose(np.linalg.norm(found[inside] - center, axis=1), radius, rtol=4e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_constants_alone_are_no_shape(islands, count):
+    with pytest.raises(core.PointCloudError, match=r"2 connected part.* at least 5"):
+        core.smooth_points(islands, count)
+
+
+class TestRim:
+    def test_places_on_the_rim_of_a_disc(self):
+        points, distance = disc_random(2000)
+        laplacian = core.build_laplacian(points)
+        places = rim_places(laplacian)
+        near = laplacian.near_rim
+        moved = np.linalg.norm(places - points, axis=1)
+        np.testing.assert_allclose(moved[near], distance[near], atol=0.03)
+        assert np.all(moved[~near] == 0.0)
+
+    @pytest.mark.parametrize("response", [core.exponential(0.05), core.fairing(0.01), 30])
+    def test_a_flat_square_stays(self, response):
+        laplacian = core.build_laplacian(square_grid(30))
+        moved = core.smooth_points(laplacian, response, fixed_rim=True)
+        np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
+        corner = np.all(np.abs(laplacian.points[:, :2] - 0.5) > 0.2, axis=1)
+        np.testing.assert_allclose(moved[~corner], laplacian.points[~corner], atol=2e-3)
+        np.testing.assert_allclose(moved[corner], laplacian.points[corner], atol=2e-2)
+
+    def test_a_flat_disc_of_random_points_stays(self):
+        laplacian = core.build_laplacian(disc_random(2000)[0])
+        moved = core.fair_points(laplacian, fixed_rim=True) - laplacian.points
+        assert np.linalg.norm(moved, axis=1).max() < 0.04  # the spacing
+        assert rms(np.linalg.norm(moved, axis=1)) < 8e-3
+
+    def test_noise_falls_on_an_open_cylinder_that_keeps_its_rims(self):
+        points = open_cylinder()[::2]
+        radial = points * [0.5, 0.5, 0.0]
+        noise = 0.02 * np.random.default_rng(0).standard_normal(len(points))
+        noise[np.abs(points[:, 2]) > 0.99] = 0.0
+        laplacian = core.build_laplacian(points + noise[:, None] * radial)
+        moved = core.fair_points(laplacian, fixed_rim=True)
+        rim = np.abs(points[:, 2]) > 0.99
+        np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
+        assert np.mean(laplacian.boundary[rim]) > 0.95
+        assert rms(np.linalg.norm(moved[:, :2], axis=1) - 2.0) < rms(noise) / 3.0
+        free = core.fair_points(laplacian)
+        assert np.abs(free[rim, 2]).mean() < np.abs(moved[rim, 2]).mean()
+
+    def test_parts_without_a_rim_are_not_in_the_way(self):
+        ball = 0.5 * fibonacci_sphere(600) + [0.0, 0.0, 4.0]
+        laplacian = core.build_laplacian(np.concatenate([hemisphere_random(1500), ball]))
+        assert laplacian.boundary.any()
+        moved = core.smooth_points(laplacian, core.fairing(1e-3), fixed_rim=True)
+        assert np.isfinite(moved).all()
+        np.testing.assert_allclose(moved[1500:], ball, atol=5e-3)
+
+    def test_an_open_surface_has_no_volume(self):
+        laplacian = core.build_laplacian(square_grid(20))
+        with pytest.raises(core.PointCloudError, match="enclose no volume"):
+            core.fair_points(laplacian, keep="volume")
+        with pytest.raises(core.PointCloudError, match="keep neither"):
+            core.fair_points(laplacian, keep="area", fixed_rim=True)
+
+
+def test_normals_that_point_inwards_enclose_no_volume(ellipsoid):
+    laplacian = core.build_laplacian(ellipsoid.points, -ellipsoid.normals)
+    with pytest.raises(core.PointCloudError, match="point outwards"):
+        core.fair_points(laplacian, keep="volume")
+
+
+def test_a_size_that_is_lost_cannot_be_kept(ellipsoid):
+    with pytest.raises(core.SolverError, match="lose too much"):
+        core.smooth_points(ellipsoid, core.exponential(5.0), keep="area")
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"strength": np.nan}, "strength"),
+        ({"mask": np.zeros(1500)}, "zero at all 1500"),
+        ({"mask": np.full(1500, 2.0)}, "0 to 1"),
+        ({"mask": np.full(1500, np.nan)}, "not finite"),
+        ({"mask": [0, 1, 2]}, "1500 points"),
+        ({"keep": "length"}, "Choose one of"),
+    ],
+)
+def test_bad_settings(ellipsoid, settings, words):
+    for smoother in (core.fair_points, lambda *given, **named: core.smooth_points(*given, 10, **named)):
+        with pytest.raises(core.PointCloudError, match=words):
+            smoother(ellipsoid, **settings)
+
+
+@pytest.mark.parametrize("settings", [{"time": -1.0}, {"time": np.nan}, {"time": 1.0, "order": 4}])
+def test_bad_fairing(ellipsoid, settings):
+    with pytest.raises(core.PointCloudError, match="fairing"):
+        core.fair_points(ellipsoid, **settings)
+
+
+class TestMode:
+    def test_displacement_along_the_normals(self, ellipsoid):
+        mode = ellipsoid.eigenpairs(5).eigenvectors[:, 4]
+        full = core.displace_by_mode(ellipsoid, mode, 0.2) - ellipsoid.points
+        np.testing.assert_allclose(np.einsum("ic,ic->i", full, ellipsoid.normals), 0.2 * mode / np.abs(mode).max())
+        assert np.linalg.norm(full, axis=1).max() == pytest.approx(0.2)
+        for phase in (0.0, 1.0, np.pi):
+            moved = core.displace_by_mode(ellipsoid, mode, 0.2, phase) - ellipsoid.points
+            np.testing.assert_allclose(moved, np.cos(phase) * full, atol=1e-12)
+
+    def test_default_amplitude_follows_the_size(self, ellipsoid):
+        mode = ellipsoid.points[:, 0]
+        moved = core.displace_by_mode(ellipsoid, mode) - ellipsoid.points
+        assert np.linalg.norm(moved, axis=1).max() == pytest.approx(0.1 * rms(np.linalg.norm(ellipsoid.points, axis=1)))
+
+    @pytest.mark.parametrize(
+        ("mode", "amplitude", "words"),
+        [
+            (np.zeros(1500), 1.0, "zero at all 1500"),
+            (np.ones(3), 1.0, "1500 points"),
+            (np.ones((1500, 2)), 1.0, "columns"),
+            (np.full(1500, np.inf), 1.0, "not finite"),
+            (np.ones(1500), np.nan, "finite numbers"),
+        ],
+    )
+    def test_bad_modes(self, ellipsoid, mode, amplitude, words):
+        with pytest.raises(core.PointCloudError, match=words):
+            core.displace_by_mode(ellipsoid, mode, amplitude)
+
+
+def test_progress_can_cancel(ellipsoid):
+    def cancel(stage, fraction):
+        raise core.Cancelled
+
+    for work in (
+        lambda: core.smooth_points(ellipsoid, 10, progress=cancel),
+        lambda: core.fair_points(ellipsoid, 0.05, progress=cancel),
+    ):
+        with pytest.raises(core.Cancelled):
+            work()
