@@ -17,6 +17,8 @@ from .errors import (
 from .laplacian import LaplaceBeltrami, build_laplacian
 from .options import LaplacianOptions
 from .points import check_points
+from .segmentation import modes_needed, nodal_domains, segment
+from .selection import grow
 from .spectrum import Spectrum
 from .stability import Stability, check_stability
 
@@ -39,5 +41,9 @@ __all__ = [
     "check_stability",
     "estimate_areas",
     "estimate_normals",
+    "grow",
     "mean_curvature",
+    "modes_needed",
+    "nodal_domains",
+    "segment",
 ]
