@@ -10,6 +10,9 @@ from .graph import near_graph
 _NEIGHBORS = 8  # nearest points on the same sheet that a domain may continue to
 _MODES = 3  # modes for each part: with fewer, limbs are missed; with more, small features get parts
 _STEPS = 300  # of k-means at most; a few dozen are needed
+_ROUGH = 1e-3  # accuracy at which the starts of k-means are compared
+_LEAST = 0.03  # a cluster of a smaller share of the mean area is no part, but a spike or an outlier
+_ROUNDS = 4  # of leaving such clusters out
 
 
 def nodal_domains(values, laplacian, threshold=0.02, smallest=5):
@@ -130,7 +133,7 @@ def segment(laplacian, parts, spectrum=None, progress=None):
         label = np.concatenate([[0], np.cumsum(share)])
         for number in np.flatnonzero(share > 1):
             own = np.flatnonzero(island == number)
-            part[own] = label[number] + _k_means(signature[own], areas[own], share[number])
+            part[own] = label[number] + _cluster(signature[own], areas[own], share[number])
         for number in np.flatnonzero(share == 1):
             part[island == number] = label[number]
     part = _join_nearest(graph.lengths, _main_pieces(graph.lengths, part, areas))
@@ -191,31 +194,78 @@ def _areas_of_places(laplacian, graph):
     return np.bincount(graph.place[graph.place >= 0], laplacian.areas[graph.place >= 0], minlength=len(graph.first))
 
 
-def _k_means(signature, weight, count):
-    """Cluster points, (m, modes), by Lloyd's steps from points far from each other; return labels, (m,)."""
-    far = _squares(signature, weight @ signature[:, :] / weight.sum())
-    chosen = [int(np.argmax(far))]
-    far = _squares(signature, signature[chosen[0]])
-    while len(chosen) < count:
-        chosen.append(int(np.argmax(far)))
-        far = np.minimum(far, _squares(signature, signature[chosen[-1]]))
-    centers, label = signature[chosen], None
-    for _ in range(_STEPS):
-        before = label
-        label = (np.sum(centers**2, axis=1) - 2.0 * (signature @ centers.T)).argmin(axis=1)
-        if before is not None and np.array_equal(label, before):
+def _cluster(signature, weight, count):
+    """Cluster points, (m, modes), and return labels, (m,); what is far too small for a part is left to the others."""
+    for _ in range(_ROUNDS):
+        centers = _k_means(signature, weight, count)
+        label = _nearest(signature, centers)
+        size = np.bincount(label, weight, minlength=count)
+        small = size < _LEAST * size.mean()
+        if not small.any():
             break
-        share = sparse.csr_array((weight, (label, np.arange(len(label)))), shape=(count, len(label)))
-        size = share.sum(axis=1)
-        filled = size > 0.0
-        centers[filled] = (share @ signature)[filled] / size[filled, None]
-        if not filled.all():  # a cluster that lost all of its points starts again at the point farthest from its center
-            centers[np.flatnonzero(~filled)[0]] = signature[np.argmax(np.sum((signature - centers[label]) ** 2, axis=1))]
+        weight = np.where(small[label], 0.0, weight)
     return label
 
 
-def _squares(signature, center):
-    return np.sum((signature - center) ** 2, axis=1)
+def _k_means(signature, weight, count):
+    """Return the centers, (count, modes), of the best clusters that Lloyd's steps find from three starts.
+
+    All starts choose among points far from each other: the farthest ones; the same around the middle of all; and those
+    that lower the sum of squares the most.
+    """
+    known = weight > 0.0
+    points, weight = signature[known], weight[known]
+    middle = weight @ points / weight.sum()
+    far = points[_farthest(points, middle, 2 * count + 8)]
+    starts = [far[:count], np.vstack([middle, far[: count - 1]]), _best_seeds(points, weight, far, count)]
+    found = min((_lloyd(points, weight, start, _ROUGH) for start in starts), key=lambda result: result[1])
+    return _lloyd(points, weight, found[0], 0.0)[0]
+
+
+def _farthest(points, middle, count):
+    """Return the rows of the point farthest from the middle, then again and again of the one farthest from those."""
+    rows = [int(np.argmax(_squares(points, middle)))]
+    away = np.full(len(points), np.inf)
+    while len(rows) < count:
+        away = np.minimum(away, _squares(points, points[rows[-1]]))
+        rows.append(int(np.argmax(away)))
+    return rows
+
+
+def _best_seeds(points, weight, candidates, count):
+    """Choose seeds from the candidates, one after the other, that leave the least sum of squares."""
+    squares = np.stack([_squares(points, candidate) for candidate in candidates])
+    left, rows = np.full(len(points), np.inf), []
+    for _ in range(count):
+        rows.append(int(np.argmin(np.minimum(left, squares) @ weight)))
+        left = np.minimum(left, squares[rows[-1]])
+    return candidates[rows]
+
+
+def _lloyd(points, weight, centers, rtol):
+    """Move centers to the means of their clusters until the sum of squares falls by less than rtol of itself."""
+    centers, total = centers.copy(), np.inf
+    for _ in range(_STEPS):
+        label = _nearest(points, centers)
+        share = sparse.csr_array((weight, (label, np.arange(len(label)))), shape=(len(centers), len(label)))
+        size = share.sum(axis=1)
+        filled = size > 0.0
+        centers[filled] = (share @ points)[filled] / size[filled, None]
+        squares = np.sum((points - centers[label]) ** 2, axis=1)
+        before, total = total, weight @ squares
+        if not filled.all():  # a cluster that lost its points starts again where the others fit worst
+            centers[np.flatnonzero(~filled)[0]] = points[np.argmax(squares)]
+        elif before - total <= rtol * total:
+            break
+    return centers, total
+
+
+def _nearest(points, centers):
+    return (np.sum(centers**2, axis=1) - 2.0 * (points @ centers.T)).argmin(axis=1)
+
+
+def _squares(points, center):
+    return np.sum((points - center) ** 2, axis=1)
 
 
 def _main_pieces(lengths, part, areas):
