@@ -19,6 +19,8 @@ from .filters import band, boost, chebyshev_filter, exponential, fairing, spectr
 from .laplacian import LaplaceBeltrami, build_laplacian
 from .options import LaplacianOptions
 from .points import check_points
+from .segmentation import modes_needed, nodal_domains, segment
+from .selection import grow
 from .smoothing import displace_by_mode, fair_points, smooth_points
 from .spectrum import Spectrum
 from .stability import Stability, check_stability
@@ -49,8 +51,12 @@ __all__ = [
     "exponential",
     "fair_points",
     "fairing",
+    "grow",
     "heat_kernel_signature",
     "mean_curvature",
+    "modes_needed",
+    "nodal_domains",
+    "segment",
     "signature_energies",
     "signature_times",
     "smooth_points",

@@ -1,0 +1,188 @@
+"""Nodal domains and segments against the paper's Figures 10, 11 and 16: ``python -m benchmarks.segmentation``."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse.csgraph import connected_components
+
+import core
+
+from .samplings import fibonacci_sphere, sausage
+from .speed import SCANS, read_ply
+from .targets import HEADER, Goal, judge
+
+SIDES = 1.2, 1.0  # of the rectangle, so that the modes that the paper shows are simple
+PARTS = range(2, 13)
+
+
+def parabolic_cylinder(bend, side=21):
+    """Return ``(u, bend u^2, v)`` over a rectangle of sides 1.2 and 1, even along the parabola's arc, (side^2, 3).
+
+    All bends are isometric to each other; zero is the plane. (v runs along y, the height is z.)
+    """
+    along, across = (part.ravel() for part in np.meshgrid(*(np.linspace(-0.5, 0.5, side) * s for s in SIDES)))
+    u = along.copy()
+    if bend:
+        slope = 2.0 * bend
+        for _ in range(30):  # Newton's steps for arc(u) = along
+            t = slope * u
+            root = np.sqrt(1.0 + t * t)
+            u -= (0.5 * (t * root + np.arcsinh(t)) / slope - along) / root
+    return np.column_stack([u, across, bend * u**2])
+
+
+def trimmed_star(count=5000, arms=6, seed=0):
+    """Return random points on a closed star with sharp edges: a thick star polygon whose arms end in straight cuts.
+
+    Parameters
+    ----------
+    count : int
+    arms : int
+    seed : int
+
+    Returns
+    -------
+    ndarray, (count, 3)
+        Evenly by area; the tips are 1 from the axis, the thickness is 0.3.
+    """
+    inner, thickness, trim = 0.45, 0.3, 0.12
+    # Corners of one arm from one valley to the next: in the middle the cut, of half width ``trim``.
+    angle = np.pi / arms
+    turns = 2.0 * np.pi * np.arange(arms) / arms
+    arm = np.array([[inner * np.cos(angle), -inner * np.sin(angle)], [1.0, -trim], [1.0, trim]])
+    rotation = np.stack([np.cos(turns), -np.sin(turns), np.sin(turns), np.cos(turns)], axis=1).reshape(-1, 2, 2)
+    outline = np.concatenate([arm @ turn.T for turn in rotation])
+    after = np.roll(outline, -1, axis=0)
+    length = np.linalg.norm(after - outline, axis=1)
+    face = 0.5 * np.abs(outline[:, 0] * after[:, 1] - outline[:, 1] * after[:, 0])  # triangles from the axis
+    weights = np.concatenate([face, face, length * thickness])
+    generator = np.random.default_rng(seed)
+    kind = generator.choice(len(weights), count, p=weights / weights.sum())
+    edge = kind % len(length)
+    s, t = generator.random((2, count))
+    rim = (outline[edge].T * (1.0 - s) + after[edge].T * s).T
+    flat = kind < 2 * len(length)
+    height = np.where(flat, np.where(kind < len(length), 0.5, -0.5), t - 0.5) * thickness
+    return np.column_stack([np.where(flat, np.sqrt(t), 1.0)[:, None] * rim, height])
+
+
+def agreement(labels, others):
+    """Share of points with the same label, after the numbers of the labels are matched as well as they can be."""
+    table = np.zeros((labels.max() + 1, others.max() + 1))
+    np.add.at(table, (labels, others), 1.0)
+    return table[linear_sum_assignment(table, maximize=True)].sum() / len(labels)
+
+
+def isometry():
+    """Figure 10: nodal domains on a plane and on two parabolic cylinders that are isometric to it."""
+    plane = core.build_laplacian(parabolic_cylinder(0.0))
+    modes = plane.eigenpairs(11).eigenvectors
+    for bend in (0.5, 1.0):
+        bent = core.build_laplacian(parabolic_cylinder(bend))
+        spectrum = bent.eigenpairs(11)
+        for mode in (2, 4, 10):
+            flat = modes[:, mode - 1]
+            sure = np.abs(flat) > 0.02 * np.abs(flat).max()
+            domains = [core.nodal_domains(flat, plane), core.nodal_domains(spectrum.eigenvectors[:, mode - 1], bent)]
+            figures = [
+                ("labels that agree, above 2 %", agreement(*(label[sure] for label in domains)), 0.97),
+                ("labels that agree, all points", agreement(*domains), None),
+            ]
+            for figure, value, bound in figures:
+                goal = Goal(figure, bound, "{:.1%}", least=True)
+                yield goal.row(f"Figure 10, mode {mode}, a = {bend:g}, {domains[0].max() + 1} domains", value)
+
+
+def noise():
+    """Figure 11: nodal domains of mode 6 on a trimmed star, with noise and without."""
+    for arms in (6, 5):
+        points = trimmed_star(arms=arms)
+        clean = core.build_laplacian(points)
+        spectrum = clean.eigenpairs(8)
+        domains = core.nodal_domains(spectrum.eigenvectors[:, 5], clean)
+        spacing = np.sqrt(clean.areas.sum() / len(points))
+        around = np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))
+        diagonal = np.linalg.norm(np.ptp(points, axis=0))
+        for name, size in (("spacing", spacing), ("rms radius", around), ("diagonal", diagonal)):
+
+            def measure(size=size, points=points, spacing=spacing, domains=domains):
+                shares = []
+                for seed in range(3):
+                    shift = 0.03 * size * np.random.default_rng(seed).standard_normal(points.shape)
+                    rough = core.build_laplacian(points + shift)
+                    mode = rough.eigenpairs(8).eigenvectors[:, 5]
+                    shares.append(agreement(domains, core.nodal_domains(mode, rough)))
+                yield np.mean(shares)
+                yield 0.03 * size / spacing
+
+            case = f"Figure 11, star of {arms} arms, {domains.max() + 1} domains, noise of 3 % of the {name}"
+            goals = [Goal("labels that agree", 0.95, "{:.1%}", least=True), Goal("noise in spacings", form="{:.2f}")]
+            yield from judge(case, goals, measure())
+
+
+def sausages():
+    """Figure 16: the second mode, the first that is not constant, divides a bent sausage in the middle."""
+
+    def measure(bent):
+        points, along = sausage(bent=bent)
+        laplacian = core.build_laplacian(points)
+        domains = core.nodal_domains(laplacian.eigenpairs(2).eigenvectors[:, 1], laplacian)
+        yield domains.max() + 1
+        middle = 0.5 * (along.min() + along.max())
+        yield agreement(domains, (along > middle).astype(int))
+
+    for bent in (False, True):
+        goals = [Goal("domains", form="{:d}"), Goal("labels that agree with halves", 0.97, "{:.1%}", least=True)]
+        yield from judge(f"Figure 16, sausage, {'bent' if bent else 'straight'}", goals, measure(bent))
+
+
+def connected(labels, laplacian):
+    """Count the labels that hang together through the pairs of the stiffness, or lack only what it does not couple."""
+    lone = 0
+    for label in range(labels.max() + 1):
+        own = np.flatnonzero(labels == label)
+        piece = connected_components(laplacian.stiffness[own][:, own], directed=False)[1]
+        lone += len(np.unique(piece)) - 1
+    return lone
+
+
+def scans():
+    """Segments of scans: all parts connected, and the time."""
+    paths = sorted(Path(SCANS).glob("*.ply")) if SCANS else []
+    if not paths:
+        yield ["scans", "segments", "left out: MESHFREE_SCANS names no folder with scans", "", ""]
+    for path in paths:
+        laplacian = core.build_laplacian(read_ply(path))
+        began = time.perf_counter()
+        spectrum = laplacian.eigenpairs(core.modes_needed(laplacian, max(PARTS)))
+        yield Goal("seconds for its modes", form="{:.1f}").row(f"scan, {path.stem}", time.perf_counter() - began)
+        wrong, cut, seconds = 0, 0, []
+        whole = connected(laplacian.component, laplacian)
+        for parts in PARTS:
+            began = time.perf_counter()
+            labels = core.segment(laplacian, parts, spectrum)
+            seconds.append(time.perf_counter() - began)
+            wrong += len(np.unique(labels)) != parts or labels.min() < 0
+            cut += connected(labels, laplacian) - whole
+        yield Goal("wrong numbers of parts, 2 to 12", 0, "{:d}").row(f"scan, {path.stem}", int(wrong))
+        yield Goal("pieces cut off, 2 to 12 parts", 0, "{:d}").row(f"scan, {path.stem}", int(cut))
+        yield Goal("seconds, slowest", form="{:.1f}").row(f"scan, {path.stem}", max(seconds))
+
+
+def paths():
+    """Distances that `grow` reaches: the area of a cap on the unit sphere against 2 pi (1 - cos d)."""
+    points = fibonacci_sphere(8000)
+    laplacian = core.build_laplacian(points)
+    for distance in (0.3, 1.0, 2.0):
+        reached = np.arccos(np.clip(points @ points[0], -1.0, 1.0))[core.grow(laplacian, [0], distance)].max()
+        yield Goal("reach / distance - 1", 0.05, "{:.1%}").row(f"grow by {distance:g} on a sphere", reached / distance - 1)
+
+
+if __name__ == "__main__":
+    for line in (HEADER, ["---"] * len(HEADER)):
+        print("| " + " | ".join(line) + " |")
+    for group in (isometry, noise, sausages, paths, scans):
+        for row in group():
+            print("| " + " | ".join(row) + " |", flush=True)

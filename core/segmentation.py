@@ -1,0 +1,327 @@
+"""Divide a surface into parts: nodal domains of a mode, and clusters of points in the spectral embedding."""
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from .errors import InvalidPointsError, IslandError, PointCloudError, TooFewPointsError, UnresolvedModesError
+from .graph import near_graph
+
+_NEIGHBORS = 8  # nearest points on the same sheet that a domain may continue to
+_MODES = 3  # modes for each part: with fewer, limbs are missed; with more, small features get parts
+_STEPS = 300  # of k-means at most; a few dozen are needed
+_ROUGH = 1e-3  # accuracy at which the starts of k-means are compared
+_LEAST = 0.03  # a cluster of a smaller share of the mean area is no part, but a spike or an outlier
+_ROUNDS = 4  # of leaving such clusters out
+
+
+def nodal_domains(values, laplacian, threshold=0.02, smallest=5):
+    """Divide the points into connected sets on which a function keeps its sign.
+
+    Points hang together through their nearest neighbours on the same sheet, so that two domains of one sign do not join
+    through a narrow one of the other sign between them. Where the function is near zero its sign is not trusted: such
+    points, and specks of a few points, go to the nearest domain of their sign, or else to the nearest one.
+
+    Parameters
+    ----------
+    values : array_like, (n,)
+        A function on the points, such as a column of ``Spectrum.eigenvectors``.
+    laplacian : LaplaceBeltrami
+        Of n points.
+    threshold : float
+        Share of the largest size of the values below which a sign is not trusted.
+    smallest : int
+        Points of the smallest domain; smaller ones are specks.
+
+    Returns
+    -------
+    ndarray, (n,) int
+        Domain of each point: 0 for the one of most points, and so on; -1 for points left out of the operator. Of equally
+        large domains the one with the larger mean value comes first. Where the function is near zero on a whole
+        connected part, that is one domain.
+
+    Raises
+    ------
+    InvalidPointsError
+        Values of another length than the points, or not finite.
+    PointCloudError
+        A threshold outside of [0, 1), or a smallest size below 1.
+
+    References
+    ----------
+    Figures 10, 11 and 16 of the paper. Counted as there, from 1, mode k is column k - 1; mode 1 is constant.
+    """
+    n = len(laplacian.points)
+    values = _check_values(values, n)
+    if not 0.0 <= threshold < 1.0:
+        raise PointCloudError(f"The threshold of nodal domains is {threshold!r}. Use a number from 0 to below 1.")
+    if not smallest >= 1:
+        raise PointCloudError(f"The smallest nodal domain is {smallest!r} points. Use a number of at least 1.")
+    graph = near_graph(laplacian, _NEIGHBORS)
+    value, part = values[graph.first], laplacian.component[graph.first]
+    positive = value > 0.0
+    domain = _pieces(graph.lengths, np.where(np.abs(value) > threshold * np.abs(value).max(), positive, -1))
+    domain[np.bincount(domain + 1)[domain + 1] < smallest] = -1
+    # A connected part where no domain is left is one.
+    empty = np.bincount(part, domain >= 0) == 0
+    domain = np.where(empty[part], domain.max() + 1 + part, domain)
+    domain = _join_nearest(_keep_edges(graph.lengths, positive), domain)
+    domain = _join_nearest(graph.lengths, domain)
+    return _by_size(graph, domain, values)
+
+
+def segment(laplacian, parts, spectrum=None, progress=None):
+    """Divide the surface into a number of connected parts, such as the limbs of a figure.
+
+    Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
+    factor that fades to zero at the last mode used, so that no choice of signs or of a basis among modes of the same
+    eigenvalue makes a difference. The clusters start at points far from each other, which are the ends of limbs; all is
+    weighted by areas and free of chance. What is cut off from the main piece of its cluster goes to the nearest part.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+    parts : int
+        How many parts; at least one for each connected part of the cloud. The others are dealt out by area.
+    spectrum : Spectrum, optional
+        Its natural modes, to save time; used if there are enough of them, which is ``modes_needed``.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n,) int
+        Part of each point: 0 for the one of most points, and so on; -1 for points left out of the operator. Moving,
+        turning or scaling the cloud, or the order of its points, make no difference but for points just at a border
+        between two parts. (On a surface that rotations map to itself, such as a sphere, all choices are equally good.)
+
+    Raises
+    ------
+    TooFewPointsError
+        A number of parts below 1, or more than the points can be divided into.
+    IslandError
+        Fewer parts than connected parts.
+    InvalidPointsError
+        A spectrum of other points.
+
+    References
+    ----------
+    Rustamov. Laplace-Beltrami eigenfunctions for deformation invariant shape representation. 2007.
+    """
+    n = len(laplacian.points)
+    if isinstance(parts, bool) or not isinstance(parts, (int, np.integer)) or parts < 1:
+        raise TooFewPointsError(f"{parts!r} parts were asked for. Ask for a whole number of at least 1.")
+    islands = int(laplacian.component.max()) + 1
+    if parts < islands:
+        raise IslandError(
+            f"{parts} parts were asked for, but the {n} points lie in {islands} connected parts that cannot be joined."
+            f" Ask for at least {islands}, or delete the small ones."
+        )
+    if spectrum is not None and len(spectrum.eigenvectors) != n:
+        raise InvalidPointsError(
+            f"The spectrum has {len(spectrum.eigenvectors)} points, the operator {n}. Compute it for the same operator."
+        )
+    report = progress or (lambda stage, fraction: None)
+    graph = near_graph(laplacian, _NEIGHBORS)
+    island, areas = laplacian.component[graph.first], _areas_of_places(laplacian, graph)
+    share = _deal(parts, np.bincount(island, areas))
+    part = island.copy()
+    if parts > islands:
+        signature = _signature(laplacian, parts, spectrum, report)[graph.first]
+        report("Parts", 0.0)
+        label = np.concatenate([[0], np.cumsum(share)])
+        for number in np.flatnonzero(share > 1):
+            own = np.flatnonzero(island == number)
+            part[own] = label[number] + _cluster(signature[own], areas[own], share[number])
+        for number in np.flatnonzero(share == 1):
+            part[island == number] = label[number]
+    part = _join_nearest(graph.lengths, _main_pieces(graph.lengths, part, areas))
+    center = laplacian.areas @ laplacian.points / laplacian.areas.sum()
+    return _by_size(graph, part, np.linalg.norm(laplacian.points - center, axis=1))
+
+
+def modes_needed(laplacian, parts):
+    """Return how many modes `segment` works with, the constant ones included.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+    parts : int
+
+    Returns
+    -------
+    int
+    """
+    return _constant_modes(laplacian) + _MODES * int(parts) + 1
+
+
+def _constant_modes(laplacian):
+    """Return the number of modes of eigenvalue zero: the parts that the stiffness does not couple."""
+    pieces = connected_components(laplacian.stiffness, directed=False)[1]
+    return len(np.unique(pieces[laplacian.component >= 0]))
+
+
+def _signature(laplacian, parts, spectrum, progress):
+    """Return the faded global point signature, (n, modes)."""
+    constant, count = _constant_modes(laplacian), modes_needed(laplacian, parts)
+    if spectrum is None or len(spectrum.eigenvalues) < count:
+        count = min(count, len(laplacian.points) // 3)
+        try:
+            spectrum = laplacian.eigenpairs(count, progress=progress)
+        except UnresolvedModesError as error:
+            count = error.resolved
+            if count > constant + parts:
+                spectrum = laplacian.eigenpairs(count, progress=progress)
+    if count <= constant + parts:
+        raise TooFewPointsError(
+            f"{parts} parts need {constant + parts + 1} modes, but {len(laplacian.points)} points resolve {count}. Ask"
+            " for fewer parts."
+        )
+    values, last = spectrum.eigenvalues[constant : count - 1], spectrum.eigenvalues[count - 1]
+    return spectrum.eigenvectors[:, constant : count - 1] * ((1.0 - values / last) / np.sqrt(values))
+
+
+def _deal(parts, areas):
+    """Deal parts out to islands: one to each, each other one where the area per part is largest then."""
+    share = np.ones(len(areas), dtype=int)
+    for _ in range(parts - len(areas)):
+        share[np.argmax(areas / share)] += 1
+    return share
+
+
+def _areas_of_places(laplacian, graph):
+    return np.bincount(graph.place[graph.place >= 0], laplacian.areas[graph.place >= 0], minlength=len(graph.first))
+
+
+def _cluster(signature, weight, count):
+    """Cluster points, (m, modes), and return labels, (m,); what is far too small for a part is left to the others."""
+    for _ in range(_ROUNDS):
+        centers = _k_means(signature, weight, count)
+        label = _nearest(signature, centers)
+        size = np.bincount(label, weight, minlength=count)
+        small = size < _LEAST * size.mean()
+        if not small.any():
+            break
+        weight = np.where(small[label], 0.0, weight)
+    return label
+
+
+def _k_means(signature, weight, count):
+    """Return the centers, (count, modes), of the best clusters that Lloyd's steps find from three starts.
+
+    All starts choose among points far from each other: the farthest ones; the same around the middle of all; and those
+    that lower the sum of squares the most.
+    """
+    known = weight > 0.0
+    points, weight = signature[known], weight[known]
+    middle = weight @ points / weight.sum()
+    far = points[_farthest(points, middle, 2 * count + 8)]
+    starts = [far[:count], np.vstack([middle, far[: count - 1]]), _best_seeds(points, weight, far, count)]
+    found = min((_lloyd(points, weight, start, _ROUGH) for start in starts), key=lambda result: result[1])
+    return _lloyd(points, weight, found[0], 0.0)[0]
+
+
+def _farthest(points, middle, count):
+    """Return the rows of the point farthest from the middle, then again and again of the one farthest from those."""
+    rows = [int(np.argmax(_squares(points, middle)))]
+    away = np.full(len(points), np.inf)
+    while len(rows) < count:
+        away = np.minimum(away, _squares(points, points[rows[-1]]))
+        rows.append(int(np.argmax(away)))
+    return rows
+
+
+def _best_seeds(points, weight, candidates, count):
+    """Choose seeds from the candidates, one after the other, that leave the least sum of squares."""
+    squares = np.stack([_squares(points, candidate) for candidate in candidates])
+    left, rows = np.full(len(points), np.inf), []
+    for _ in range(count):
+        rows.append(int(np.argmin(np.minimum(left, squares) @ weight)))
+        left = np.minimum(left, squares[rows[-1]])
+    return candidates[rows]
+
+
+def _lloyd(points, weight, centers, rtol):
+    """Move centers to the means of their clusters until the sum of squares falls by less than rtol of itself."""
+    centers, total = centers.copy(), np.inf
+    for _ in range(_STEPS):
+        label = _nearest(points, centers)
+        share = sparse.csr_array((weight, (label, np.arange(len(label)))), shape=(len(centers), len(label)))
+        size = share.sum(axis=1)
+        filled = size > 0.0
+        centers[filled] = (share @ points)[filled] / size[filled, None]
+        squares = np.sum((points - centers[label]) ** 2, axis=1)
+        before, total = total, weight @ squares
+        if not filled.all():  # a cluster that lost its points starts again where the others fit worst
+            centers[np.flatnonzero(~filled)[0]] = points[np.argmax(squares)]
+        elif before - total <= rtol * total:
+            break
+    return centers, total
+
+
+def _nearest(points, centers):
+    return (np.sum(centers**2, axis=1) - 2.0 * (points @ centers.T)).argmin(axis=1)
+
+
+def _squares(points, center):
+    return np.sum((points - center) ** 2, axis=1)
+
+
+def _main_pieces(lengths, part, areas):
+    """Keep the label of each part on its connected piece of the largest area, -1 elsewhere."""
+    piece = _pieces(lengths, part)
+    size = np.bincount(piece, areas)
+    order = np.argsort(size[piece], kind="stable")
+    main = np.zeros(part.max() + 1, dtype=int)
+    main[part[order]] = piece[order]
+    return np.where(main[part] == piece, part, -1)
+
+
+def _check_values(values, count):
+    given = np.asarray(values)
+    if given.shape != (count,) or given.dtype.kind not in "biuf":
+        raise InvalidPointsError(
+            f"Values have the shape {given.shape} and type {given.dtype}. Give {count} numbers, one per point."
+        )
+    bad = np.count_nonzero(~np.isfinite(given))
+    if bad:
+        raise InvalidPointsError(f"{bad} of {count} values are not finite (NaN or infinity). Replace them by numbers.")
+    return given.astype(np.float64)
+
+
+def _keep_edges(lengths, label):
+    """Return the graph without edges between different labels, or from labels below zero."""
+    edges = lengths.tocoo()
+    kept = (label[edges.row] == label[edges.col]) & (label[edges.row] >= 0)
+    return sparse.csr_array((edges.data[kept], (edges.row[kept], edges.col[kept])), shape=lengths.shape)
+
+
+def _pieces(lengths, label):
+    """Number the connected pieces of equal label; labels below zero stay -1."""
+    piece = connected_components(_keep_edges(lengths, label), directed=False)[1]
+    return np.where(label >= 0, piece, -1)
+
+
+def _join_nearest(lengths, label):
+    """Give every place of label -1 that a path leads to the label of the nearest place that has one."""
+    start = np.flatnonzero(label >= 0)
+    if len(start) in (0, len(label)):
+        return label
+    _, _, source = dijkstra(lengths, directed=False, indices=start, min_only=True, return_predecessors=True)
+    reached = source >= 0
+    result = label.copy()
+    result[reached] = label[source[reached]]
+    return result
+
+
+def _by_size(graph, label, values):
+    """Number labels of places by their points and, where these are as many, by their mean value, for the caller's points."""
+    label = graph.hand_out(label, -1)
+    known = label >= 0
+    _, inverse, size = np.unique(label[known], return_inverse=True, return_counts=True)
+    mean = np.bincount(inverse, values[known]) / size
+    number = np.empty_like(size)
+    number[np.lexsort((-mean, -size))] = np.arange(len(size))
+    label[known] = number[inverse]
+    return label
