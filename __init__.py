@@ -2,10 +2,11 @@
 
 
 def _classes():
-    from .operators import analyze, spectrum
-    from .ui import colormap, panel, settings
+    from .operators import analyze, selecting, smooth, spectrum
+    from .ui import applications, colormap, panel, settings
 
-    return (*settings.CLASSES, *analyze.CLASSES, *spectrum.CLASSES, *colormap.CLASSES, *panel.CLASSES)
+    modules = (settings, analyze, spectrum, smooth, selecting, colormap, panel, applications)
+    return [cls for module in modules for cls in module.CLASSES]
 
 
 def register():

@@ -20,12 +20,15 @@ class ApplicationOperator(ReadyOperator):
     only_active = False  # for what has one object by nature
     writes = ()  # names of the attributes that `write` makes
 
+    def invoke(self, context, event):
+        return context.window_manager.invoke_props_dialog(self)
+
     def execute(self, context):
         objects = [context.object] if self.only_active else chosen_objects(context)
         try:
             plans = []
             for obj in objects:
-                check_writable(obj, self.writes, obj.meshfree.make_single_user, among=objects)
+                check_writable(obj, self.writes, obj.meshfree.make_single_user, among=context.selected_objects)
                 plans.append(self.plan(context, obj))
             with Stages(context.window_manager) as stages:
                 results = [plan(stages) for plan in plans]

@@ -50,9 +50,14 @@ def write_positions(obj, reading, points, target: str, name: str):
         One of `TARGETS`.
     name : str
         Of the shape key; Blender adds a number if there is one already.
+
+    Returns
+    -------
+    bpy.types.ShapeKey or None
     """
     mesh = obj.data
     moved = (points - reading.points) @ np.linalg.inv(reading.matrix).T
+    key = None
     if target == "IN_PLACE":
         positions = mesh_positions(mesh) + moved
         mesh.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
@@ -66,3 +71,4 @@ def write_positions(obj, reading, points, target: str, name: str):
         key.points.foreach_set("co", basis + moved.astype(np.float32).reshape(-1))
         key.value = 1.0
     mesh.update()
+    return key

@@ -107,5 +107,14 @@ def is_stale(obj, glance=False) -> bool:
 
 def area_text(area: float) -> str:
     """Write an area in the units of the scene."""
+    return _in_units("AREA", area, 2)
+
+
+def length_text(length: float) -> str:
+    """Write a length in the units of the scene."""
+    return _in_units("LENGTH", length, 1)
+
+
+def _in_units(kind, value, power):
     units = bpy.context.scene.unit_settings
-    return bpy.utils.units.to_string(units.system, "AREA", area * units.scale_length**2, precision=6).strip()
+    return bpy.utils.units.to_string(units.system, kind, value * units.scale_length**power, precision=6).strip()

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
-from ..core import PointCloudError, grow_selection
+from ..core import PointCloudError, grow
 from .application import operator_reader
 from .reading import obstacle
 from .stages import Stages
@@ -88,9 +88,9 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
 
     def change(self, context, obj):
         chosen = selected(obj)
-        reading, laplacian = analyzed(context, obj)
+        _, laplacian = analyzed(context, obj)
         distance = self.distance or 4.0 * np.sqrt(np.median(laplacian.areas))
-        return select(obj, grow_selection(laplacian, chosen, distance))
+        return select(obj, grow(laplacian, chosen, distance))
 
 
 class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):

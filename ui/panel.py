@@ -16,13 +16,15 @@ _SETTINGS = (  # what belongs together
 )
 
 
-class _Panel:
+class SidebarPanel:
+    """A panel in the tab of the extension."""
+
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Mesh-Free"
 
 
-class _ReadyPanel(_Panel):
+class ReadyPanel(SidebarPanel):
     """A panel below the main one, for objects that can be analyzed."""
 
     bl_parent_id = "MESHFREE_PT_main"
@@ -32,7 +34,7 @@ class _ReadyPanel(_Panel):
         return not obstacle(context.object)
 
 
-class MESHFREE_PT_main(_Panel, bpy.types.Panel):
+class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
     """The object, and the button that analyzes it"""
 
     bl_label = "Mesh-Free Laplacian"
@@ -93,7 +95,7 @@ def _draw_summary(layout, obj):
         column.prop(obj.meshfree, "make_single_user")
 
 
-class MESHFREE_PT_settings(_ReadyPanel, bpy.types.Panel):
+class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
     """Settings that change results"""
 
     bl_label = "Settings"
@@ -115,7 +117,7 @@ class MESHFREE_PT_settings(_ReadyPanel, bpy.types.Panel):
                     row.prop(obj.meshfree, name)
 
 
-class MESHFREE_PT_spectrum(_ReadyPanel, bpy.types.Panel):
+class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
     """Vibration modes and their eigenvalues"""
 
     bl_label = "Spectrum"
@@ -141,7 +143,7 @@ class MESHFREE_PT_spectrum(_ReadyPanel, bpy.types.Panel):
             layout.label(text=f"and {len(eigenvalues) - _LISTED} more, up to {eigenvalues[-1]:.5g}")
 
 
-class MESHFREE_PT_display(_ReadyPanel, bpy.types.Panel):
+class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
     """What is shown as colors on the points"""
 
     bl_label = "Display"

@@ -1,0 +1,39 @@
+"""The panels of what the operator is for: groups of points, and shapes by frequency."""
+
+import bpy
+
+from .panel import ReadyPanel, SidebarPanel
+
+
+class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
+    """Selecting points, and the groups that the tools take"""
+
+    bl_label = "Points and Groups"
+    bl_parent_id = "MESHFREE_PT_main"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.object is not None and context.object.type == "MESH"
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator("meshfree.select_grow")
+        column.operator("meshfree.select_component")
+        column.operator("meshfree.select_front")
+        self.layout.operator_menu_enum("meshfree.group_from_selection", "role")
+
+
+class MESHFREE_PT_shape(ReadyPanel, bpy.types.Panel):
+    """Shapes by frequency"""
+
+    bl_label = "Smooth"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator("meshfree.smooth", text="Smooth Points...")
+        column.operator("meshfree.mode_shape", text="Deform by Mode...")
+
+
+CLASSES = (MESHFREE_PT_points, MESHFREE_PT_shape)
