@@ -3,6 +3,7 @@
 from .areas import estimate_areas
 from .cloud import estimate_normals
 from .curvature import mean_curvature
+from .deformation import Deformer
 from .errors import (
     AreaError,
     Cancelled,
@@ -23,6 +24,7 @@ from .stability import Stability, check_stability
 __all__ = [
     "AreaError",
     "Cancelled",
+    "Deformer",
     "InvalidPointsError",
     "IslandError",
     "LaplaceBeltrami",

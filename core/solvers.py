@@ -38,7 +38,7 @@ def narrow_laplacian(laplacian, neighbors=NARROW):
     return build_laplacian(laplacian.surface_points, laplacian.normals, options, laplacian.boundary)
 
 
-def drop_faint_pairs(stiffness, share=1e-3):
+def drop_faint_pairs(stiffness, share=1e-2):
     """Leave out the pairs that hardly count, which makes factors smaller.
 
     Parameters
@@ -47,7 +47,7 @@ def drop_faint_pairs(stiffness, share=1e-3):
         Symmetric, rows sum to zero, nothing positive off the diagonal.
     share : float
         Pairs whose weight is below this share of the diagonal at both ends are left out. The kernel falls off so
-        steeply that this is a third of the pairs with hardly any weight.
+        steeply that these are more than half of the pairs, with a few percent of the weight.
 
     Returns
     -------
