@@ -11,6 +11,7 @@ from .solvers import drop_faint_pairs, factorize, narrow_laplacian
 _NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
 _STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
 _RTOL = 1e-5
+_HUGE = 1e100  # of a coordinate, so that no product overflows
 _MEMORY = 5  # steps that the acceleration looks back on
 
 
@@ -105,19 +106,21 @@ class Deformer:
 
         report("Equations", 0.4)
         moving = self._moving
+        row = np.full(n, -1)
+        row[moving] = np.arange(len(moving))
+        self._row = row[self._held]
+        if not len(moving):
+            return
         # The centre of each part at rest, so that sums of products do not lose digits far from the origin.
         self._center = np.zeros((self._parts, 3))
         np.add.at(self._center, self._part, self.points[moving])
         self._center /= np.bincount(self._part, minlength=self._parts)[:, None]
         self._rest = self.points[moving] - self._center[self._part]
-        self._size = float(np.sqrt(np.mean(np.sum(self._rest**2, axis=1)))) if len(moving) else 0.0
+        self._size = float(np.sqrt(np.mean(np.sum(self._rest**2, axis=1))))
         stiffness = drop_faint_pairs(narrow.stiffness[moving][:, moving])
         inverse = sparse.diags_array(1.0 / narrow.areas[moving], format="csr")
         energy = (stiffness @ inverse @ stiffness).tocsr()
         self._differential = stiffness @ self._rest
-        row = np.full(n, -1)
-        row[moving] = np.arange(len(moving))
-        self._row = row[self._held]
         inside = self._row >= 0
         fixed = np.zeros(len(moving), dtype=bool)
         fixed[self._row[inside & hard]] = True
@@ -192,15 +195,15 @@ class Deformer:
             now = _check_positions(start, len(self.points), "starting points", "point")[self._moving]
         if self.rotation_aware and steps > 0:
             at_rest = np.einsum("nab,nb->na", turn, self._differential)
-            self.converged, mixing = False, _Mixing()
+            self.converged, mixing, begin = False, _Mixing(), now
             for self.steps in range(1, int(steps) + 1):
                 report("Deform", self.steps / (steps + 1.0))
-                before = now if self.steps == 1 else mixing.mix(before, now)
-                turned = np.einsum("abn,nb->na", self._rotations(before), self._differential)
+                turned = np.einsum("abn,nb->na", self._rotations(begin), self._differential)
                 now = place(self._divergence @ (turned - at_rest))
-                if np.abs(now - before).max() <= rtol * self._size:
+                if np.abs(now - begin).max() <= rtol * self._size:
                     self.converged = True
                     break
+                begin = mixing.mix(begin, now)
         result[self._moving] = now
         return result
 
@@ -322,10 +325,11 @@ def _check_positions(positions, count, name, singular):
             f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers. Give x, y,"
             f" z for each {singular}."
         )
-    bad = int(np.count_nonzero(~np.isfinite(given).all(axis=1)))
+    bad = int(np.count_nonzero(~(np.abs(given) < _HUGE).all(axis=1)))
     if bad:
         raise InvalidPointsError(
-            f"{bad} of {count} {name} are not finite (NaN or infinity). Give a place for each {singular}."
+            f"{bad} of {count} {name} are not finite (NaN or infinity), or beyond {_HUGE:g}. Give a place for each"
+            f" {singular}."
         )
     return given.astype(np.float64)
 
