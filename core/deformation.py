@@ -112,10 +112,10 @@ class Deformer:
         if not len(moving):
             return
         # The centre of each part at rest, so that sums of products do not lose digits far from the origin.
-        self._center = np.zeros((self._parts, 3))
-        np.add.at(self._center, self._part, self.points[moving])
-        self._center /= np.bincount(self._part, minlength=self._parts)[:, None]
-        self._rest = self.points[moving] - self._center[self._part]
+        center = np.zeros((self._parts, 3))
+        np.add.at(center, self._part, self.points[moving])
+        center /= np.bincount(self._part)[:, None]
+        self._rest = self.points[moving] - center[self._part]
         self._size = float(np.sqrt(np.mean(np.sum(self._rest**2, axis=1))))
         stiffness = drop_faint_pairs(narrow.stiffness[moving][:, moving])
         inverse = sparse.diags_array(1.0 / narrow.areas[moving], format="csr")
@@ -147,7 +147,7 @@ class Deformer:
         handle_positions : array_like, (h, 3)
             Where the handles are to be [L], in the order of their indices.
         steps : int
-            Most rotation-aware steps; a single one is fit for dragging.
+            Most rotation-aware steps; a single one is fit for dragging, and with none each part turns as a whole.
         rtol : float
             Stop when no point moves by more than this share of the size.
         start : array_like, (n, 3), optional
@@ -183,13 +183,13 @@ class Deformer:
         constant = self._pull[self._free, None] * wanted[self._free] - self._coupling @ wanted[self._fixed]
 
         def place(load):
-            place = frame + wanted
+            placed = frame + wanted
             if len(self._free):
-                place[self._free] = frame[self._free] + self._solve(constant + load)
-            return place
+                placed[self._free] = frame[self._free] + self._solve(constant + load)
+            return placed
 
         report("Deform", 0.0)
-        if start is None or not self.rotation_aware:
+        if start is None or not self.rotation_aware or steps < 1:
             now = place(0.0)
         else:
             now = _check_positions(start, len(self.points), "starting points", "point")[self._moving]
