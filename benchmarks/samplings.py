@@ -345,3 +345,53 @@ def _sausage_eigenvalue(bend, radius, length, cells):
     mass = diags_array((w * r * ds * dt).ravel(), format="csc")
     start = np.random.default_rng(0).standard_normal(w.size)
     return eigsh(stiffness.tocsc(), k=2, M=mass, sigma=-0.01, v0=start, return_eigenvectors=False).max()
+
+
+def bar(cells=15, rows=60, length=4.0):
+    """Return a closed bar of unit square section along x, from 0 to its length, as a grid with its quads.
+
+    Returns
+    -------
+    points : ndarray, (n, 3)
+        4,052 with the defaults.
+    quads : ndarray, (m, 4) int
+    section : ndarray, (rows + 1, 4 cells) int
+        The points around each cross-section, in order.
+    """
+    j, k = np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij")
+    side = np.arange(cells)
+    full = np.full(cells, cells)
+    ring = np.concatenate(
+        [
+            np.column_stack(edge)
+            for edge in ((side, 0 * side), (full, side), (full - side, full), (0 * side, full - side))
+        ]
+    )
+    section = np.arange((rows + 1) * len(ring)).reshape(rows + 1, len(ring))
+    inner = np.column_stack([j.ravel(), k.ravel()])
+    inner = inner[(inner > 0).all(axis=1)]
+    at = np.repeat(np.arange(rows + 1), len(ring))
+    points = [np.column_stack([at * length / rows, np.tile(ring / cells - 0.5, (rows + 1, 1))])]
+    after = np.roll(section, -1, axis=1)
+    quads = [np.stack([section[:-1], section[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)]
+    for row in (0, rows):
+        number = np.empty((cells + 1, cells + 1), dtype=int)
+        number[tuple(ring.T)] = section[row]
+        number[tuple(inner.T)] = sum(len(part) for part in points) + np.arange(len(inner))
+        points.append(np.column_stack([np.full(len(inner), row * length / rows), inner / cells - 0.5]))
+        corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+        quads.append(np.stack(corners if row else corners[::-1], axis=-1).reshape(-1, 4))
+    return np.concatenate(points), np.concatenate(quads), section
+
+
+def bent_end(points, angle, length=4.0):
+    """Carry points at the end of a bar along an arc in the x-z plane as long as the bar, turned with it."""
+    radius = length / angle
+    beyond, height = points[:, 0] - length, points[:, 2]
+    return np.column_stack(
+        [
+            radius * np.sin(angle) + beyond * np.cos(angle) - height * np.sin(angle),
+            points[:, 1],
+            radius * (1.0 - np.cos(angle)) + beyond * np.sin(angle) + height * np.cos(angle),
+        ]
+    )

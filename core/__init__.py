@@ -3,6 +3,7 @@
 from .areas import estimate_areas
 from .cloud import estimate_normals
 from .curvature import mean_curvature
+from .deformation import Deformer
 from .descriptors import heat_kernel_signature, signature_energies, signature_times, wave_kernel_signature
 from .errors import (
     AreaError,
@@ -28,6 +29,7 @@ from .stability import Stability, check_stability
 __all__ = [
     "AreaError",
     "Cancelled",
+    "Deformer",
     "InvalidPointsError",
     "IslandError",
     "LaplaceBeltrami",

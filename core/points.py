@@ -166,6 +166,27 @@ def as_mask(chosen, count):
     return mask
 
 
+def as_indices(chosen, count, name):
+    """Return a set of points, (k,) indices or an (n,) bool mask, as indices in the order given.
+
+    Raises
+    ------
+    InvalidPointsError
+        Neither whole numbers below n nor n truth values, or some points named several times.
+    """
+    mask = as_mask(chosen, count)
+    given = np.asarray(chosen)
+    if given.dtype == bool or given.size == 0:
+        return np.flatnonzero(mask)
+    index = given.astype(np.int64) % count
+    twice = len(index) - int(np.count_nonzero(mask))
+    if twice:
+        raise InvalidPointsError(
+            f"{twice} of the {len(index)} {name} are named more than once. Name every point a single time."
+        )
+    return index
+
+
 def check_distances(distances, count):
     """Check distances to a rim, (count,), infinite where there is none near.
 
