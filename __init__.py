@@ -2,10 +2,10 @@
 
 
 def _classes():
-    from .operators import analyze, selecting, smooth, spectrum
+    from .operators import analyze, deform, selecting, smooth, spectrum
     from .ui import applications, colormap, panel, settings
 
-    modules = (settings, analyze, spectrum, smooth, selecting, colormap, panel, applications)
+    modules = (settings, analyze, spectrum, smooth, deform, selecting, colormap, panel, applications)
     return [cls for module in modules for cls in module.CLASSES]
 
 
@@ -26,7 +26,7 @@ def unregister():
     """Take everything out again, in reverse order, and give back the memory of the cached operators."""
     import bpy
 
-    from .operators import cache, command
+    from .operators import cache, command, deform
     from .ui import settings
 
     command.detach()
@@ -34,3 +34,4 @@ def unregister():
     for cls in reversed(_classes()):
         bpy.utils.unregister_class(cls)
     cache.clear()
+    deform.clear()

@@ -56,19 +56,27 @@ def write_positions(obj, reading, points, target: str, name: str):
     bpy.types.ShapeKey or None
     """
     mesh = obj.data
-    moved = (points - reading.points) @ np.linalg.inv(reading.matrix).T
     key = None
     if target == "IN_PLACE":
-        positions = mesh_positions(mesh) + moved
+        positions = mesh_positions(mesh) + _local(points - reading.points, reading)
         mesh.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
+        mesh.update()
     else:
         if mesh.shape_keys is None:
             obj.shape_key_add(name="Basis", from_mix=False)
-        basis = np.empty(3 * len(mesh.vertices), np.float32)
-        mesh.shape_keys.reference_key.points.foreach_get("co", basis)
         key = obj.shape_key_add(name=name, from_mix=False)
-        # The points that were read already hold what the other keys add, so this key adds the rest.
-        key.points.foreach_set("co", basis + moved.astype(np.float32).reshape(-1))
         key.value = 1.0
-    mesh.update()
+        fill_key(obj, key, points - reading.points, reading)
     return key
+
+
+def fill_key(obj, key, moved, reading):
+    """Let a shape key move the points by so much, (n, 3), beside what the other keys do."""
+    basis = np.empty((len(moved), 3), np.float32)
+    obj.data.shape_keys.reference_key.points.foreach_get("co", basis.reshape(-1))
+    key.points.foreach_set("co", (basis + _local(moved, reading)).astype(np.float32).reshape(-1))
+    obj.data.update()
+
+
+def _local(moved, reading):
+    return moved @ np.linalg.inv(reading.matrix).T

@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..operators.deform import binding
 from .panel import ReadyPanel, SidebarPanel
 
 
@@ -36,4 +37,19 @@ class MESHFREE_PT_shape(ReadyPanel, bpy.types.Panel):
         column.operator("meshfree.mode_shape", text="Deform by Mode...")
 
 
-CLASSES = (MESHFREE_PT_points, MESHFREE_PT_shape)
+class MESHFREE_PT_deform(ReadyPanel, bpy.types.Panel):
+    """Deformation by handles"""
+
+    bl_label = "Deform"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator("meshfree.deform_bind", text="Bind...")
+        row = column.row(align=True)
+        row.enabled = binding(context.object) is not None
+        row.operator_context = "EXEC_DEFAULT"
+        row.operator("meshfree.deform_update")
+
+
+CLASSES = (MESHFREE_PT_points, MESHFREE_PT_shape, MESHFREE_PT_deform)
