@@ -14,6 +14,8 @@ from .errors import (
     TooFewPointsError,
     UnresolvedModesError,
 )
+from .fields import harmonic_field, solve_poisson
+from .geodesics import geodesic_distance
 from .laplacian import LaplaceBeltrami, build_laplacian
 from .options import LaplacianOptions
 from .points import check_points
@@ -39,5 +41,8 @@ __all__ = [
     "check_stability",
     "estimate_areas",
     "estimate_normals",
+    "geodesic_distance",
+    "harmonic_field",
     "mean_curvature",
+    "solve_poisson",
 ]

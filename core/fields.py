@@ -6,15 +6,20 @@ from scipy.sparse.linalg import cg
 from scipy.spatial import cKDTree
 
 from .errors import InvalidPointsError, PointCloudError, SolverError
-from .kernel import SECOND_MOMENT, SUPPORT
+from .kernel import SECOND_MOMENT
 from .points import as_mask
-from .solvers import narrow_laplacian
+from .solvers import coupled_parts, mean_spacing, narrow_laplacian
 
 _MEAN = 1e-2  # of the source's mean size: a larger mean is meant, a smaller one is left by the quadrature
 _RTOL = 1e-9  # of the residual
 _STEPS = 20_000
-_DEEP = 0.8  # share of a point's weights that lead to fixed points, where it lies deep inside a set of them
-RAMP0, RAMPW, NNAR = 1.5, 1.5, 60
+_DEEP = 0.6  # share of a point's weights that lead to fixed points, where it lies deep inside a set of them
+_NARROW = 60  # neighbours of the narrow operator: fewer are too noisy at random points, more leak more
+_NEAR = (
+    1.5,
+    3.0,
+)  # distances from thin sets, in units of h, where the narrow operator gives way to the wide one
+_LEAST = 2e-3  # share of the wide operator everywhere: it connects what the narrow one does not
 _GRAZING = 0.1  # least distance from the edge of a set of fixed points, in spacings
 
 
@@ -67,13 +72,14 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
     report = progress or (lambda stage, fraction: None)
     source = _read_source(source, count)
     index, values = read_values(fixed, fixed_values, count)
-    known = laplacian.component >= 0
+    part = coupled_parts(laplacian)
+    known = part >= 0
     is_fixed = np.zeros(count, dtype=bool)
     is_fixed[index] = True
-    part = np.where(known, laplacian.component, 0)
-    held = np.bincount(part, known & is_fixed) > 0.0
-    loose = known & ~held[part]  # on parts without any fixed point
-    source = _without_mean(laplacian, source, loose)
+    held = np.zeros(part.max() + 1, dtype=bool)
+    held[part[known & is_fixed]] = True
+    loose = np.flatnonzero(known)[~held[part[known]]]  # points of parts without any fixed point
+    source = _without_mean(laplacian.areas, source, part, loose)
 
     result = np.full(count, values.mean() if len(values) else 0.0)
     level = result[0]
@@ -88,13 +94,10 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
         matrix, load = laplacian.stiffness, np.zeros(count)
     free = free[cKDTree(laplacian.points[free]).indices]  # neighbours near in memory make the products faster
     load = load[free] + laplacian.areas[free] * source[free]
-    if load.any():
-        result[free] = conjugate_gradients(matrix[free][:, free], load, np.where(loose, 0.0, level)[free], report)
-    else:
-        result[free] = np.where(loose[free], level, 0.0)
+    result[free] = conjugate_gradients(matrix[free][:, free], load, result[free], report)
     if laplacian.options.symbol_correction:
-        result[loose] -= (SECOND_MOMENT / 8.0 * laplacian.smoothing_lengths**2 * source)[loose]
-    result[loose] += level - _means(laplacian, result, loose)[loose]
+        result[loose] -= SECOND_MOMENT / 8.0 * laplacian.smoothing_lengths[loose] ** 2 * source[loose]
+    result[loose] += level - _means(laplacian.areas, result, part, loose)
     return result
 
 
@@ -152,7 +155,7 @@ def read_values(fixed, values, count):
         index = np.flatnonzero(mask)
     index = index.astype(np.intp).ravel() % count
     given = np.zeros(0) if values is None else np.asarray(values)
-    if given.dtype.kind not in "biuf" or (given.shape != (len(index),) and given.size != 1):
+    if given.dtype.kind not in "biuf" or (given.shape not in ((), (len(index),))):
         raise InvalidPointsError(
             f"Values have the shape {given.shape} and type {given.dtype} for {len(index)} fixed points. Give one number"
             " for each of them."
@@ -215,7 +218,8 @@ def _read_source(source, count):
     given = np.asarray(source)
     if given.dtype.kind not in "biuf" or given.shape not in ((), (count,)):
         raise InvalidPointsError(
-            f"The source has the shape {given.shape} and type {given.dtype}. Give one number for each of {count} points."
+            f"The source has the shape {given.shape} and type {given.dtype}. Give one number for each of the {count}"
+            " points."
         )
     bad = np.count_nonzero(~np.isfinite(given))
     if bad:
@@ -223,31 +227,31 @@ def _read_source(source, count):
     return np.broadcast_to(given.astype(np.float64), count)
 
 
-def _means(laplacian, values, rows):
-    """Return the area-weighted mean of each point's part, (n,); zero for parts without any of the rows."""
-    weight = np.where(rows, laplacian.areas, 0.0)
-    part = np.where(laplacian.component >= 0, laplacian.component, 0)
-    total = np.bincount(part, weight)
-    return (np.bincount(part, weight * values) / np.where(total > 0.0, total, 1.0))[part]
+def _means(areas, values, part, rows):
+    """Return the area-weighted mean of values (n,) over the part of each of some rows, (k,)."""
+    part, areas = part[rows], areas[rows]
+    total = np.bincount(part, areas)
+    return (np.bincount(part, areas * values[rows]) / np.where(total > 0.0, total, 1.0))[part]
 
 
-def _without_mean(laplacian, source, loose):
+def _without_mean(areas, source, part, rows):
     """Take the mean out of the source on parts that nothing holds, or raise if there is one."""
-    mean, size = _means(laplacian, source, loose), _means(laplacian, np.abs(source), loose)
-    wrong = loose & (np.abs(mean) > _MEAN * size)
-    if wrong.any():
-        row = np.flatnonzero(wrong)[0]
+    mean, size = (_means(areas, values, part, rows) for values in (source, np.abs(source)))
+    wrong = np.flatnonzero(np.abs(mean) > _MEAN * size)
+    if len(wrong):
         raise PointCloudError(
-            f"The source has the mean {mean[row]:.3g} over a connected part without fixed points"
-            f" ({np.count_nonzero(wrong)} points on such parts), where only sources of mean zero have a solution."
-            " Subtract the area-weighted mean of each part, or fix a point there."
+            f"The source has the mean {mean[wrong[0]]:.3g} over a connected part of"
+            f" {np.count_nonzero(part == part[rows[wrong[0]]])} points where nothing is fixed: only sources of mean"
+            " zero have a solution there. Subtract the area-weighted mean of each part, or fix a point."
         )
-    return np.where(loose, source - mean, source)
+    result = source.copy()
+    result[rows] -= mean
+    return result
 
 
 def _with_fixed_points(laplacian, fixed, values, free, report):
     """Return a stiffness and a load whose rows of free points take account of the fixed ones."""
-    spacing = _spacing(laplacian)
+    spacing = mean_spacing(laplacian)
     edge = _edge_distance(laplacian, fixed, spacing)
     thin = fixed & ~_thick(laplacian, fixed)
     edge[thin] = 0.0
@@ -256,9 +260,9 @@ def _with_fixed_points(laplacian, fixed, values, free, report):
     if thin.any():
         report("Narrow operator", 0.0)
         distance = cKDTree(laplacian.points[thin]).query(laplacian.points, workers=-1)[0]
-        ramp = np.clip((distance / laplacian.smoothing_lengths - RAMP0) / RAMPW, 0.0, 1.0)
-        wide = ramp**2 * (3.0 - 2.0 * ramp)
-        narrow, narrow_own, narrow_load = _weights(narrow_laplacian(laplacian, NNAR), fixed, values)
+        ramp = np.clip((distance / laplacian.smoothing_lengths - _NEAR[0]) / (_NEAR[1] - _NEAR[0]), 0.0, 1.0)
+        wide = np.maximum(ramp**2 * (3.0 - 2.0 * ramp), _LEAST)
+        narrow, narrow_own, narrow_load = _weights(narrow_laplacian(laplacian, _NARROW), fixed, values)
         weights = _blend(weights, wide) + _blend(narrow, 1.0 - wide)
         own, load = wide * own + (1.0 - wide) * narrow_own, wide * load + (1.0 - wide) * narrow_load
     across = sparse.coo_array(weights[free][:, np.flatnonzero(fixed)])
@@ -328,10 +332,3 @@ def _thick(laplacian, fixed):
     result = np.zeros(len(fixed), dtype=bool)
     result[rows] = (abs(laplacian.stiffness[rows][:, rows[deep]]).sum(axis=1) > 0.0) | deep
     return result
-
-
-def _spacing(laplacian):
-    """Return the distance between the points of an even sample as dense as the neighbours of each, (n,)."""
-    stiffness = laplacian.stiffness
-    neighbors = sparse.csr_array((np.ones(stiffness.nnz), stiffness.indices, stiffness.indptr), shape=stiffness.shape)
-    return np.sqrt(neighbors @ laplacian.areas / np.maximum(neighbors.sum(axis=1), 1.0))

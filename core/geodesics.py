@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from .errors import InvalidPointsError
 from .points import as_mask
+from .solvers import mean_spacing
 
 _BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
 _BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
@@ -69,8 +70,7 @@ def _lengths_of_pairs(laplacian):
     first = np.repeat(np.arange(count, dtype=np.int32), np.diff(stiffness.indptr))
     once = first < stiffness.indices
     first, second = first[once], stiffness.indices[once]
-    spacing = np.sqrt(np.bincount(first, laplacian.areas[second], count) + np.bincount(second, laplacian.areas[first], count))
-    spacing /= np.sqrt(np.maximum(np.bincount(first, minlength=count) + np.bincount(second, minlength=count), 1))
+    spacing = mean_spacing(laplacian)
     arcs = np.empty(len(first))
     kept = np.empty(len(first), dtype=bool)
     tree = cKDTree(points[laplacian.component >= 0])
