@@ -395,3 +395,28 @@ def bent_end(points, angle, length=4.0):
             radius * (1.0 - np.cos(angle)) + beyond * np.sin(angle) + height * np.cos(angle),
         ]
     )
+
+
+def strip_points(count=None, seed=0):
+    """Return points on a flat strip of 3 x 1: a grid of 91 x 31, or so many random ones, (n, 3)."""
+    if count is None:
+        return grid_points(np.linspace(0.0, 3.0, 91), np.linspace(0.0, 1.0, 31), [0.0])
+    return np.random.default_rng(seed).random((count, 3)) * [3.0, 1.0, 0.0]
+
+
+def torus_potential(points, major=1.0, minor=0.4):
+    """Solve -Delta u = -x / sqrt(x^2 + y^2) on the torus (the paper's Figure 8) to rounding.
+
+    With u = g(theta) cos(phi) and w = major + minor cos(theta) it is the ordinary equation
+    ``-(w g')' / (minor^2 w) + g / w^2 = -1``, here by trigonometric collocation.
+    """
+    count = 128
+    waves = np.fft.fftfreq(count, 1.0 / count)
+    w = major + minor * np.cos(2.0 * np.pi * np.arange(count) / count)
+    odd = np.where(np.abs(waves) < count // 2, waves, 0.0)
+    derive = np.fft.ifft(1j * odd[:, None] * np.fft.fft(np.eye(count), axis=0), axis=0).real
+    matrix = -derive @ (w[:, None] * derive) / (minor**2 * w[:, None]) + np.diag(1.0 / w**2)
+    series = np.fft.fft(np.linalg.solve(matrix, -np.ones(count))) / count
+    radius = np.hypot(points[:, 0], points[:, 1])
+    theta = np.arctan2(points[:, 2], radius - major)
+    return (np.exp(1j * theta[:, None] * waves) @ series).real * points[:, 0] / radius

@@ -177,7 +177,9 @@ def paths():
     laplacian = core.build_laplacian(points)
     for distance in (0.3, 1.0, 2.0):
         reached = np.arccos(np.clip(points @ points[0], -1.0, 1.0))[core.grow(laplacian, [0], distance)].max()
-        yield Goal("reach / distance - 1", 0.05, "{:.1%}").row(f"grow by {distance:g} on a sphere", reached / distance - 1)
+        yield Goal("reach / distance - 1", 0.05, "{:.1%}").row(
+            f"grow by {distance:g} on a sphere", reached / distance - 1
+        )
 
 
 if __name__ == "__main__":

@@ -16,7 +16,9 @@ from .errors import (
     TooFewPointsError,
     UnresolvedModesError,
 )
+from .fields import harmonic_field, solve_poisson
 from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
+from .geodesics import geodesic_distance
 from .laplacian import LaplaceBeltrami, build_laplacian
 from .options import LaplacianOptions
 from .points import check_points
@@ -53,7 +55,9 @@ __all__ = [
     "exponential",
     "fair_points",
     "fairing",
+    "geodesic_distance",
     "grow",
+    "harmonic_field",
     "heat_kernel_signature",
     "mean_curvature",
     "modes_needed",
@@ -62,6 +66,7 @@ __all__ = [
     "signature_energies",
     "signature_times",
     "smooth_points",
+    "solve_poisson",
     "spectral_filter",
     "wave_kernel_signature",
 ]

@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from .components import SMALLEST
 from .errors import SolverError
 from .laplacian import build_laplacian
 
@@ -61,6 +62,24 @@ def drop_faint_pairs(stiffness, share=1e-2):
     if connected_components(weights, directed=False)[0] > connected_components(stiffness, directed=False)[0]:
         return stiffness
     return (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
+
+
+def coupled_parts(laplacian):
+    """Number the parts of the cloud between which the operator couples no points, (n,) int.
+
+    Parts of fewer than 50 points are -1: points left out, and single ones within a connected part that are so far off
+    its surface that they lost all neighbours.
+    """
+    count, label = connected_components(laplacian.stiffness, directed=False)
+    large = np.bincount(label, minlength=count) >= SMALLEST
+    return np.where(large, np.cumsum(large) - 1, -1)[label]
+
+
+def mean_spacing(laplacian):
+    """Return the distance between the points of an even sample as dense as the neighbours of each, (n,) [L]."""
+    stiffness = laplacian.stiffness
+    neighbors = sparse.csr_array((np.ones(stiffness.nnz), stiffness.indices, stiffness.indptr), shape=stiffness.shape)
+    return np.sqrt(neighbors @ laplacian.areas / np.maximum(neighbors.sum(axis=1), 1.0))
 
 
 def factorize(matrix):

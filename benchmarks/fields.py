@@ -1,0 +1,148 @@
+"""Poisson's equation, harmonic fields and geodesic distances: ``python -m benchmarks.fields``."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+import core
+
+from .accuracy import relative
+from .samplings import (
+    fibonacci_sphere,
+    random_sphere,
+    square_grid,
+    strip_points,
+    torus_low_discrepancy,
+    torus_points,
+    torus_potential,
+)
+from .speed import SCANS, read_ply
+from .tables import Table
+from .targets import HEADER, Goal, judge, percent
+
+try:
+    import potpourri3d
+except ImportError:  # the peer is shown where it is installed
+    potpourri3d = None
+
+
+def poisson():
+    """Torus, the right-hand side of the paper's Figure 8: relative l2 error, and the order in the spacing."""
+    for name, options, bound, order in (
+        ("default", core.LaplacianOptions(), 1e-3, None),
+        ("h = d100 / 2", core.LaplacianOptions(bandwidth="local", bandwidth_factor=0.5), 1e-3, 3.0),
+    ):
+        errors = []
+
+        def measure(points, options=options, errors=errors):
+            laplacian = core.build_laplacian(points, options=options)
+            exact = torus_potential(points)
+            exact -= laplacian.areas @ exact / laplacian.areas.sum()
+            found = core.solve_poisson(laplacian, -points[:, 0] / np.hypot(points[:, 0], points[:, 1]))
+            errors.append(relative(found, exact))
+            yield errors[-1]
+            if len(errors) > 1:
+                yield np.log2(errors[-2] / errors[-1])
+
+        for count in (2000, 8000, 32_000):
+            goals = [Goal("u", bound if count == 8000 else None)]
+            if errors:
+                goals.append(Goal(f"order, {count // 4:,} to {count:,}", order, "{:.2f}", least=True))
+            case = f"Poisson, torus, {count:,} low-discrepancy, {name}"
+            yield from judge(case, goals, measure(torus_low_discrepancy(count)))
+    points = torus_points(8000)
+    default = core.LaplacianOptions()
+    yield from judge("Poisson, torus, 8,000 random", [Goal("u", 1e-3)], measure(points, default, []))
+
+
+def harmonic():
+    """Strip of 3 x 1 with 0 and 1 on end bands: largest distance from linear."""
+
+    def measure(points, areas):
+        laplacian = core.build_laplacian(points, options=core.LaplacianOptions(areas=areas))
+        x = points[:, 0]
+        fixed = (x <= 0.25 + 1e-12) | (x >= 2.75 - 1e-12)
+        exact = np.clip((x - 0.25) / 2.5, 0.0, 1.0)
+        found = core.harmonic_field(laplacian, fixed, exact[fixed])
+        yield np.abs(found - exact).max()
+        plain = core.solve_poisson(laplacian, 0.0, fixed, exact[fixed])  # not clipped to the range
+        yield max(-plain.min(), plain.max() - 1.0, 0.0)
+
+    clouds = {"91 x 31 grid": strip_points()} | {
+        f"2,800 random, seed {seed}": strip_points(2800, seed) for seed in range(3)
+    }
+    for areas, bound in (("fast", 1e-2), ("uniform", 3e-2)):
+        for name, points in clouds.items():
+            goals = [Goal("largest error", bound), Goal("outside [0, 1] before clipping", 1e-8)]
+            yield from judge(f"strip, {name}, areas {areas}", goals, measure(points, areas))
+
+
+def geodesic():
+    """Spheres and a square: mean error over mean distance, beside the same of potpourri3d."""
+
+    def measure(laplacian, sources, exact):
+        def error(found):
+            return np.abs(found - exact).mean() / exact.mean()
+
+        yield error(core.geodesic_distance(laplacian, sources))
+        if potpourri3d is None:
+            yield "not installed"
+        else:
+            solver = potpourri3d.PointCloudHeatSolver(laplacian.points)
+            yield error(solver.compute_distance_multisource([int(source) for source in sources]))
+
+    def great_circles(points, sources):
+        return np.arccos(np.clip(points @ points[sources].T, -1.0, 1.0)).min(axis=1)
+
+    def straight(points, sources):
+        return np.linalg.norm(points[:, None] - points[None, sources], axis=2).min(axis=1)
+
+    for name, points, exact in (
+        ("sphere, 8,000 Fibonacci", fibonacci_sphere(8000), great_circles),
+        ("sphere, 8,000 random", random_sphere(8000), great_circles),
+        ("square, 90 x 90 with rim", square_grid(90), straight),
+    ):
+        laplacian = core.build_laplacian(points)
+        for label, sources in (("one source", [0]), ("five", np.random.default_rng(0).integers(0, 8000, 5))):
+            goals = [percent("distance", 0.4), percent("potpourri3d")]
+            yield from judge(f"{name}, {label}", goals, measure(laplacian, sources, exact(points, sources)))
+
+
+def cost():
+    """Seconds on a large scan."""
+    path = Path(SCANS) / "bunny.ply"
+    if not SCANS or not path.exists():
+        yield ["bunny", "seconds", "left out: MESHFREE_SCANS names no folder with bunny.ply", "", ""]
+        return
+    laplacian = core.build_laplacian(read_ply(path))
+
+    def measure():
+        began = time.perf_counter()
+        distance = core.geodesic_distance(laplacian, [0])
+        yield time.perf_counter() - began
+        far = distance.max()
+        bands = (distance < 0.1 * far) | (distance > 0.9 * far)
+        for fixed in (bands, [0, int(np.argmax(distance))]):
+            began = time.perf_counter()
+            core.harmonic_field(laplacian, fixed, np.round(distance / far)[fixed])
+            yield time.perf_counter() - began
+        source = distance - laplacian.areas @ distance / laplacian.areas.sum()
+        began = time.perf_counter()
+        core.solve_poisson(laplacian, source)
+        yield time.perf_counter() - began
+
+    figures = ("distance", "harmonic, bands", "harmonic, two points", "Poisson")
+    yield from judge(
+        f"bunny, {len(laplacian.points):,}", [Goal(f"{name}, s", form="{:.1f}") for name in figures], measure()
+    )
+
+
+def main():
+    """Print all rows."""
+    rows = [row for group in (poisson, harmonic, geodesic, cost) for row in group()]
+    print(Table("Fields and distances", HEADER, rows).markdown())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,122 @@
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import disc_random, fibonacci_sphere, grid_points, parallel_sheets, random_sphere, square_grid
+
+
+def on_sphere(points, sources):
+    return np.arccos(np.clip(points @ points[sources].T, -1.0, 1.0)).min(axis=1)
+
+
+def mean_error(found, exact):
+    return np.abs(found - exact).mean() / exact.mean()
+
+
+@pytest.mark.parametrize("name", ["even sphere", "random sphere", "marching cubes", "density jump"])
+@pytest.mark.parametrize("sources", [[5], [0, 700, 1400, 2100, 2800]], ids=["one", "five"])
+def test_great_circles(operators, name, sources):
+    laplacian = operators(name)
+    exact = on_sphere(laplacian.points, sources)
+    found = core.geodesic_distance(laplacian, sources)
+    assert mean_error(found, exact) < 1.5e-3
+    assert np.abs(found - exact).max() < 1e-2
+    np.testing.assert_array_equal(found[sources], 0.0)
+
+
+def test_meridians_of_the_torus(operators):
+    laplacian = operators("fine torus")
+    points = laplacian.points
+    radius = np.hypot(points[:, 0], points[:, 1])
+    theta, phi = np.arctan2(points[:, 2], radius - 1.0), np.arctan2(points[:, 1], points[:, 0])
+    source = int(np.argmin(np.hypot(theta, phi)))
+    apart = np.abs(np.angle(np.exp(1j * (phi - phi[source]))))
+    # Meridians are shortest ways; next to them the distance differs by second order only.
+    meridian = (apart < 0.02) & (np.abs(theta) > 0.5)
+    assert np.count_nonzero(meridian) > 20
+    exact = 0.4 * np.abs(theta - theta[source])
+    np.testing.assert_allclose(core.geodesic_distance(laplacian, [source])[meridian], exact[meridian], rtol=1e-2)
+
+
+@pytest.mark.parametrize("sources", [[0], [1770], [0, 59, 1770]], ids=["corner", "middle", "several"])
+def test_flat_square_with_its_rim(sources):
+    points = square_grid(60)
+    found = core.geodesic_distance(core.build_laplacian(points), sources)
+    exact = np.linalg.norm(points[:, None] - points[None, sources], axis=2).min(axis=1)
+    assert mean_error(found, exact) < 2e-3
+    assert np.all(found >= exact - 1e-12)
+
+
+def test_the_way_leads_around_a_hole():
+    points = disc_random(3000, 0)[0]
+    radius = np.hypot(points[:, 0], points[:, 1])
+    points, radius = points[radius > 0.3], radius[radius > 0.3]
+    source = int(np.argmin(np.hypot(points[:, 0] + 0.8, points[:, 1])))
+    angle = np.arctan2(points[:, 1], points[:, 0])
+    turn = np.abs(np.angle(np.exp(1j * (angle - angle[source]))))
+    own, other = np.arccos(0.3 / radius[source]), np.arccos(0.3 / radius)
+    hidden = turn > own + other
+    tangents = np.sqrt(radius[source] ** 2 - 0.09) + np.sqrt(radius**2 - 0.09)
+    exact = np.where(hidden, tangents + 0.3 * (turn - own - other), np.linalg.norm(points - points[source], axis=1))
+    found = core.geodesic_distance(core.build_laplacian(points), [source])
+    assert np.count_nonzero(hidden) > 150
+    assert mean_error(found[hidden], exact[hidden]) < 4e-3
+    assert mean_error(found, exact) < 2e-3
+
+
+def test_around_the_edges_of_a_cube():
+    side = np.linspace(-1.0, 1.0, 31)
+    points = grid_points(side, side, side)
+    points = points[np.abs(points).max(axis=1) == 1.0]
+    top = int(np.argmin(np.linalg.norm(points - [0.0, 0.0, 1.0], axis=1)))
+    found = core.geodesic_distance(core.build_laplacian(points), [top])
+    middle = np.abs(points[:, 0]) < 1e-9
+    side = middle & (points[:, 1] == 1.0) & (np.abs(points[:, 2]) < 0.9)
+    np.testing.assert_allclose(found[side], 2.0 - points[side, 2], rtol=0.05)
+
+
+def test_other_parts_are_infinitely_far():
+    points, sheet, _ = parallel_sheets(side=30)
+    laplacian = core.build_laplacian(points)
+    source = int(np.flatnonzero(sheet == 0)[0])
+    found = core.geodesic_distance(laplacian, [source])
+    assert np.isfinite(found[sheet == 0]).all()
+    assert np.isinf(found[sheet == 1]).all()
+
+
+def test_points_left_out():
+    points = np.concatenate([fibonacci_sphere(900), [[20.0, 0.0, 0.0]]])
+    laplacian = core.build_laplacian(points)
+    assert np.isinf(core.geodesic_distance(laplacian, [0])[900])
+    np.testing.assert_array_equal(core.geodesic_distance(laplacian, [0, 900])[[0, 900]], 0.0)
+    with pytest.raises(core.InvalidPointsError, match="All 1 sources are points that the operator left out"):
+        core.geodesic_distance(laplacian, [900])
+
+
+def test_duplicates_are_no_way_apart():
+    points = fibonacci_sphere(900)
+    found = core.geodesic_distance(core.build_laplacian(np.concatenate([points, points[:5]])), [0])
+    np.testing.assert_allclose(found[900:], found[:5], atol=1e-12)
+
+
+def test_motion_and_scale_do_not_matter():
+    points = random_sphere(1500)
+    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+    order = np.random.default_rng(1).permutation(len(points))
+    first = core.geodesic_distance(core.build_laplacian(points), order[:2])
+    second = core.geodesic_distance(core.build_laplacian(50.0 * points[order] @ turn), [0, 1])
+    np.testing.assert_allclose(second / 50.0, first[order], rtol=1e-6, atol=1e-9)
+
+
+def test_masks_are_sets_too(operators):
+    laplacian = operators("even sphere")
+    mask = laplacian.points[:, 2] > 0.9
+    found = core.geodesic_distance(laplacian, mask)
+    np.testing.assert_array_equal(found, core.geodesic_distance(laplacian, np.flatnonzero(mask)[::-1]))
+    assert np.all(found[~mask] > 0.0)
+
+
+@pytest.mark.parametrize(("sources", "text"), [([], "no sources"), ([5000], "below 4000"), ([0.5], "whole numbers")])
+def test_bad_sources(operators, sources, text):
+    with pytest.raises(core.InvalidPointsError, match=text):
+        core.geodesic_distance(operators("even sphere"), sources)
