@@ -7,10 +7,12 @@ from ..core import PointCloudError
 ROLES = HANDLE, ANCHOR, FIXED, SOURCE, VALUE = "Handle", "Anchor", "Fixed", "Source", "Value"
 
 
-def group_weights(obj, name: str):
-    """Read the weight of every vertex in a group, (n,) float64; 0 for those outside."""
+def group_weights(obj, name: str, outside=0.0):
+    """Read the weight of every vertex in a group, (n,) float64; those outside get a number of their own."""
     index = obj.vertex_groups[name].index
-    held = (next((item.weight for item in vertex.groups if item.group == index), 0.0) for vertex in obj.data.vertices)
+    held = (
+        next((item.weight for item in vertex.groups if item.group == index), outside) for vertex in obj.data.vertices
+    )
     return np.fromiter(held, np.float64, count=len(obj.data.vertices))
 
 

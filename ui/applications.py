@@ -37,6 +37,18 @@ class MESHFREE_PT_shape(ReadyPanel, bpy.types.Panel):
         column.operator("meshfree.mode_shape", text="Deform by Mode...")
 
 
+class MESHFREE_PT_fields(ReadyPanel, bpy.types.Panel):
+    """Fields and distances"""
+
+    bl_label = "Fields"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator("meshfree.geodesic_distance", text="Geodesic Distance...")
+        column.operator("meshfree.harmonic_field", text="Harmonic Field...")
+
+
 class MESHFREE_PT_deform(ReadyPanel, bpy.types.Panel):
     """Deformation by handles"""
 
@@ -52,4 +64,4 @@ class MESHFREE_PT_deform(ReadyPanel, bpy.types.Panel):
         row.operator("meshfree.deform_update")
 
 
-CLASSES = (MESHFREE_PT_points, MESHFREE_PT_shape, MESHFREE_PT_deform)
+CLASSES = (MESHFREE_PT_points, MESHFREE_PT_shape, MESHFREE_PT_fields, MESHFREE_PT_deform)

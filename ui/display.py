@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..operators.attributes import BOUNDARY, COMPONENT, MEAN_CURVATURE, read_attribute
+from ..operators.attributes import BOUNDARY, COMPONENT, DISTANCE, MEAN_CURVATURE, read_attribute
 from ..operators.reading import DISPLAY_TAG, is_display, spacing
 from .nodes import ATTRIBUTE, COLORS, RANGE, color_by, display_group
 
@@ -87,6 +87,8 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
         if name not in obj.data.attributes:
             name = MEAN_CURVATURE
     values = read_attribute(obj.data, name)
+    if name == DISTANCE:
+        values = values[values >= 0.0]  # what no source reaches does not count for the range
     modifier = find_display(obj)
     if modifier is None:
         radius = radius or 0.75 * spacing(obj.data) or 0.01

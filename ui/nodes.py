@@ -6,6 +6,7 @@ from ..operators.reading import DISPLAY_TAG
 from . import colormaps
 
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
+_LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
 
@@ -97,7 +98,29 @@ def _number_color(tree, number, values, settings):
         _set_colors(ramp.color_ramp.elements, colors, last=len(colors) - 1)
     tree.links.new(number, bounds.inputs["Value"])
     tree.links.new(bounds.outputs["Result"], ramp.inputs[0])
-    return ramp.outputs["Color"]
+    if steps or not settings.iso_lines:
+        return ramp.outputs["Color"]
+    return _with_lines(tree, bounds.outputs["Result"], ramp.outputs["Color"], settings.iso_lines)
+
+
+def _with_lines(tree, number, color, count):
+    """Darken a colour along so many even steps of a number from 0 to 1."""
+    scaled = add_node(tree, "ShaderNodeMath", 2, -300, operation="MULTIPLY")
+    scaled.inputs[1].default_value = count
+    part = add_node(tree, "ShaderNodeMath", 3, -300, operation="FRACT")
+    line = add_node(tree, "ShaderNodeMath", 4, -300, operation="LESS_THAN")
+    line.inputs[1].default_value = _LINE
+    mixed = add_node(tree, "ShaderNodeMixRGB", 5, -300)
+    mixed.inputs["Color2"].default_value = _DARK
+    for source, target in (
+        (number, scaled.inputs[0]),
+        (scaled.outputs[0], part.inputs[0]),
+        (part.outputs[0], line.inputs[0]),
+        (line.outputs[0], mixed.inputs["Fac"]),
+        (color, mixed.inputs["Color1"]),
+    ):
+        tree.links.new(source, target)
+    return mixed.outputs["Color"]
 
 
 def _set_colors(elements, colors, last):

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..operators.attributes import NORMAL, RESULTS, eigenvector_name, mode_number
+from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number
 from ..operators.reading import is_display, obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
 from .display import find_display, input_property, label, range_node, shown_attribute, step_colors
@@ -154,7 +154,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         shown = shown_attribute(obj)
         attributes = obj.data.attributes
         column = layout.column(align=True)
-        for name in RESULTS:
+        for name in (*RESULTS, *(name for name in APPLICATIONS if name in attributes)):
             row = column.row(align=True)
             row.enabled = name in attributes
             row.operator("meshfree.colormap", text=label(name), depress=name == shown).attribute = name
@@ -168,6 +168,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             column.prop(obj.meshfree, "component")
         column.prop(obj.meshfree, "color_map")
         column.prop(obj.meshfree, "coverage")
+        column.prop(obj.meshfree, "iso_lines")
         column.operator("meshfree.colormap", text="Update Colors")
         column = layout.column(align=True)
         bounds = range_node(obj)

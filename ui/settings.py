@@ -165,6 +165,13 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         max=100.0,
         subtype="PERCENTAGE",
     )
+    iso_lines: IntProperty(
+        name="Iso Lines",
+        description="Dark lines at so many even steps of the color range, such as lines of equal distance; 0 for none",
+        default=0,
+        min=0,
+        soft_max=50,
+    )
     component: EnumProperty(
         name="Vector",
         description="What of a vector is shown",

@@ -1,0 +1,143 @@
+"""Fields between given values, and distances along the surface."""
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+
+from ..core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
+from .application import ApplicationOperator, operator_reader
+from .attributes import DISTANCE, FIELD, read_attribute, write_attribute
+from .groups import SOURCE, VALUE, chosen_members, chosen_weights, group_weights
+from .result import length_text
+from .selecting import selected
+
+UNREACHED = -1.0  # distance of points that no source reaches
+
+
+class ShownOperator(ApplicationOperator):
+    """An operator whose attribute is shown when it is done."""
+
+    show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
+
+    def execute(self, context):
+        result = super().execute(context)
+        if result == {"FINISHED"} and self.show:
+            bpy.ops.meshfree.colormap(attribute=self.writes[0])
+        return result
+
+
+class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
+    """Fill in a smooth field between points with given values, or solve Poisson's equation"""
+
+    bl_idname = "meshfree.harmonic_field"
+    bl_label = "Harmonic Field"
+    writes = (FIELD,)
+
+    values: EnumProperty(
+        name="Values",
+        description="Where the given values come from",
+        items=[
+            ("WEIGHTS", "Weights", "The points of one group have their weights as values"),
+            ("GROUPS", "Two Groups", "The points of each of two groups have one value"),
+        ],
+        default="WEIGHTS",
+    )
+    group: StringProperty(name="Group", description="Vertex group whose weights are the values", default=VALUE)
+    low_group: StringProperty(name="Low Group", description="Vertex group of the points with the low value")
+    high_group: StringProperty(name="High Group", description="Vertex group of the points with the high value")
+    low: FloatProperty(name="Low Value", description="Value of the low group, or of weight 0", default=0.0)
+    high: FloatProperty(name="High Value", description="Value of the high group, or of weight 1", default=1.0)
+    source: StringProperty(
+        name="Source",
+        description="Attribute with the source f of Poisson's equation -Laplacian u = f; empty for a harmonic field",
+    )
+
+    def plan(self, context, obj):
+        if self.values == "GROUPS":
+            low = chosen_members(obj, self.low_group, "Low Group")
+            high = chosen_members(obj, self.high_group, "High Group")
+            both = np.count_nonzero(low & high)
+            if both:
+                raise PointCloudError(
+                    f'{both} points are both in "{self.low_group}" and in "{self.high_group}". Remove them from one.'
+                )
+            fixed, values = low | high, np.where(high, self.high, self.low)
+        elif self.group or not self.source:
+            chosen_weights(obj, self.group, "Group")
+            weights = group_weights(obj, self.group, outside=np.nan)
+            fixed = np.isfinite(weights)  # with weight 0 too
+            values = self.low + (self.high - self.low) * weights
+        else:
+            fixed = values = np.zeros(len(obj.data.vertices), dtype=bool)
+        source = read_attribute(obj.data, self.source).astype(np.float64) if self.source else None
+        _, operator = operator_reader(context, obj)
+
+        def compute(progress):
+            laplacian = operator(progress)
+            if source is None:
+                return harmonic_field(laplacian, fixed, values[fixed], progress=progress)
+            return solve_poisson(laplacian, source, fixed, values[fixed], progress=progress)
+
+        return compute
+
+    def write(self, context, obj, result):
+        write_attribute(obj.data, FIELD, result)
+        obj.data.update()
+        return f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "values")
+        names = ("group",) if self.values == "WEIGHTS" else ("low_group", "high_group")
+        for name in names:
+            layout.prop_search(self, name, context.object, "vertex_groups")
+        for name in ("low", "high"):
+            layout.prop(self, name)
+        layout.prop_search(self, "source", context.object.data, "attributes")
+        layout.prop(self, "show")
+
+
+class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
+    """Measure the distance along the surface from a group of points, or from the selected ones"""
+
+    bl_idname = "meshfree.geodesic_distance"
+    bl_label = "Geodesic Distance"
+    writes = (DISTANCE,)
+
+    group: StringProperty(
+        name="Sources",
+        description="Vertex group with the points to measure from; where there is none of that name, the points"
+        " selected in Edit Mode",
+        default=SOURCE,
+    )
+
+    def plan(self, context, obj):
+        if self.group and (self.group in obj.vertex_groups or self.group != SOURCE):
+            sources = chosen_members(obj, self.group, "Sources")
+        else:
+            sources = selected(obj)
+        _, operator = operator_reader(context, obj)
+
+        def compute(progress):
+            return geodesic_distance(operator(progress), sources, progress=progress)
+
+        return compute
+
+    def write(self, context, obj, result):
+        reached = np.isfinite(result)
+        write_attribute(obj.data, DISTANCE, np.where(reached, result, UNREACHED))
+        obj.data.update()
+        missed = np.count_nonzero(~reached)
+        if missed:
+            self.warn([f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."])
+        return f"{obj.name}: distances up to {length_text(result[reached].max())}"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop_search(self, "group", context.object, "vertex_groups")
+        layout.prop(self, "show")
+
+
+CLASSES = (MESHFREE_OT_harmonic_field, MESHFREE_OT_geodesic_distance)

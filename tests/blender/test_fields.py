@@ -1,0 +1,101 @@
+"""Fields between given values, and distances along the surface, as attributes that are shown at once."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests.blender.clouds import add_group, add_object, attribute, everything, grid_points, local_points, sphere_points
+
+
+@pytest.fixture
+def strip():
+    points, _ = grid_points(columns=60, rows=20, step=0.1, jitter=0.0)
+    return add_object(points)
+
+
+@pytest.fixture
+def shown(extension):
+    return importlib.import_module(f"{extension.__name__}.ui.display").shown_attribute
+
+
+class TestHarmonicField:
+    def test_two_groups(self, strip, shown):
+        x = local_points(strip)[:, 0]
+        add_group(strip, "Left", x < 0.45)
+        add_group(strip, "Right", x > 5.45)
+        bpy.ops.meshfree.harmonic_field(values="GROUPS", low_group="Left", high_group="Right", low=-1.0, high=3.0)
+        expected = -1.0 + 4.0 * np.clip((x - 0.4) / 5.1, 0.0, 1.0)
+        assert_allclose(attribute(strip, "lb_field"), expected, atol=0.08)
+        assert shown(strip) == "lb_field"
+
+    def test_weights_as_values_zero_included(self, strip):
+        x = local_points(strip)[:, 0]
+        add_group(strip, "Value", x < 0.45, weight=0.0)
+        strip.vertex_groups["Value"].add(np.flatnonzero(x > 5.45).tolist(), 0.5, "REPLACE")
+        bpy.ops.meshfree.harmonic_field()
+        field = attribute(strip, "lb_field")
+        assert field.min() == 0.0
+        assert field.max() == 0.5
+        assert_allclose(field, 0.5 * np.clip((x - 0.4) / 5.1, 0.0, 1.0), atol=0.01)
+
+    def test_a_source_from_an_attribute(self):
+        obj = add_object(sphere_points(1500))
+        z = local_points(obj)[:, 2]
+        obj.data.attributes.new("heat", "FLOAT", "POINT").data.foreach_set("value", z.astype(np.float32))
+        bpy.ops.meshfree.harmonic_field(source="heat", group="")
+        field = attribute(obj, "lb_field")
+        assert_allclose(field - field.mean(), 0.5 * (z - z.mean()), atol=0.02)
+
+    def test_points_in_both_groups(self, strip):
+        add_group(strip, "A", range(100))
+        add_group(strip, "B", range(90, 200))
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match='10 points are both in "A" and in "B"'):
+            bpy.ops.meshfree.harmonic_field(values="GROUPS", low_group="A", high_group="B")
+        assert everything(strip) == before
+
+
+class TestGeodesicDistance:
+    def test_from_a_group_on_a_scaled_sphere(self, shown):
+        obj = add_object(sphere_points(1500))
+        obj.scale = (2.0, 2.0, 2.0)
+        points = local_points(obj)
+        add_group(obj, "Source", [np.argmax(points[:, 2])])
+        bpy.ops.meshfree.geodesic_distance()
+        expected = 2.0 * np.arccos(np.clip(points @ points[np.argmax(points[:, 2])], -1.0, 1.0))
+        assert np.abs(attribute(obj, "lb_distance") - expected).mean() < 0.02
+        assert shown(obj) == "lb_distance"
+
+    def test_from_the_selection(self, strip):
+        x = local_points(strip)[:, 0]
+        strip.data.vertices.foreach_set("select", x < 0.05)
+        bpy.ops.meshfree.geodesic_distance(show=False)
+        assert_allclose(attribute(strip, "lb_distance"), x - x.min(), atol=0.02)
+
+    def test_parts_without_a_source(self, extension):
+        obj = add_object(np.concatenate([sphere_points(900), sphere_points(300, 1) * 0.5 + [4.0, 0.0, 0.0]]))
+        add_group(obj, "Source", [0])
+        bpy.ops.meshfree.geodesic_distance()
+        distance = attribute(obj, "lb_distance")
+        assert (distance[900:] == -1.0).all()
+        assert (distance[:900] >= 0.0).all()
+        display = importlib.import_module(f"{extension.__name__}.ui.display")
+        assert display.range_node(obj).inputs["From Min"].default_value >= 0.0
+
+    def test_neither_group_nor_selection(self, strip):
+        strip.data.vertices.foreach_set("select", np.zeros(1200, dtype=bool))
+        with pytest.raises(RuntimeError, match="No points.*are selected"):
+            bpy.ops.meshfree.geodesic_distance()
+
+    def test_iso_lines_are_a_setting_of_the_display(self, strip):
+        strip.data.vertices.foreach_set("select", np.arange(1200) < 5)
+        strip.meshfree.iso_lines = 12
+        bpy.ops.meshfree.geodesic_distance()
+        nodes = strip.modifiers[0].node_group and bpy.data.materials[0].node_tree.nodes
+        factors = [
+            node.inputs[1].default_value for node in nodes if node.type == "MATH" and node.operation == "MULTIPLY"
+        ]
+        assert factors == [12.0]
