@@ -1,5 +1,8 @@
 """What the operators that apply the Laplacian have in common: read all objects, compute, and only then write."""
 
+import bpy
+from bpy.props import BoolProperty
+
 from ..core import PointCloudError
 from . import cache
 from .options import laplacian_options
@@ -45,6 +48,18 @@ class ApplicationOperator(ReadyOperator):
         """Report notices of core."""
         for notice in notices:
             self.report({"WARNING"}, notice)
+
+
+class ShownOperator(ApplicationOperator):
+    """An operator whose attribute is shown when it is done."""
+
+    show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
+
+    def execute(self, context):
+        result = super().execute(context)
+        if result == {"FINISHED"} and self.show:
+            bpy.ops.meshfree.colormap(attribute=self.writes[0])
+        return result
 
 
 def chosen_objects(context):

@@ -44,8 +44,12 @@ def eigenvector_name(mode: int) -> str:
 
 def mode_number(name: str) -> int:
     """Number of the mode that an attribute holds; 0 for attributes that hold none."""
-    number = name.removeprefix(EIGENVECTOR)
-    return int(number) if name.startswith(EIGENVECTOR) and number.isdecimal() else 0
+    return _number(name, EIGENVECTOR)
+
+
+def _number(name, prefix):
+    number = name.removeprefix(prefix)
+    return int(number) if name.startswith(prefix) and number.isdecimal() else 0
 
 
 def check_names(obj, names):
@@ -97,7 +101,7 @@ def read_attribute(mesh, name: str):
     return values[:, 0] if storage.components == 1 else values
 
 
-def remove_eigenvectors(mesh, beyond: int):
-    """Remove the modes numbered above `beyond`."""
-    for name in [attribute.name for attribute in mesh.attributes if mode_number(attribute.name) > beyond]:
+def remove_numbered(mesh, prefix: str, beyond: int):
+    """Remove the attributes of a kind that are numbered above `beyond`."""
+    for name in [attribute.name for attribute in mesh.attributes if _number(attribute.name, prefix) > beyond]:
         mesh.attributes.remove(mesh.attributes[name])

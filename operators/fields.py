@@ -2,28 +2,16 @@
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
-from .application import ApplicationOperator, operator_reader
+from .application import ShownOperator, operator_reader
 from .attributes import DISTANCE, FIELD, read_attribute, write_attribute
 from .groups import SOURCE, VALUE, chosen_members, chosen_weights, group_weights
 from .result import length_text
 from .selecting import selected
 
 UNREACHED = -1.0  # distance of points that no source reaches
-
-
-class ShownOperator(ApplicationOperator):
-    """An operator whose attribute is shown when it is done."""
-
-    show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
-
-    def execute(self, context):
-        result = super().execute(context)
-        if result == {"FINISHED"} and self.show:
-            bpy.ops.meshfree.colormap(attribute=self.writes[0])
-        return result
 
 
 class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):

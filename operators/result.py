@@ -8,13 +8,14 @@ from .attributes import (
     AREA,
     BOUNDARY,
     COMPONENT,
+    EIGENVECTOR,
     GAUSSIAN_CURVATURE,
     MEAN_CURVATURE,
     NORMAL,
     RESULTS,
     check_names,
     eigenvector_name,
-    remove_eigenvectors,
+    remove_numbered,
     write_attribute,
 )
 from .options import settings_values
@@ -57,13 +58,13 @@ def write_result(obj, analysis, write_limit: int):
     mesh = obj.data
     if analysis.spectrum is not None:
         vectors = analysis.spectrum.eigenvectors[:, :write_limit]
-        remove_eigenvectors(mesh, beyond=vectors.shape[1])
+        remove_numbered(mesh, EIGENVECTOR, beyond=vectors.shape[1])
         for index, vector in enumerate(vectors.T):
             write_attribute(mesh, eigenvector_name(index + 1), vector)
         # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
         obj[EIGENVALUES] = analysis.spectrum.eigenvalues.tolist()
     elif is_stale(obj):
-        remove_eigenvectors(mesh, beyond=0)
+        remove_numbered(mesh, EIGENVECTOR, beyond=0)
         obj.pop(EIGENVALUES, None)
     laplacian = analysis.laplacian
     write_attribute(mesh, AREA, laplacian.areas)

@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..operators.attributes import SEGMENT
 from ..operators.deform import binding
 from .panel import ReadyPanel, SidebarPanel
 
@@ -37,6 +38,21 @@ class MESHFREE_PT_shape(ReadyPanel, bpy.types.Panel):
         column.operator("meshfree.mode_shape", text="Deform by Mode...")
 
 
+class MESHFREE_PT_segment(ReadyPanel, bpy.types.Panel):
+    """Parts and signatures"""
+
+    bl_label = "Segment"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator("meshfree.segment", text="Segment...")
+        row = column.row(align=True)
+        row.enabled = SEGMENT in context.object.data.attributes
+        row.operator("meshfree.separate_by_segment")
+        self.layout.operator("meshfree.signature", text="Signatures...")
+
+
 class MESHFREE_PT_fields(ReadyPanel, bpy.types.Panel):
     """Fields and distances"""
 
@@ -64,4 +80,4 @@ class MESHFREE_PT_deform(ReadyPanel, bpy.types.Panel):
         row.operator("meshfree.deform_update")
 
 
-CLASSES = (MESHFREE_PT_points, MESHFREE_PT_shape, MESHFREE_PT_fields, MESHFREE_PT_deform)
+CLASSES = (MESHFREE_PT_points, MESHFREE_PT_shape, MESHFREE_PT_segment, MESHFREE_PT_fields, MESHFREE_PT_deform)

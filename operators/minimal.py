@@ -1,0 +1,94 @@
+"""Minimal surfaces: what a soap film on the rim of an object would be."""
+
+import bpy
+from bpy.props import FloatProperty, IntProperty, StringProperty
+
+from ..core import PointCloudError, minimal_surface
+from . import cache
+from .application import ApplicationOperator
+from .groups import FIXED, chosen_members
+from .options import laplacian_options
+from .positions import check_movable, target_property, write_positions
+from .reading import read_points
+from .result import area_text
+
+HISTORY = "lb_area_history"  # custom property of the object: area after each step
+
+
+class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
+    """Let the points shrink to the least area that their rim can span, as a soap film does"""
+
+    bl_idname = "meshfree.minimal_surface"
+    bl_label = "Minimal Surface"
+
+    group: StringProperty(
+        name="Fixed",
+        description="Vertex group with the points that stay, every rim at least; where there is none of that name, the"
+        " rims that are found",
+        default=FIXED,
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="It ends when a step changes the area by a smaller share than this",
+        default=1e-4,
+        min=0.0,
+        soft_max=0.01,
+        precision=6,
+    )
+    steps: IntProperty(name="Steps", description="Most steps to take", default=100, min=1, soft_max=500)
+    target: target_property()
+
+    def plan(self, context, obj):
+        check_movable(obj, self.target)
+        reading = read_points(context, obj)
+        options = laplacian_options(obj.meshfree)
+        fixed = reading.rim
+        if self.group and (self.group in obj.vertex_groups or self.group != FIXED):
+            fixed = chosen_members(obj, self.group, "Fixed")
+        tolerance, steps, name = self.tolerance, self.steps, obj.name
+
+        def compute(progress):
+            rim = fixed
+            if rim is None:
+                rim = cache.build(reading.points, options, None, progress).laplacian.boundary
+                if not rim.any():
+                    raise PointCloudError(
+                        f'"{name}" has no rim, so that its surface would shrink to nothing. Assign the points that stay'
+                        f' to the vertex group "{FIXED}".'
+                    )
+            count = 0
+
+            def stepped(step, points, area):
+                nonlocal count
+                count = step
+
+            def report(stage, fraction):
+                progress("Steps", min(1.0, (count + fraction) / steps))
+
+            return reading, minimal_surface(
+                reading.points, rim, tolerance, steps, options, callback=stepped, progress=report
+            )
+
+        return compute
+
+    def write(self, context, obj, result):
+        reading, film = result
+        self.warn(film.notices)
+        if film.steps:
+            write_positions(obj, reading, film.points, self.target, "Minimal Surface")
+        obj[HISTORY] = film.area_history.tolist()
+        area = film.area_history[-1] if film.steps else film.initial_area
+        return (
+            f"{obj.name}: area from {area_text(film.initial_area)} to {area_text(float(area))} in {film.steps} steps"
+            f" ({film.reason})"
+        )
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop_search(self, "group", context.object, "vertex_groups")
+        for name in ("tolerance", "steps", "target"):
+            layout.prop(self, name)
+
+
+CLASSES = (MESHFREE_OT_minimal_surface,)

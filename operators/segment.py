@@ -1,0 +1,157 @@
+"""Divide objects into parts, and make objects of the parts; signatures that tell points apart."""
+
+import bmesh
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, IntProperty
+
+from ..core import PointCloudError, heat_kernel_signature, nodal_domains, segment, wave_kernel_signature
+from . import cache
+from .application import ShownOperator, operator_reader
+from .attributes import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE, read_attribute, remove_numbered, write_attribute
+from .ready import ReadyOperator
+from .result import check_writable
+
+GROUP = "Segment {}"  # of vertex groups and objects
+
+
+class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
+    """Divide the points into parts, such as the limbs of a figure, or where a vibration mode has one sign"""
+
+    bl_idname = "meshfree.segment"
+    bl_label = "Segment"
+    writes = (SEGMENT,)
+
+    method: EnumProperty(
+        name="Method",
+        description="What makes a part",
+        items=[
+            ("PARTS", "Parts", "As many parts as asked for, each connected, divided at narrow places"),
+            ("NODAL", "Signs of a Mode", "Connected regions in which a vibration mode keeps its sign"),
+        ],
+        default="PARTS",
+    )
+    parts: IntProperty(name="Parts", description="How many parts", default=6, min=1, soft_max=50)
+    mode: IntProperty(name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1)
+    vertex_groups: BoolProperty(name="Vertex Groups", description="Make a vertex group of each part", default=False)
+
+    def plan(self, context, obj):
+        _, operator = operator_reader(context, obj)
+        by_mode, parts, mode = self.method == "NODAL", self.parts, self.mode
+
+        def compute(progress):
+            laplacian = operator(progress)
+            if by_mode:
+                return nodal_domains(cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1], laplacian)
+            return segment(laplacian, parts, progress=progress)
+
+        return compute
+
+    def write(self, context, obj, result):
+        write_attribute(obj.data, SEGMENT, result)
+        count = int(result.max()) + 1
+        if self.vertex_groups:
+            for name in [group.name for group in obj.vertex_groups if _is_numbered(group.name)]:
+                obj.vertex_groups.remove(obj.vertex_groups[name])
+            for label in range(count):
+                group = obj.vertex_groups.new(name=GROUP.format(label))
+                group.add(np.flatnonzero(result == label).tolist(), 1.0, "REPLACE")
+        obj.data.update()
+        return f"{obj.name}: {count} parts"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        for name in ("method", "mode" if self.method == "NODAL" else "parts", "vertex_groups", "show"):
+            layout.prop(self, name)
+
+
+def _is_numbered(name):
+    start = GROUP.format("")
+    return name.startswith(start) and name.removeprefix(start).isdecimal()
+
+
+class MESHFREE_OT_separate_by_segment(ReadyOperator, bpy.types.Operator):
+    """Make an object of each part; the largest one stays in this object"""
+
+    bl_idname = "meshfree.separate_by_segment"
+    bl_label = "Separate by Segment"
+
+    def execute(self, context):
+        obj = context.object
+        try:
+            check_writable(obj, (), False)
+            labels = read_attribute(obj.data, SEGMENT)
+            if labels.dtype.kind != "i" or labels.max() < 1:
+                raise PointCloudError(f'All points of "{obj.name}" are in one part. Segment it into more parts first.')
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        numbers = [number for number in np.unique(labels) if number > 0]
+        for number in numbers:
+            part = obj.copy()
+            part.data = obj.data.copy()
+            part.name = f"{obj.name} {GROUP.format(number)}"
+            _keep(part.data, labels == number)
+            for collection in obj.users_collection:
+                collection.objects.link(part)
+        _keep(obj.data, labels <= 0)
+        self.report({"INFO"}, f"{obj.name}: {len(numbers)} parts are objects of their own")
+        return {"FINISHED"}
+
+
+def _keep(mesh, kept):
+    """Delete all vertices of a mesh but some, (n,) bool, with all that belongs to them."""
+    shape = bmesh.new()
+    shape.from_mesh(mesh)
+    dropped = [vertex for vertex, keep in zip(shape.verts, kept, strict=True) if not keep]
+    bmesh.ops.delete(shape, geom=dropped, context="VERTS")
+    shape.to_mesh(mesh)
+    shape.free()
+
+
+class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
+    """Compute signatures that tell points apart by the shape around them, at several scales, however it is bent"""
+
+    bl_idname = "meshfree.signature"
+    bl_label = "Signatures"
+
+    kind: EnumProperty(
+        name="Kind",
+        description="What spreads over the surface",
+        items=[
+            ("HEAT", "Heat", "Heat that is left after some time: high on tips and thin parts"),
+            ("WAVE", "Wave", "Waves of one energy: sharper, also for small features"),
+        ],
+        default="HEAT",
+    )
+    count: IntProperty(
+        name="Scales", description="How many scales, from fine to coarse", default=8, min=1, soft_max=50, max=999
+    )
+    modes: IntProperty(
+        name="Modes", description="How many vibration modes they are made of", default=100, min=10, soft_max=300
+    )
+
+    @property
+    def writes(self):
+        """Names of the attributes."""
+        return [f"{self._prefix()}{number:03d}" for number in range(1, self.count + 1)]
+
+    def _prefix(self):
+        return HEAT_SIGNATURE if self.kind == "HEAT" else WAVE_SIGNATURE
+
+    def plan(self, context, obj):
+        _, operator = operator_reader(context, obj)
+        signature = heat_kernel_signature if self.kind == "HEAT" else wave_kernel_signature
+        count, modes = self.count, self.modes
+        return lambda progress: signature(cache.lowest_modes(operator(progress), modes, progress), count=count)
+
+    def write(self, context, obj, result):
+        remove_numbered(obj.data, self._prefix(), beyond=self.count)
+        for name, values in zip(self.writes, result.T, strict=True):
+            write_attribute(obj.data, name, values)
+        obj.data.update()
+        return f"{obj.name}: signatures at {self.count} scales"
+
+
+CLASSES = (MESHFREE_OT_segment, MESHFREE_OT_separate_by_segment, MESHFREE_OT_signature)

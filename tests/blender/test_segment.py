@@ -1,0 +1,88 @@
+"""Parts as an attribute, vertex groups and objects; signatures at several scales."""
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.clouds import add_group, add_object, attribute, everything, local_points, result_names, sphere_points
+
+
+@pytest.fixture
+def dumbbell():
+    """Add two balls joined by a bar, all of one surface."""
+    points = sphere_points(2500)
+    along = points[:, 0]
+    return add_object(points * np.column_stack([3.0 + 0 * along, *[0.35 + 0.9 * along**2] * 2]))
+
+
+def test_two_parts_are_the_two_balls(dumbbell):
+    bpy.ops.meshfree.segment(parts=2)
+    labels, x = attribute(dumbbell, "lb_segment"), local_points(dumbbell)[:, 0]
+    assert set(labels) == {0, 1}
+    sure = np.abs(x) > 0.5
+    assert len(np.unique(labels[sure & (x > 0)])) == len(np.unique(labels[sure & (x < 0)])) == 1
+
+
+def test_signs_of_a_mode(dumbbell):
+    bpy.ops.meshfree.segment(method="NODAL", mode=2)
+    labels, x = attribute(dumbbell, "lb_segment"), local_points(dumbbell)[:, 0]
+    assert np.abs(np.corrcoef(labels, np.sign(x))[0, 1]) > 0.95
+
+
+def test_vertex_groups_on_demand(dumbbell):
+    add_group(dumbbell, "Segment 7", [0, 1])
+    add_group(dumbbell, "Mine", [0, 1])
+    bpy.ops.meshfree.segment(parts=3, vertex_groups=True)
+    assert [group.name for group in dumbbell.vertex_groups] == ["Mine", "Segment 0", "Segment 1", "Segment 2"]
+    labels = attribute(dumbbell, "lb_segment")
+    index = dumbbell.vertex_groups["Segment 1"].index
+    held = [any(item.group == index for item in vertex.groups) for vertex in dumbbell.data.vertices]
+    assert (np.array(held) == (labels == 1)).all()
+
+
+def test_separating_keeps_every_point_and_what_it_holds(dumbbell):
+    dumbbell.location = (1.0, 2.0, 3.0)
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.segment(parts=3)
+    labels, points, areas = (
+        attribute(dumbbell, "lb_segment"),
+        local_points(dumbbell),
+        attribute(dumbbell, "lb_area"),
+    )
+    add_group(dumbbell, "Right", points[:, 0] > 0.0)
+    bpy.ops.meshfree.separate_by_segment()
+    for number, name in enumerate(["Cloud", "Cloud Segment 1", "Cloud Segment 2"]):
+        part = bpy.data.objects[name]
+        np.testing.assert_array_equal(local_points(part), points[labels == number])
+        np.testing.assert_array_equal(attribute(part, "lb_area"), areas[labels == number])
+        assert tuple(part.location) == (1.0, 2.0, 3.0)
+        right = part.vertex_groups["Right"].index
+        held = [any(item.group == right for item in vertex.groups) for vertex in part.data.vertices]
+        np.testing.assert_array_equal(held, points[labels == number, 0] > 0.0)
+
+
+def test_separating_without_parts(dumbbell):
+    before = everything(dumbbell)
+    with pytest.raises(RuntimeError, match="no attribute lb_segment"):
+        bpy.ops.meshfree.separate_by_segment()
+    assert everything(dumbbell) == before
+
+
+def test_too_many_modes_asked_for(dumbbell):
+    before = everything(dumbbell)
+    with pytest.raises(RuntimeError, match="modes were asked for"):
+        bpy.ops.meshfree.segment(method="NODAL", mode=2000)
+    assert everything(dumbbell) == before
+
+
+@pytest.mark.parametrize("kind", ["HEAT", "WAVE"])
+def test_signatures(core, dumbbell, kind):
+    bpy.ops.meshfree.signature(kind=kind, count=5, modes=20)
+    names = [f"lb_{kind.lower()}_signature_{number:03d}" for number in range(1, 6)]
+    assert [name for name in result_names(dumbbell) if "signature" in name] == names
+    laplacian = core.build_laplacian(local_points(dumbbell), options=core.LaplacianOptions(orient=True))
+    signature = getattr(core, f"{kind.lower()}_kernel_signature")(laplacian.eigenpairs(20), count=5)
+    for name, values in zip(names, signature.T, strict=True):
+        np.testing.assert_allclose(attribute(dumbbell, name), values, rtol=1e-3)
+    bpy.ops.meshfree.signature(kind=kind, count=2, modes=20)
+    assert [name for name in result_names(dumbbell) if "signature" in name] == names[:2]
