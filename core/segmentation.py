@@ -6,8 +6,11 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from .errors import InvalidPointsError, IslandError, PointCloudError, TooFewPointsError, UnresolvedModesError
 from .graph import near_graph
+from .kernel import RESOLVED
 
 _NEIGHBORS = 8  # nearest points on the same sheet that a domain may continue to
+_STEP = 0.75  # from level to level, on the way down the hills of a function
+_LOWEST = 1e-4  # the last but one of these levels, if all signs are trusted
 _MODES = 3  # modes for each part: with fewer, limbs are missed; with more, small features get parts
 _STEPS = 300  # of k-means at most; a few dozen are needed
 _ROUGH = 1e-3  # accuracy at which the starts of k-means are compared
@@ -15,12 +18,13 @@ _LEAST = 0.03  # a cluster of a smaller share of the mean area is no part, but a
 _ROUNDS = 4  # of leaving such clusters out
 
 
-def nodal_domains(values, laplacian, threshold=0.02, smallest=5):
+def nodal_domains(values, laplacian, threshold=0.02, bridge=0.1, smallest=5):
     """Divide the points into connected sets on which a function keeps its sign.
 
     Points hang together through their nearest neighbours on the same sheet, so that two domains of one sign do not join
     through a narrow one of the other sign between them. Where the function is near zero its sign is not trusted: such
-    points, and specks of a few points, go to the nearest domain of their sign, or else to the nearest one.
+    points, and specks of a few points, go to the nearest domain of their sign, or else to the nearest one. Where nodal
+    lines cross, the least change opens a way between two of the four domains; so low bridges do not join domains.
 
     Parameters
     ----------
@@ -30,22 +34,24 @@ def nodal_domains(values, laplacian, threshold=0.02, smallest=5):
         Of n points.
     threshold : float
         Share of the largest size of the values below which a sign is not trusted.
+    bridge : float
+        Two hills of one sign are two domains if the way between them goes lower than this share of the lower one.
     smallest : int
         Points of the smallest domain; smaller ones are specks.
 
     Returns
     -------
     ndarray, (n,) int
-        Domain of each point: 0 for the one of most points, and so on; -1 for points left out of the operator. Of equally
-        large domains the one with the larger mean value comes first. Where the function is near zero on a whole
-        connected part, that is one domain.
+        Domain of each point: 0 for the one of most points, and so on; -1 for points left out of the operator. Of
+        equally large domains the one with the larger mean value comes first. Where the function is near zero on a
+        whole connected part, that is one domain.
 
     Raises
     ------
     InvalidPointsError
         Values of another length than the points, or not finite.
     PointCloudError
-        A threshold outside of [0, 1), or a smallest size below 1.
+        A threshold or bridge outside of [0, 1), or a smallest size below 1.
 
     References
     ----------
@@ -53,14 +59,15 @@ def nodal_domains(values, laplacian, threshold=0.02, smallest=5):
     """
     n = len(laplacian.points)
     values = _check_values(values, n)
-    if not 0.0 <= threshold < 1.0:
-        raise PointCloudError(f"The threshold of nodal domains is {threshold!r}. Use a number from 0 to below 1.")
+    for name, share in (("threshold", threshold), ("bridge", bridge)):
+        if not 0.0 <= share < 1.0:
+            raise PointCloudError(f"The {name} of nodal domains is {share!r}. Use a number from 0 to below 1.")
     if not smallest >= 1:
         raise PointCloudError(f"The smallest nodal domain is {smallest!r} points. Use a number of at least 1.")
     graph = near_graph(laplacian, _NEIGHBORS)
     value, part = values[graph.first], laplacian.component[graph.first]
-    positive = value > 0.0
-    domain = _pieces(graph.lengths, np.where(np.abs(value) > threshold * np.abs(value).max(), positive, -1))
+    positive = (value > 0.0).astype(int)
+    domain = _hills(graph.lengths, positive, np.abs(value), threshold, bridge)
     domain[np.bincount(domain + 1)[domain + 1] < smallest] = -1
     # A connected part where no domain is left is one.
     empty = np.bincount(part, domain >= 0) == 0
@@ -166,13 +173,14 @@ def _signature(laplacian, parts, spectrum, progress):
     """Return the faded global point signature, (n, modes)."""
     constant, count = _constant_modes(laplacian), modes_needed(laplacian, parts)
     if spectrum is None or len(spectrum.eigenvalues) < count:
-        count = min(count, len(laplacian.points) // 3)
+        # Weyl's law, doubled: with more, all eigenvalues would be computed only to be refused.
+        resolved = 2.0 * RESOLVED**2 / (4.0 * np.pi) * np.sum(laplacian.areas / laplacian.smoothing_lengths**2)
+        count = min(count, len(laplacian.points) // 3, int(resolved) + constant)
         try:
             spectrum = laplacian.eigenpairs(count, progress=progress)
         except UnresolvedModesError as error:
             count = error.resolved
-            if count > constant + parts:
-                spectrum = laplacian.eigenpairs(count, progress=progress)
+            spectrum = laplacian.eigenpairs(count, progress=progress)
     if count <= constant + parts:
         raise TooFewPointsError(
             f"{parts} parts need {constant + parts + 1} modes, but {len(laplacian.points)} points resolve {count}. Ask"
@@ -290,6 +298,41 @@ def _check_values(values, count):
     return given.astype(np.float64)
 
 
+def _hills(lengths, sign, size, threshold, bridge):
+    """Number the hills of a function's size, by what hangs together above lower and lower levels; -1 for no hill.
+
+    Hills of one sign that meet at a level become one, unless the level is below a share `bridge` of both.
+    """
+    lengths = sparse.triu(lengths, format="csr")  # once per edge is enough to tell what hangs together
+    hill, top = np.full(len(size), -1), np.empty(0, dtype=int)  # top: the highest place of each hill
+    steps = int(np.ceil(np.log(max(threshold, _LOWEST)) / np.log(_STEP)))
+    levels = size.max() * np.append(_STEP ** np.arange(1, steps), threshold)
+    by_size = np.argsort(size, kind="stable")
+    for level in levels:
+        piece = _pieces(lengths, np.where(size > level, sign, -1))
+        count = piece.max() + 1
+        known = by_size[piece[by_size] >= 0]
+        highest = np.empty(count, dtype=int)
+        highest[piece[known]] = known
+        order = np.argsort(size[top], kind="stable")
+        head = np.full(count, -1)
+        head[piece[top[order]]] = order
+        new = head < 0
+        # A hill that stays is alone in its piece, the highest one there, or reaches far above the level.
+        number = np.where(bridge * size[top] > level, np.arange(len(top)), head[piece[top]])
+        hill[hill >= 0] = number[hill[hill >= 0]]
+        alone = np.bincount(piece[top[np.unique(number)]], minlength=count) == 1
+        head[new] = len(top) + np.arange(np.count_nonzero(new))
+        top = np.append(top, highest[new])
+        fresh = (hill < 0) & (piece >= 0)
+        fresh[fresh] = (alone | new)[piece[fresh]]
+        hill[fresh] = head[piece[fresh]]
+        left, hill = np.unique(hill, return_inverse=True)
+        hill = hill.reshape(-1) - (left[0] < 0)
+        top = top[left[left >= 0]]
+    return hill
+
+
 def _keep_edges(lengths, label):
     """Return the graph without edges between different labels, or from labels below zero."""
     edges = lengths.tocoo()
@@ -299,8 +342,10 @@ def _keep_edges(lengths, label):
 
 def _pieces(lengths, label):
     """Number the connected pieces of equal label; labels below zero stay -1."""
-    piece = connected_components(_keep_edges(lengths, label), directed=False)[1]
-    return np.where(label >= 0, piece, -1)
+    piece, known = connected_components(_keep_edges(lengths, label), directed=False)[1], label >= 0
+    result = np.full(len(label), -1)
+    result[known] = np.unique(piece[known], return_inverse=True)[1].reshape(-1)
+    return result
 
 
 def _join_nearest(lengths, label):
@@ -316,7 +361,7 @@ def _join_nearest(lengths, label):
 
 
 def _by_size(graph, label, values):
-    """Number labels of places by their points and, where these are as many, by their mean value, for the caller's points."""
+    """Return labels for the caller's points, numbered by how many points have them, and by mean values among equals."""
     label = graph.hand_out(label, -1)
     known = label >= 0
     _, inverse, size = np.unique(label[known], return_inverse=True, return_counts=True)

@@ -1,0 +1,80 @@
+"""Selections that grow along the surface."""
+
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import fibonacci_sphere, parallel_sheets, random_sphere, sausage
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    return core.build_laplacian(random_sphere(3000))
+
+
+@pytest.mark.parametrize("distance", [0.3, 1.0, 2.0])
+def test_a_cap_of_a_sphere(sphere, distance):
+    angle = np.arccos(np.clip(sphere.points @ sphere.points[5], -1.0, 1.0))
+    grown = core.grow(sphere, [5], distance)
+    assert np.all(grown[angle < 0.95 * distance])
+    assert not np.any(grown[angle > distance])
+
+
+def test_from_several_points_and_from_a_mask(sphere):
+    both = core.grow(sphere, [5, 900], 0.4)
+    np.testing.assert_array_equal(both, core.grow(sphere, [5], 0.4) | core.grow(sphere, [900], 0.4))
+    np.testing.assert_array_equal(core.grow(sphere, np.isin(np.arange(3000), [5, 900]), 0.4), both)
+
+
+def test_nothing_grows_from_nothing_or_by_nothing(sphere):
+    assert not core.grow(sphere, [], 1.0).any()
+    np.testing.assert_array_equal(np.flatnonzero(core.grow(sphere, [17, 3], 0.0)), [3, 17])
+
+
+def test_place_scale_and_order_do_not_matter(sphere):
+    order = np.random.default_rng(0).permutation(3000)
+    turn = np.array([[0.0, 0.6, 0.8], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6]])
+    moved = core.build_laplacian(50.0 * sphere.points[order] @ turn.T + [7.0, 8.0, 9.0])
+    grown = core.grow(moved, np.flatnonzero(order == 5), 50.0 * 0.7)
+    assert np.mean(grown == core.grow(sphere, [5], 0.7)[order]) > 0.999
+
+
+def test_not_to_a_close_sheet():
+    points, sheet, _ = parallel_sheets(20, 1.5)
+    laplacian = core.build_laplacian(points)
+    grown = core.grow(laplacian, np.flatnonzero(sheet == 0)[:1], np.inf)
+    np.testing.assert_array_equal(grown, sheet == 0)
+
+
+def test_along_a_bent_sausage_and_not_across_the_gap():
+    points, along = sausage(3000, bent=True)
+    laplacian = core.build_laplacian(points)
+    grown = core.grow(laplacian, along < 0.0, 1.5)
+    assert np.all(grown[along < 1.3])
+    assert not np.any(grown[along > 1.7])
+
+
+def test_only_within_the_part_and_not_to_points_left_out():
+    lone = [[0.0, 9.0, 0.0], [0.0, -9.0, 0.0]]
+    points = np.concatenate([fibonacci_sphere(600), lone, 2.0 * fibonacci_sphere(900) + [9.0, 0.0, 0.0]])
+    laplacian = core.build_laplacian(points)
+    grown = core.grow(laplacian, [0, 601], np.inf)
+    np.testing.assert_array_equal(grown, np.isin(np.arange(len(points)), [*range(600), 601]))
+
+
+def test_points_at_one_place_grow_together():
+    laplacian = core.build_laplacian(np.repeat(fibonacci_sphere(600), 2, axis=0))
+    grown = core.grow(laplacian, [0], 0.5).reshape(600, 2)
+    np.testing.assert_array_equal(grown[:, 0], grown[:, 1])
+    assert 20 < grown[:, 0].sum() < 60
+
+
+@pytest.mark.parametrize("distance", [-1.0, np.nan, None, "far"])
+def test_distances_that_make_no_sense(sphere, distance):
+    with pytest.raises(core.PointCloudError, match="distance to grow by"):
+        core.grow(sphere, [0], distance)
+
+
+def test_unknown_points(sphere):
+    with pytest.raises(core.InvalidPointsError, match="below 3000"):
+        core.grow(sphere, [3000], 1.0)
