@@ -29,7 +29,7 @@ class SurfaceSize:
         self.known = laplacian.component >= 0
         self.factor, self.before = np.ones(self.known.sum()), None
         growth, _ = self._metric(laplacian.surface_points)
-        self.factor = 1.0 / growth
+        self.factor = 1.0 / np.where(growth > 0.0, growth, 1.0)
         areas, normals = laplacian.areas[self.known], laplacian.normals[self.known]
         self.before = self._sizes(laplacian.surface_points, areas, normals)
         if kind == "volume":

@@ -68,6 +68,8 @@ def smooth_points(
     ----------
     Vallet, Levy. Spectral geometry processing with manifold harmonics. 2008. Section 4 and Figure 12 of the paper.
     """
+    if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
+        raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
     blend = _Blend(laplacian, strength, mask, keep, fixed_rim)
     base, rest = _split(laplacian, fixed_rim, progress)
     if spectrum is None and callable(response):

@@ -290,6 +290,19 @@ def test_bad_settings(ellipsoid, settings, words):
             smoother(ellipsoid, **settings)
 
 
+@pytest.mark.parametrize("response", [None, 2.5, True, "all"])
+def test_responses_that_are_neither_number_nor_function(ellipsoid, response):
+    with pytest.raises(core.PointCloudError, match="whole number of modes, or a function"):
+        core.smooth_points(ellipsoid, response)
+
+
+def test_duplicates_move_together():
+    points = noisy_sphere(1000, False)[0]
+    laplacian = core.build_laplacian(np.concatenate([points, points[:50]]))
+    for found in (core.fair_points(laplacian, keep="volume"), core.smooth_points(laplacian, 20, keep="area")):
+        np.testing.assert_allclose(found[1000:], found[:50], atol=1e-9)
+
+
 @pytest.mark.parametrize("settings", [{"time": -1.0}, {"time": np.nan}, {"time": 1.0, "order": 4}])
 def test_bad_fairing(ellipsoid, settings):
     with pytest.raises(core.PointCloudError, match="fairing"):
