@@ -273,7 +273,7 @@ def respond(response, eigenvalues):
 def check_modes(count, spectrum, areas):
     """Check a number of modes to keep and return it as an integer."""
     held = len(spectrum.eigenvalues)
-    if isinstance(count, bool) or not np.isscalar(count) or int(count) != count or not 1 <= count <= held:
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= held:
         raise PointCloudError(
             f"The first {count!r} modes were to be kept, and the spectrum holds {held}. Use a whole number from 1 to"
             f" {held}, or compute more modes."

@@ -3,14 +3,13 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .errors import InvalidPointsError, PointCloudError, SolverError
+from .errors import InvalidPointsError, PointCloudError
 from .filters import chebyshev_filter, check_values, corrected_operator, fairing, spectral_filter
+from .sizes import SurfaceSize, match_size
 from .solvers import conjugate_gradients
 
 _KEPT = (None, "area", "volume")
 _TOLERANCE = 1e-5  # of the factors: the coordinates are large next to the spacing
-_SCALE = 4.0  # a filtered shape is not scaled by more than this, or its inverse
-_ROUNDS = 30  # of the secant steps that find the scale
 _AROUND = 4  # neighbours along the rim that a rim point is joined to
 
 
@@ -69,6 +68,8 @@ def smooth_points(
     ----------
     Vallet, Levy. Spectral geometry processing with manifold harmonics. 2008. Section 4 and Figure 12 of the paper.
     """
+    if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
+        raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
     blend = _Blend(laplacian, strength, mask, keep, fixed_rim)
     base, rest = _split(laplacian, fixed_rim, progress)
     if spectrum is None and callable(response):
@@ -149,7 +150,7 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals should agree in sign, as estimated ones do.
+        Its normals must agree in sign, as those from quadrics do, and others with ``LaplacianOptions(orient=True)``.
     mode : array_like, (n,)
         A column of the eigenvectors, or any function; only its shape matters, not its size.
     amplitude : float, optional
@@ -274,10 +275,10 @@ class _Blend:
             raise PointCloudError(f"What to keep is {keep!r}. Choose one of None, 'area', 'volume'.")
         if keep is not None and fixed_rim:
             raise PointCloudError("A rim that stays fixes the size already: keep neither area nor volume with it.")
-        open_parts = np.unique(laplacian.component[laplacian.boundary])
-        if keep == "volume" and len(open_parts):
+        if keep == "volume" and laplacian.boundary.any():
+            parts = len(np.unique(laplacian.component[laplacian.boundary]))
             raise PointCloudError(
-                f"{len(open_parts)} connected part(s) have a rim and enclose no volume. Keep the area instead."
+                f"Connected parts that have a rim and enclose no volume: {parts}. Keep the area instead."
             )
 
     def __call__(self, filtered):
@@ -292,79 +293,6 @@ class _Blend:
         def result(scale):
             return points + self.weights[:, None] * (center + scale[part][:, None] * (filtered - center) - points)
 
-        measure = _Size(self.laplacian, self.keep)
+        measure = SurfaceSize(self.laplacian, self.keep)
         touched = np.bincount(part, self.weights) != 0.0
-        return result(_match(lambda scale: measure(result(scale)), measure.before, touched))
-
-
-def _match(size, wanted, touched):
-    """Return the scale of each part at which its size is the one wanted, by secant steps on all parts together.
-
-    Raises
-    ------
-    SolverError
-        Some part has no such scale near 1.
-    """
-    last, scale = np.ones(len(wanted)), np.ones(len(wanted))
-    error = np.where(touched, size(scale) / wanted - 1.0, 0.0)
-    scale = np.where(error != 0.0, np.clip((1.0 + error) ** -0.5, 0.5, 2.0), 1.0)
-    for _ in range(_ROUNDS):
-        before, error = error, np.where(touched, size(scale) / wanted - 1.0, 0.0)
-        if np.abs(error).max() < 1e-9:
-            return scale
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = error * (scale - last) / (error - before)
-        step = np.where(np.isfinite(step), np.clip(step, -0.5 * scale, 0.5 * scale), 0.0)
-        last, scale = scale, np.clip(scale - step, 1.0 / _SCALE, _SCALE)
-    raise SolverError(
-        f"{np.count_nonzero(np.abs(error) >= 1e-9)} of {len(wanted)} connected parts lose too much of their size for a"
-        " scale to bring it back. Smooth less, or do not keep the size."
-    )
-
-
-class _Size:
-    """Area or volume of each connected part after its points moved, measured by the operator of the points before.
-
-    The operator gives the metric of the moved surface, ``P = sum_j w_ij (x'_j - x'_i) (x'_j - x'_i)^T / (2 areas_i)``:
-    its two large eigenvalues multiply to the square of the growth of the area, and the vector to the small one is the
-    normal. What the kernel's width does to P cancels in the quotient with that of the surface before.
-    """
-
-    def __init__(self, laplacian, kind):
-        self.laplacian, self.kind = laplacian, kind
-        self.known = laplacian.component >= 0
-        self.factor, self.before = np.ones(self.known.sum()), None
-        growth, _ = self._metric(laplacian.surface_points)
-        self.factor = 1.0 / growth
-        self.before = self._sizes(laplacian.surface_points, laplacian.areas[self.known], laplacian.normals[self.known])
-        if kind == "volume" and not np.all(self.before > 0.0):
-            raise PointCloudError(
-                f"{np.count_nonzero(self.before <= 0.0)} of {len(self.before)} connected parts enclose no volume by"
-                " their normals. Let the normals point outwards, or keep the area."
-            )
-
-    def __call__(self, moved):
-        growth, normals = self._metric(moved)
-        return self._sizes(moved, self.laplacian.areas[self.known] * growth, normals)
-
-    def _metric(self, places):
-        laplacian, known = self.laplacian, self.known
-        x = places - places[known].mean(axis=0)
-        a, b = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]).T
-        products = laplacian.stiffness @ np.column_stack([x, x[:, a] * x[:, b]])
-        flat = x[:, a] * products[:, b] + x[:, b] * products[:, a] - products[:, 3:]
-        flat = flat[known] / (2.0 * laplacian.areas[known])[:, None]
-        metric = flat[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
-        values, vectors = np.linalg.eigh(metric)
-        normals = vectors[:, :, 0]
-        side = np.where(np.einsum("ic,ic->i", normals, laplacian.normals[known]) < 0.0, -1.0, 1.0)
-        return np.sqrt(np.maximum(values[:, 1] * values[:, 2], 0.0)) * self.factor, side[:, None] * normals
-
-    def _sizes(self, places, areas, normals):
-        part = self.laplacian.component[self.known]
-        if self.kind == "area":
-            return np.bincount(part, areas)
-        x = places[self.known]
-        total = np.bincount(part)
-        center = np.column_stack([np.bincount(part, column) for column in x.T]) / total[:, None]
-        return np.bincount(part, areas * np.einsum("ic,ic->i", x - center[part], normals)) / 3.0
+        return result(match_size(lambda scale: measure(result(scale)), measure.before, touched))

@@ -16,7 +16,7 @@ def bumps(directions):
     return BUMP * np.sqrt(2.0) * sph_harm_y(6, 3, np.arccos(z), around).real
 
 
-def noisy(count, bumpy, level=0.03):
+def noisy_sphere(count, bumpy, level=0.03):
     """Points over the Fibonacci sphere with noise of the radius, and the noise."""
     directions = fibonacci_sphere(count)
     noise = level * np.random.default_rng(0).standard_normal(count)
@@ -36,7 +36,10 @@ def rms(values):
 
 @pytest.fixture(scope="module")
 def clouds():
-    return {bumpy: (core.build_laplacian(noisy(4000, bumpy)[0]), noisy(4000, bumpy)[1]) for bumpy in (False, True)}
+    return {
+        bumpy: (core.build_laplacian(noisy_sphere(4000, bumpy)[0]), noisy_sphere(4000, bumpy)[1])
+        for bumpy in (False, True)
+    }
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +132,7 @@ def test_few_modes_of_a_sphere_give_the_sphere():
 
 
 def test_details_are_boosted(clouds):
-    laplacian = core.build_laplacian(noisy(4000, True, 0.0)[0])
+    laplacian = core.build_laplacian(noisy_sphere(4000, True, 0.0)[0])
     boosted = core.smooth_points(laplacian, core.boost(1.5, 15.0))
     error, height = radial(boosted, False)
     assert 1.35 < height < 1.6
@@ -166,7 +169,7 @@ def test_strength_and_mask_blend(ellipsoid):
 
 @pytest.mark.parametrize("smoother", [core.fair_points, lambda laplacian: core.smooth_points(laplacian, 9)])
 def test_result_moves_turns_and_grows_with_the_points(smoother):
-    points = noisy(1200, True)[0]
+    points = noisy_sphere(1200, True)[0]
     found = smoother(core.build_laplacian(points))
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
     other = smoother(core.build_laplacian(20.0 * points @ turn + [4.0, 5.0, 6.0]))
@@ -256,8 +259,11 @@ class TestRim:
             core.fair_points(laplacian, keep="area", fixed_rim=True)
 
 
-def test_normals_that_point_inwards_enclose_no_volume(ellipsoid):
-    laplacian = core.build_laplacian(ellipsoid.points, -ellipsoid.normals)
+@pytest.mark.parametrize("signs", [-1.0, "random"])
+def test_normals_that_do_not_point_outwards_enclose_no_volume(ellipsoid, signs):
+    if signs == "random":
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], 1500)[:, None]
+    laplacian = core.build_laplacian(ellipsoid.points, signs * ellipsoid.normals)
     with pytest.raises(core.PointCloudError, match="point outwards"):
         core.fair_points(laplacian, keep="volume")
 
@@ -282,6 +288,19 @@ def test_bad_settings(ellipsoid, settings, words):
     for smoother in (core.fair_points, lambda *given, **named: core.smooth_points(*given, 10, **named)):
         with pytest.raises(core.PointCloudError, match=words):
             smoother(ellipsoid, **settings)
+
+
+@pytest.mark.parametrize("response", [None, 2.5, True, "all"])
+def test_responses_that_are_neither_number_nor_function(ellipsoid, response):
+    with pytest.raises(core.PointCloudError, match="whole number of modes, or a function"):
+        core.smooth_points(ellipsoid, response)
+
+
+def test_duplicates_move_together():
+    points = noisy_sphere(1000, False)[0]
+    laplacian = core.build_laplacian(np.concatenate([points, points[:50]]))
+    for found in (core.fair_points(laplacian, keep="volume"), core.smooth_points(laplacian, 20, keep="area")):
+        np.testing.assert_allclose(found[1000:], found[:50], atol=1e-9)
 
 
 @pytest.mark.parametrize("settings", [{"time": -1.0}, {"time": np.nan}, {"time": 1.0, "order": 4}])
