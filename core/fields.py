@@ -2,23 +2,18 @@
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import cg
 from scipy.spatial import cKDTree
 
-from .errors import InvalidPointsError, PointCloudError, SolverError
+from .errors import InvalidPointsError, PointCloudError
 from .kernel import SECOND_MOMENT
 from .points import as_mask
-from .solvers import coupled_parts, mean_spacing, narrow_laplacian
+from .solvers import conjugate_gradients, coupled_parts, mean_spacing, narrow_laplacian
 
 _MEAN = 1e-2  # of the source's mean size: a larger mean is meant, a smaller one is left by the quadrature
-_RTOL = 1e-9  # of the residual
-_STEPS = 20_000
 _DEEP = 0.6  # share of a point's weights that lead to fixed points, where it lies deep inside a set of them
 _NARROW = 60  # neighbours of the narrow operator: fewer are too noisy at random points, more leak more
-_NEAR = (
-    1.5,
-    3.0,
-)  # distances from thin sets, in units of h, where the narrow operator gives way to the wide one
+# Distances from thin sets, in units of h, between which the narrow operator gives way to the wide one.
+_NEAR = 1.5, 3.0
 _LEAST = 2e-3  # share of the wide operator everywhere: it connects what the narrow one does not
 _GRAZING = 0.1  # least distance from the edge of a set of fixed points, in spacings
 
@@ -94,7 +89,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
         matrix, load = laplacian.stiffness, np.zeros(count)
     free = free[cKDTree(laplacian.points[free]).indices]  # neighbours near in memory make the products faster
     load = load[free] + laplacian.areas[free] * source[free]
-    result[free] = conjugate_gradients(matrix[free][:, free], load, result[free], report)
+    result[free] = conjugate_gradients(matrix[free][:, free], load, result[free], progress=report)
     if laplacian.options.symbol_correction:
         result[loose] -= SECOND_MOMENT / 8.0 * laplacian.smoothing_lengths[loose] ** 2 * source[loose]
     result[loose] += level - _means(laplacian.areas, result, part, loose)
@@ -169,49 +164,6 @@ def read_values(fixed, values, count):
     if torn:
         raise InvalidPointsError(f"{torn} fixed points have two different values. Give each point one value.")
     return index, given[first]
-
-
-def conjugate_gradients(matrix, load, start, progress=None, rtol=_RTOL):
-    """Solve a symmetric system whose diagonal holds most of it.
-
-    Parameters
-    ----------
-    matrix : csr_array, (m, m)
-        Positive semi-definite.
-    load : ndarray, (m,)
-        In its range.
-    start : ndarray, (m,)
-        First guess.
-    progress : callable, optional
-    rtol : float
-        Of the residual against the load.
-
-    Returns
-    -------
-    ndarray, (m,)
-
-    Raises
-    ------
-    SolverError
-        No convergence.
-    """
-    report = progress or (lambda stage, fraction: None)
-    step = 0
-
-    def count(_):
-        nonlocal step
-        step += 1
-        if step % 20 == 0:
-            report("Solve", step / (step + 200.0))
-
-    diagonal = sparse.diags_array(1.0 / matrix.diagonal())
-    solution, failed = cg(matrix, load, start, rtol=rtol, atol=0.0, maxiter=_STEPS, M=diagonal, callback=count)
-    if failed:
-        raise SolverError(
-            f"The equations of {len(load)} points were not solved in {_STEPS} steps. Fix more points, or raise the"
-            " number of neighbors."
-        )
-    return solution
 
 
 def _read_source(source, count):

@@ -1,6 +1,7 @@
 """New places for the points: smoothed or sharpened by frequency, faired without eigenvectors, moved by a mode."""
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator
 from scipy.spatial import cKDTree
 
 from .errors import InvalidPointsError, PointCloudError
@@ -199,7 +200,10 @@ def _split(laplacian, fixed_rim, progress):
         order, root, multiply = corrected_operator(laplacian, fixed_rim=True, raw=True)
         # In terms of the distance from the centre: parts without a rim, whose equations are singular, stay there.
         force = (pull @ np.where(laplacian.near_rim[:, None], rim - base, 0.0))[order] * root[:, None]
-        base[order] += root[:, None] * conjugate_gradients(multiply, force, 1e-9, progress)
+        operator = LinearOperator((len(order),) * 2, matvec=multiply, dtype=np.float64)
+        base[order] += root[:, None] * np.column_stack(
+            [conjugate_gradients(operator, column, progress=progress) for column in force.T]
+        )
     return base, points - base
 
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import cg, splu
 
 from .components import SMALLEST
 from .errors import SolverError
 from .laplacian import build_laplacian
 
 NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that random points bear
-_STEPS = 5000  # of the conjugate gradients, at most
+_STEPS = 20_000  # of conjugate gradients, at most
 
 
 def narrow_laplacian(laplacian, neighbors=NARROW):
@@ -115,48 +115,44 @@ def factorize(matrix):
     return factors.solve
 
 
-def conjugate_gradients(multiply, right, tolerance, progress=None):
-    """Solve equations with a symmetric positive semi-definite product, each column on its own.
+def conjugate_gradients(matrix, load, start=None, rtol=1e-9, progress=None):
+    """Solve symmetric equations whose diagonal holds most of them.
 
     Parameters
     ----------
-    multiply : callable
-        Of (m, k) arrays.
-    right : ndarray, (m, k)
-        In the range of the product.
-    tolerance : float
-        Of the residual, relative to the right-hand side.
+    matrix : csr_array or LinearOperator, (m, m)
+        Positive semi-definite; the diagonal of an array is the preconditioner.
+    load : ndarray, (m,)
+        In the range of the matrix.
+    start : ndarray, (m,), optional
+        First guess.
+    rtol : float
+        Of the residual against the load.
     progress : callable, optional
         Called as ``progress("Solve", fraction)``; may raise `Cancelled`.
 
     Returns
     -------
-    ndarray, (m, k)
+    ndarray, (m,)
 
     Raises
     ------
     SolverError
-        Not converged after 5,000 steps.
+        No convergence.
     """
-    result = np.zeros_like(right)
-    residual = right.copy()
-    direction = residual.copy()
-    squared = np.einsum("ij,ij->j", residual, residual)
-    first, goal = squared.max(), tolerance**2 * squared
-    for step in range(_STEPS):
-        if np.all(squared <= goal):
-            return result
-        if progress is not None and step % 10 == 0:
-            done = np.log(max(squared.max() / first, 1e-300)) / (2.0 * np.log(tolerance))
-            progress("Solve", float(np.clip(done, 0.0, 1.0)))
-        product = multiply(direction)
-        energy = np.einsum("ij,ij->j", direction, product)
-        length = np.divide(squared, energy, out=np.zeros_like(squared), where=energy > 0.0)
-        result += length * direction
-        residual -= length * product
-        before, squared = squared, np.einsum("ij,ij->j", residual, residual)
-        direction = residual + np.divide(squared, before, out=np.zeros_like(squared), where=before > 0.0) * direction
-    raise SolverError(
-        f"The conjugate gradients on {len(right)} points did not reach {tolerance:g} in {_STEPS} steps. Use a shorter"
-        " time, or a wider tolerance."
-    )
+    step = 0
+
+    def count(_):
+        nonlocal step
+        step += 1
+        if progress is not None and step % 20 == 0:
+            progress("Solve", step / (step + 200.0))
+
+    scaling = sparse.diags_array(1.0 / matrix.diagonal()) if sparse.issparse(matrix) else None
+    solution, failed = cg(matrix, load, start, rtol=rtol, atol=0.0, maxiter=_STEPS, M=scaling, callback=count)
+    if failed:
+        raise SolverError(
+            f"The equations of {len(load)} points were not solved in {_STEPS} steps. Fix more points, or raise the"
+            " number of neighbors."
+        )
+    return solution
