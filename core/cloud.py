@@ -141,7 +141,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         unsure = unsure_orientation(nearest, oriented)
         same = pairs_on_one_sheet(pairs, oriented, unsure, bending, nearest.spacing)
         if not same.all():
-            definite, pairs = False, pairs.keep(same)
+            definite, pairs = False, pairs.keep(same | _last_pairs(pairs, same))
     return Cloud(
         scaled=scaled,
         label=label,
@@ -154,6 +154,22 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         definite=definite,
         notices=notices,
     )
+
+
+def _last_pairs(pairs, same):
+    """Tell which pairs are the nearest of a point that would be left without any, (p,) bool.
+
+    A point between two sheets may belong to neither by its normal; it stays with what is nearest.
+    """
+    count = sum(np.bincount(end[same], minlength=len(pairs.points)) for end in (pairs.first, pairs.second))
+    result = np.zeros(len(same), dtype=bool)
+    for ends in (pairs.first, pairs.second), (pairs.second, pairs.first):
+        rows = np.flatnonzero(count[ends[0]] == 0)
+        least = np.full(len(pairs.points), np.inf)
+        for end in ends:
+            np.minimum.at(least, end[rows], pairs.distance[rows])
+        result[rows[pairs.distance[rows] <= least[ends[0][rows]]]] = True
+    return result
 
 
 def _fit(nearest, options):

@@ -13,9 +13,10 @@ from benchmarks.samplings import (
     sausage_bend,
     torus_points,
 )
-from core.cloud import read_cloud
+from core.cloud import _last_pairs, read_cloud
 from core.components import label_sheets
 from core.nearest import find_nearest
+from core.neighbors import Neighborhoods
 from core.options import LaplacianOptions
 from core.sheets import fit_sheets, same_sheet
 
@@ -218,3 +219,21 @@ class TestLabels:
         values = laplacian.eigenpairs(3).eigenvalues
         assert np.all(values[:2] < 1e-9)
         assert values[2] > 1e-4
+
+
+class TestLastPairs:
+    """Of a point between two sheets, which belongs to neither by its normal."""
+
+    def test_a_point_left_without_pairs_keeps_the_nearest(self):
+        points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.5, 0.0, 0.0], [2.5, 1.0, 0.0]])
+        first, second = np.array([0, 0, 1, 1, 2]), np.array([1, 2, 2, 3, 3])
+        distance = np.linalg.norm(points[first] - points[second], axis=1)
+        pairs = Neighborhoods(points, np.ones(4), first, second, distance)
+        same = np.array([False, False, False, False, True])
+        np.testing.assert_array_equal(_last_pairs(pairs, same), [True, False, False, False, False])
+        same = np.array([True, False, False, False, False])
+        np.testing.assert_array_equal(_last_pairs(pairs, same), [False, False, False, False, True])
+
+    def test_none_where_all_have_pairs(self):
+        pairs = Neighborhoods(np.eye(3), np.ones(3), np.array([0, 0]), np.array([1, 2]), np.ones(2))
+        assert not _last_pairs(pairs, np.array([True, True])).any()
