@@ -1,5 +1,7 @@
 """What the operators that apply the Laplacian have in common: read all objects, compute, and only then write."""
 
+from dataclasses import dataclass, field
+
 import bpy
 from bpy.props import BoolProperty
 
@@ -10,6 +12,18 @@ from .reading import obstacle, read_points, sharing_objects
 from .ready import ReadyOperator
 from .result import check_writable
 from .stages import Stages
+
+
+@dataclass
+class Done:
+    """What the last of these operators did, for the command line."""
+
+    messages: list = field(default_factory=list)
+    notices: list = field(default_factory=list)
+    seconds: dict = field(default_factory=dict)
+
+
+done = Done()
 
 
 class ApplicationOperator(ReadyOperator):
@@ -38,16 +52,19 @@ class ApplicationOperator(ReadyOperator):
         except PointCloudError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        done.messages, done.notices, done.seconds = [], [], stages.seconds
         for obj, result in zip(objects, results, strict=True):
             if obj.meshfree.make_single_user and sharing_objects(obj):
                 obj.data = obj.data.copy()
-            self.report({"INFO"}, self.write(context, obj, result))
+            done.messages.append(self.write(context, obj, result))
+            self.report({"INFO"}, done.messages[-1])
         return {"FINISHED"}
 
     def warn(self, notices):
         """Report notices of core."""
         for notice in notices:
             self.report({"WARNING"}, notice)
+        done.notices += notices
 
 
 class ShownOperator(ApplicationOperator):

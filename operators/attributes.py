@@ -20,6 +20,7 @@ _STORAGE = {
     "BOOLEAN": _Storage(np.bool_, 1, "value"),
 }
 
+PREFIX = "lb_"
 AREA = "lb_area"
 NORMAL = "lb_normal"
 MEAN_CURVATURE = "lb_mean_curvature"

@@ -1,4 +1,4 @@
-"""The command line: `blender --command meshfree analyze FILE ...`, from files to files without a window."""
+"""The command line: `blender --command meshfree VERB FILE ...`, from files to files without a window."""
 
 import argparse
 import json
@@ -9,9 +9,12 @@ import bpy
 from ..core import PointCloudError
 from . import files, options
 from .analyze import WRITE_LIMIT, analyze_object
+from .application import done
 from .reading import obstacle
 from .result import analysis_names, check_writable, write_result
 
+# Operators that need nothing picked, beside the analysis.
+VERBS = ("smooth", "mode_shape", "segment", "signature", "minimal_surface")
 _handles = []
 
 
@@ -56,46 +59,76 @@ def run(argv) -> int:
 
 def _parse(argv):
     parser = argparse.ArgumentParser(prog="blender --command meshfree")
-    analyze = parser.add_subparsers(dest="command", required=True).add_parser(
+    commands = parser.add_subparsers(dest="command", required=True)
+    analyze = commands.add_parser(
         "analyze",
         help="areas, normals, curvature, rims and vibration modes of point clouds",
         description="Analyze point clouds. Writes one JSON line per input: points, total area, connected parts, points"
         " at a rim, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1 if any"
         " input failed.",
     )
+    analyze.add_argument("--modes", type=int, default=0, metavar="N", help="how many vibration modes to compute")
     analyze.add_argument(
+        "--write-limit", type=int, default=WRITE_LIMIT, metavar="N", help="modes written as attributes at most"
+    )
+    _add_files(analyze)
+    parsers = {"analyze": analyze}
+    for verb in VERBS:
+        operator = _operator(verb).get_rna_type()
+        parsers[verb] = commands.add_parser(
+            verb.replace("_", "-"),
+            help=operator.description.lower(),
+            description=f"{operator.description}. Writes one JSON line per input: points, what was done, seconds per"
+            " stage, notices; or the error. The exit code is 1 if any input failed.",
+        )
+        for setting in _choices(verb):
+            _add_setting(parsers[verb], setting)
+        _add_files(parsers[verb])
+
+    arguments = parser.parse_args(argv)
+    arguments.command = arguments.command.replace("-", "_")
+    chosen = parsers[arguments.command]
+    if arguments.command == "analyze" and (arguments.modes < 0 or arguments.write_limit < 1):
+        chosen.error("--modes takes a number of at least 0, --write-limit one of at least 1")
+    if arguments.out is not None and len(arguments.inputs) > 1:
+        chosen.error("--out takes one input; use --out-dir for many")
+    if arguments.out is not None and arguments.out.suffix.lower() not in files.OUTPUTS:
+        chosen.error(f"--out must end in {', '.join(files.OUTPUTS)}")
+    outputs = [_output_path(path, arguments) for path in arguments.inputs]
+    if arguments.out_dir is not None and len(set(outputs)) < len(outputs):
+        chosen.error("some inputs have the same name and would overwrite each other in --out-dir")
+    return arguments
+
+
+def _operator(verb):
+    return getattr(bpy.ops.meshfree, verb)
+
+
+def _choices(verb):
+    """Properties of an operator that make sense on the command line; points are moved in place there."""
+    left_out = {"rna_type", "show", "target", "animate", "period"}
+    return [item for item in _operator(verb).get_rna_type().properties if item.identifier not in left_out]
+
+
+def _add_files(parser):
+    """Add what all verbs take: inputs, outputs, and the settings of the object."""
+    parser.add_argument(
         "inputs",
         nargs="+",
         type=Path,
         metavar="IN",
         help=f"point clouds: {', '.join(files.INPUTS)}. Text has columns x y z and may have a header",
     )
-    target = analyze.add_mutually_exclusive_group()
+    target = parser.add_mutually_exclusive_group()
     target.add_argument("--out", type=Path, metavar="FILE", help=f"output of one input: {', '.join(files.OUTPUTS)}")
     target.add_argument("--out-dir", type=Path, metavar="DIR", help="folder for the outputs of all inputs")
-    analyze.add_argument(
+    parser.add_argument(
         "--format", choices=[suffix[1:] for suffix in files.OUTPUTS], default="blend", help="outputs in the folder"
     )
-    analyze.add_argument("--modes", type=int, default=0, metavar="N", help="how many vibration modes to compute")
-    analyze.add_argument(
-        "--write-limit", type=int, default=WRITE_LIMIT, metavar="N", help="modes written as attributes at most"
-    )
-    analyze.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
+    parser.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
     settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
     for name in options.ALL_NAMES:
-        _add_setting(analyze, settings[name])
-
-    arguments = parser.parse_args(argv)
-    if arguments.modes < 0 or arguments.write_limit < 1:
-        analyze.error("--modes takes a number of at least 0, --write-limit one of at least 1")
-    if arguments.out is not None and len(arguments.inputs) > 1:
-        analyze.error("--out takes one input; use --out-dir for many")
-    if arguments.out is not None and arguments.out.suffix.lower() not in files.OUTPUTS:
-        analyze.error(f"--out must end in {', '.join(files.OUTPUTS)}")
-    outputs = [_output_path(path, arguments) for path in arguments.inputs]
-    if arguments.out_dir is not None and len(set(outputs)) < len(outputs):
-        analyze.error("some inputs have the same name and would overwrite each other in --out-dir")
-    return arguments
+        _add_setting(parser, settings[name])
 
 
 def _add_setting(parser, setting):
@@ -119,7 +152,7 @@ def _output_path(path, arguments):
 
 
 def _process(path, arguments) -> dict:
-    """Analyze one file, write its output, and return what to print."""
+    """Work on one file, write its output, and return what to print."""
     output = _output_path(path, arguments)
     if output is not None and output.resolve() == path.resolve():
         raise PointCloudError(f"The output {output} would overwrite its input. Choose another name.")
@@ -131,11 +164,16 @@ def _process(path, arguments) -> dict:
         value = getattr(arguments, name)
         if value is not None:
             setattr(obj.meshfree, name, value)
+    result = _analyze(obj, arguments, output) if arguments.command == "analyze" else _apply(obj, arguments, output)
+    return {**result, "output": None if output is None else str(output)}
+
+
+def _analyze(obj, arguments, output):
     check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
     analysis = analyze_object(bpy.context, obj, arguments.modes)
     write_result(obj, analysis, arguments.write_limit)
     if output is not None:
-        files.save(output, obj, analysis)
+        files.save(output, obj, files.analysis_arrays(obj, analysis))
     return {
         "points": len(analysis.laplacian.areas),
         "total_area": analysis.total_area,
@@ -143,5 +181,25 @@ def _process(path, arguments) -> dict:
         "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
         "seconds": {name: round(seconds, 3) for name, seconds in analysis.seconds.items()},
         "notices": analysis.notices,
-        "output": None if output is None else str(output),
+    }
+
+
+def _apply(obj, arguments, output):
+    """Run the operator of a verb on the object."""
+    given = {item.identifier: getattr(arguments, item.identifier) for item in _choices(arguments.command)}
+    properties = {name: value for name, value in given.items() if value is not None}
+    operator = _operator(arguments.command)
+    for name, value in (("show", False), ("target", "IN_PLACE")):
+        if name in operator.get_rna_type().properties:
+            properties[name] = value
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other == obj)
+    operator(**properties)
+    if output is not None:
+        files.save(output, obj, files.attribute_arrays(obj))
+    return {
+        "points": len(obj.data.vertices),
+        "done": done.messages[-1],
+        "seconds": {name: round(seconds, 3) for name, seconds in done.seconds.items()},
+        "notices": done.notices,
     }

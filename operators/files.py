@@ -4,6 +4,8 @@ import bpy
 import numpy as np
 
 from ..core import PointCloudError, check_points
+from .attributes import APPLICATIONS, MEAN_CURVATURE, PREFIX, read_attribute
+from .reading import mesh_positions
 
 _TEXT = (".xyz", ".csv", ".txt")
 INPUTS = (".ply", ".obj", *_TEXT, ".blend")
@@ -94,12 +96,12 @@ def _choose_object(path, name):
     return chosen[0]
 
 
-def save(path, obj, analysis):
-    """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, the points, or the arrays."""
+def save(path, obj, arrays):
+    """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, the points, or the arrays by name."""
     path.parent.mkdir(parents=True, exist_ok=True)
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        _save_arrays(path, obj, analysis)
+        np.savez(path, **arrays)
         return
     for other in bpy.context.view_layer.objects:
         other.select_set(other == obj)
@@ -113,23 +115,34 @@ def save(path, obj, analysis):
             export_attributes=True,
         )
     else:
-        bpy.ops.meshfree.colormap()
+        names = [name for name in (*APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
+        if names:
+            bpy.ops.meshfree.colormap(attribute=names[0])
         bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))
 
 
-def _save_arrays(path, obj, analysis):
-    """Write all arrays, numbers in double precision: points and normals in the world, lengths and areas too."""
+def analysis_arrays(obj, analysis):
+    """Return all arrays, numbers in double precision: points and normals in the world, lengths and areas too."""
     laplacian, spectrum = analysis.laplacian, analysis.spectrum
-    np.savez(
-        path,
-        points=laplacian.points + np.array(obj.matrix_world.translation, dtype=np.float64),
-        areas=laplacian.areas,
-        normals=laplacian.normals,
-        mean_curvature=analysis.mean_curvature,
-        gaussian_curvature=laplacian.gaussian_curvature,
-        boundary=laplacian.boundary,
-        component=laplacian.component,
-        smoothing_lengths=laplacian.smoothing_lengths,
-        eigenvalues=np.empty(0) if spectrum is None else spectrum.eigenvalues,
-        eigenvectors=np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,
-    )
+    return {
+        "points": laplacian.points + np.array(obj.matrix_world.translation, dtype=np.float64),
+        "areas": laplacian.areas,
+        "normals": laplacian.normals,
+        "mean_curvature": analysis.mean_curvature,
+        "gaussian_curvature": laplacian.gaussian_curvature,
+        "boundary": laplacian.boundary,
+        "component": laplacian.component,
+        "smoothing_lengths": laplacian.smoothing_lengths,
+        "eigenvalues": np.empty(0) if spectrum is None else spectrum.eigenvalues,
+        "eigenvectors": np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,
+    }
+
+
+def attribute_arrays(obj):
+    """Return the points in the world, and the attributes of this extension by their names without the lb_."""
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    arrays = {"points": mesh_positions(obj.data).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]}
+    for attribute in obj.data.attributes:
+        if attribute.name.startswith(PREFIX):
+            arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)
+    return arrays

@@ -266,3 +266,46 @@ def test_extension_stays_usable_after_a_run(run, tmp_path):
     run("analyze", tmp_path / "in.obj")
     add_object(POINTS, "After")
     assert bpy.ops.meshfree.analyze() == {"FINISHED"}
+
+
+class TestVerbs:
+    def test_smoothing_moves_the_points(self, run, tmp_path):
+        rough = POINTS * (1.0 + np.random.default_rng(1).normal(0.0, 0.03, (len(POINTS), 1)))
+        np.savetxt(tmp_path / "a.xyz", rough)
+        code, (line,) = run("smooth", tmp_path / "a.xyz", "--out", tmp_path / "a.npz", "--strength", 0.9)
+        assert code == 0
+        assert line["points"] == 1000
+        assert "moved by" in line["done"]
+        smooth = np.load(tmp_path / "a.npz")["points"]
+        before, after = (np.std(np.linalg.norm(points, axis=1)) for points in (rough, smooth))
+        assert after < 0.5 * before
+
+    def test_segmenting_many(self, run, tmp_path):
+        for name in "ab":
+            np.savetxt(tmp_path / f"{name}.xyz", POINTS * [3.0, 1.0, 1.0])
+        out = tmp_path / "out"
+        code, lines = run(
+            "segment", tmp_path / "a.xyz", tmp_path / "b.xyz", "--parts", 3, "--out-dir", out, "--format", "npz"
+        )
+        assert code == 0
+        assert [line["done"].split(": ")[1] for line in lines] == ["3 parts", "3 parts"]
+        labels = [np.load(out / f"{name}.npz")["segment"] for name in "ab"]
+        assert set(labels[0]) == {0, 1, 2}
+        assert (labels[0] == labels[1]).all()
+
+    def test_settings_count(self, run, tmp_path):
+        np.savetxt(tmp_path / "a.xyz", POINTS)
+        code, (line,) = run("signature", tmp_path / "a.xyz", "--count", 3, "--modes", 20, "--neighbors", 3000)
+        assert code == 1
+        assert "neighborhoods need 3001 different points" in line["error"]
+
+    def test_choices_of_an_operator_are_options(self, run):
+        assert run("smooth", "x.ply", "--method", "NONSENSE")[0] == 2
+
+    def test_a_blend_file_holds_the_colored_result(self, run, tmp_path):
+        np.savetxt(tmp_path / "a.xyz", POINTS)
+        assert run("segment", tmp_path / "a.xyz", "--out", tmp_path / "a.blend")[0] == 0
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+        obj = bpy.context.object
+        assert "lb_segment" in obj.data.attributes
+        assert obj.modifiers
