@@ -15,6 +15,7 @@ from .errors import (
     UnresolvedModesError,
 )
 from .laplacian import LaplaceBeltrami, build_laplacian
+from .minimal_surface import MinimalSurface, minimal_surface
 from .options import LaplacianOptions
 from .points import check_points
 from .spectrum import Spectrum
@@ -27,6 +28,7 @@ __all__ = [
     "IslandError",
     "LaplaceBeltrami",
     "LaplacianOptions",
+    "MinimalSurface",
     "NotASurfaceError",
     "PointCloudError",
     "SolverError",
@@ -40,4 +42,5 @@ __all__ = [
     "estimate_areas",
     "estimate_normals",
     "mean_curvature",
+    "minimal_surface",
 ]
