@@ -157,9 +157,11 @@ def _fit(nearest, options):
 
 
 def _rim(nearest, normals, options, scaled, boundary, boundary_distance):
+    distance = None
     if boundary_distance is not None:
         distance = check_distances(boundary_distance, len(scaled.inverse))[scaled.first] / scaled.scale
-        return given_rim(nearest, normals, distance)
+        if boundary is None:
+            return given_rim(nearest, normals, distance)
     if boundary is not None:
         at_rim = as_mask(boundary, len(scaled.inverse))[scaled.first]
         if 0 < np.count_nonzero(at_rim) < FEWEST:
@@ -170,7 +172,11 @@ def _rim(nearest, normals, options, scaled, boundary, boundary_distance):
         at_rim = find_rim_points(nearest, normals)
     else:
         return no_rim(len(normals))
-    return measure_rim(nearest, normals, at_rim, _RIM_REACH * nearest.spacing)
+    rim = measure_rim(nearest, normals, at_rim, _RIM_REACH * nearest.spacing)
+    if distance is not None:
+        alone = ~np.isfinite(rim.distance[:, 1])
+        rim.distance[alone, 0] = distance[alone]
+    return rim
 
 
 def _leave_out(scaled, label, options):

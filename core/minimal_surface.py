@@ -1,6 +1,6 @@
 """Minimal surfaces through fixed rims: the problem of Plateau, Figure 14 of the paper."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -8,18 +8,21 @@ from scipy.spatial import cKDTree
 
 from .errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloudError
 from .laplacian import LaplaceBeltrami, build_laplacian
+from .nearest import find_nearest
 from .options import LaplacianOptions
 from .points import as_mask, check_points
 from .rim_curve import RimCurve
 from .rims import FEWEST
 
 _REACH = 8.0  # smoothing lengths from the rim at which no kernel sees it, also after a step
-_TURN = 0.3  # most that a step may move a point, in units of the radius to which the surface bends there
+_TURN = 0.3  # most that Newton's step may move a point, in units of the radius to which the surface bends there
 _RISE = 3e-3  # share of the area by which the measured one may rise by chance
-_HALVINGS = 4  # of a step that was too long
+_HALVINGS = 3  # of a step that went too far
 _NECK = 0.7  # smoothing length over the radius to which the surface bends, where it is no longer resolved
-_FEW = 16  # points that may be less well resolved
-_SURPLUS = 0.01  # of the tolerance: the area that may still be lost when the iteration ends
+_FEW = 16  # points that may be less well resolved, or lie at a free edge by mistake
+_SURPLUS = 0.01  # of the tolerance: the area that may still be saved when the iteration ends
+_FREE_EDGE, _ON_CURVE = 4.0, 0.5  # spacings from fixed points to points of a free edge; from the rim's curve to its own
+_LOPSIDED = 0.2  # mean offset of the neighbours over their mean distance at a rim, at least
 _RTOL, _PRODUCTS = 1e-6, 500  # of the linear solves
 
 
@@ -41,8 +44,9 @@ class MinimalSurface:
         Whether the area has settled, on a surface whose area every small change raises.
     steps : int
         Steps that were taken and kept.
-    reason : {"converged", "step limit", "stopped", "cancelled", "pinching", "stalled"}
-        Why the iteration ended.
+    reason : {"converged", "step limit", "stopped", "cancelled", "pinching", "unresolved", "stalled"}
+        Why the iteration ended: "stopped" by the callback, "cancelled" by `Cancelled`; "unresolved" where the points
+        no longer resolve a surface that does not pinch; "stalled" where no step lowers the area.
     notices : list of str
         What a user should know.
     """
@@ -58,15 +62,9 @@ class MinimalSurface:
 
 
 def minimal_surface(
-    points,
-    fixed,
-    epsilon=1e-4,
-    max_steps=100,
-    options=LaplacianOptions(projection="off"),
-    callback=None,
-    progress=None,
+    points, fixed, epsilon=1e-4, max_steps=100, options=LaplacianOptions(), callback=None, progress=None
 ):
-    """Move points along their normals until the area is the least that the fixed points permit.
+    """Move points until the area is the least that the fixed points permit.
 
     Parameters
     ----------
@@ -80,10 +78,11 @@ def minimal_surface(
     max_steps : int
         Most steps to take.
     options : LaplacianOptions
-        Settings of the operator, which is built anew for every step.
+        Settings of the operator, which is built anew for every step; but points are never projected to smooth noise,
+        which the motion itself smooths.
     callback : callable, optional
-        Called as ``callback(step, points, area)`` after every step; ends the iteration by returning False or raising
-        `Cancelled`, and the surface stays as it is then.
+        Called as ``callback(step, points, area)`` after every step, counted from 1. It ends the iteration by returning
+        False or raising `Cancelled`; the surface is left as it is then.
     progress : callable, optional
         Called as ``progress(stage, fraction)`` during each step; may raise `Cancelled`, which ends the iteration too.
 
@@ -94,7 +93,8 @@ def minimal_surface(
     Raises
     ------
     InvalidPointsError
-        Too few fixed points, nothing but fixed points, a rim that is not fixed, or a tolerance out of range.
+        Too few fixed points, or nothing but fixed points; a part without any, or an edge that is not fixed; a tolerance
+        or a number of steps out of range.
     PointCloudError
         No operator can be built on the given points.
     Cancelled
@@ -102,28 +102,31 @@ def minimal_surface(
 
     Notes
     -----
-    The paper (after Pinkall and Polthier) solves L x = 0 for the coordinates with the rim points fixed, and repeats
-    this with the operator of the new points. Taken literally it fails: next to a rim the kernel is cut off, so that
-    the areas come out too large and the operator pulls points away from the rim, the surface slides off it within about
-    five steps and collapses; and points wander within the surface, which changes nothing about its shape, so that the
-    iteration never settles. Where the surface bends strongly the full step also overshoots: the top of a hemisphere is
-    drawn to a spike.
+    The paper, after Pinkall and Polthier, solves L x = 0 for the coordinates with the rim points fixed, and repeats
+    this with the operator of the new points. Taken literally that fails in two ways. Next to a rim the kernel is cut
+    off, so that areas come out too large there and the operator pulls points away from the rim: within about five steps
+    the surface slides off and collapses. And points drift within the surface, which costs no area, so that the
+    iteration never settles.
 
-    Here the mirror image of a point in the rim carries ``2 c - x``, with c the rim next to it, and points move along
-    their normals n alone, x + u n. The area's first change is ``-r . u`` with ``r = n . (pull c - K x)``, and its
-    second one that of the Jacobi operator, ``K - areas |A|^2``, with |A|^2 the sum of the squared principal curvatures.
-    So ``(K - areas |A|^2) u = r`` is Newton's step, which settles within few of them; the fixed point, r = 0, is that
-    of the paper's iteration. Where that matrix is not definite, as on the way to a pinching neck, ``(K + areas |A|^2)
-    u = r``, the paper's own step along the normals, still lowers the area. No step moves a point further than a
-    share of the radius to which the surface bends there; one that raises the area is halved.
+    Here the mirror image of a point in the rim carries ``2 c - x``, c being the place on the rim next to it. A motion
+    along the normals, x + u n, changes the area by ``-r . u`` with ``r = n . (pull c - K x)``, and to second order by
+    the Jacobi operator ``K - areas |A|^2``, with |A|^2 the sum of the squared principal curvatures. Newton's step
+    ``(K - areas |A|^2) u = r`` settles within a few repetitions where the paper's iteration, moved along the normals
+    only, would settle: at r = 0.
+
+    Newton's step is taken where that matrix is definite and no point moves further than a share of the radius to which
+    the surface bends there. Otherwise, far from the end or on the way to a pinching neck, the step is that of the
+    paper, ``K x = pull c`` for whole coordinates: it never raises the area and keeps the points evenly spread, where
+    long steps along the normals would draw the top of a hemisphere to a spike. A step that still raises the measured
+    area is halved.
 
     Rims too far apart span no surface in one piece: then the neck shrinks until the points no longer resolve it. That
-    is reported as pinching, with the last surface that they did resolve. On the way there the area may hardly change
-    for many steps; only a definite Jacobi operator tells that a surface has settled.
+    is reported as pinching, with the last surface that they did resolve. On the way the area may hardly change for many
+    steps; that the Jacobi operator is definite tells a surface that has settled from one that has not.
 
     References
     ----------
-    Petronetto et al. 2013, section 5, Figure 14. Pinkall and Polthier. Computing discrete minimal surfaces and their
+    Petronetto et al. 2013, section 5, Figure 14. Pinkall, Polthier. Computing discrete minimal surfaces and their
     conjugates. 1993.
     """
     points = check_points(points)
@@ -133,29 +136,28 @@ def minimal_surface(
             f"A tolerance of {epsilon!r} and {max_steps!r} steps were asked for. Give a tolerance of at least 0 and a"
             " whole number of steps."
         )
-    iteration = _Flow(points, fixed, options, progress)
+    options = replace(options, projection="off")
+    first = build_laplacian(points, options=options, progress=progress)
+    film = _Film(first, fixed, options, progress)
+    state = film.state(points, first)
+    initial_area, bent = state.area, max(_NECK, state.bent)
     area_history = []
-    notices = list(iteration.notices)
-    state = iteration.state(points, iteration.first)
-    initial_area = state.area
-    unresolved = max(_NECK, state.neck)
     reason = "step limit"
     try:
         while len(area_history) < max_steps:
             before = state
-            state, reason = iteration.advance(before, unresolved)
-            if state is None:
-                state = before
+            state, failure = film.advance(before, bent)
+            if failure:
+                reason = failure
                 break
             area_history.append(state.area)
-            change = abs(state.area - before.area)
             if callback is not None and callback(len(area_history), state.points.copy(), state.area) is False:
                 reason = "stopped"
                 break
-            if change < epsilon * state.area and state.definite and state.savings < _SURPLUS * epsilon * state.area:
+            settled = state.definite and state.savings <= _SURPLUS * epsilon * state.area
+            if settled and abs(state.area - before.area) < epsilon * state.area:
                 reason = "converged"
                 break
-            reason = "step limit"
     except Cancelled:
         reason = "cancelled"
     return MinimalSurface(
@@ -166,8 +168,22 @@ def minimal_surface(
         converged=reason == "converged",
         steps=len(area_history),
         reason=reason,
-        notices=notices,
+        notices=first.notices + _notices(reason, len(area_history)),
     )
+
+
+def _notices(reason, steps):
+    texts = {
+        "step limit": f"The surface had not settled after {steps} steps. Allow more steps, or a larger tolerance.",
+        "stopped": f"The iteration was stopped after {steps} steps, before the surface had settled.",
+        "pinching": f"The surface pinches: after {steps} steps the points no longer resolve its neck. These rims span"
+        " no surface in one piece; move them closer together. The last sound step was kept.",
+        "unresolved": f"After {steps} steps the points no longer resolve the surface. Use more points, or spread them"
+        " more evenly. The last sound step was kept.",
+        "stalled": f"After {steps} steps no further one lowered the area. Use more points, or spread them more evenly.",
+    }
+    texts["cancelled"] = texts["stopped"]
+    return [texts[reason]] if reason in texts else []
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,14 +192,17 @@ class _State:
 
     Attributes
     ----------
-    step : ndarray, (n,)
-        Motion along the normals [L]; zero at fixed points.
+    points : ndarray, (n, 3)
+    laplacian : LaplaceBeltrami
+    area : float
+    step : ndarray, (n, 3)
+        To the next surface; zero at fixed points.
     savings : float
-        Area that the step would save if the area were quadratic [L^2].
+        Area that Newton's step would save if the area were quadratic.
     definite : bool
         Whether the Jacobi operator is.
-    neck : float
-        How badly the kernel resolves the bends of the surface.
+    bent : float
+        Smoothing length over the radius to which the surface bends, where that is largest but for a few points.
     """
 
     points: np.ndarray
@@ -192,101 +211,120 @@ class _State:
     step: np.ndarray
     savings: float
     definite: bool
-    neck: float
+    bent: float
 
 
-class _Flow:
-    """What stays the same during the iteration: the rim, the fixed points and the settings."""
+class _Film:
+    """What stays the same while the surface moves: its rim, the free points, and the settings."""
 
-    def __init__(self, points, fixed, options, progress):
+    def __init__(self, first, fixed, options, progress):
         self.options, self.progress = options, progress
-        first = build_laplacian(points, options=options, progress=progress)
+        self.rim = _rim_points(first, fixed)
+        self.curve = RimCurve(first.points[self.rim]) if len(self.rim) else None
         self.free = np.flatnonzero(~fixed & (first.component >= 0))
-        rows = _rim_points(first, fixed)
-        self.notices = list(first.notices)
-        self.rim = rows
-        self.curve = RimCurve(points[rows])
-        self.row = cKDTree(points[rows]).query(self.curve.points)[1]
-
-        self.first = first
+        self.parts = first.component.max()
 
     def state(self, points, before):
-        """Build the operator of moved points, and the next step."""
-        foot, index = self.curve.nearest(points)
-        distance = self.curve.distance(points, before.normals, foot, index, before.normals[self.rim[self.row]])
-        distance[distance > _REACH * before.smoothing_lengths] = np.inf
-        laplacian = build_laplacian(points, options=self.options, boundary_distance=distance, progress=self.progress)
-        if np.any(laplacian.component[self.free] < 0) or laplacian.component.max() > self.first.component.max():
-            raise NotASurfaceError("The surface came apart.")
-        return self.next_step(points, laplacian, foot)
+        """Build the operator of moved points, with the rim's distances by the normals before, and the next step."""
+        distance, foot = None, points
+        if len(self.rim):
+            foot, index = self.curve.nearest(points)
+            normals = before.normals[self.rim[self.curve.first]]
+            distance = self.curve.distance(points, before.normals, foot, index, normals)
+            distance[distance > _REACH * before.smoothing_lengths] = np.inf
+        laplacian = build_laplacian(
+            points, options=self.options, boundary=self.rim, boundary_distance=distance, progress=self.progress
+        )
+        torn = np.count_nonzero(laplacian.component[self.free] < 0)
+        if torn or laplacian.component.max() > self.parts:
+            raise NotASurfaceError(f"The surface came apart; {torn} points lie apart from the rest. Use more points.")
+        return self._with_step(points, laplacian, foot)
 
-    def next_step(self, points, laplacian, foot):
+    def _with_step(self, points, laplacian, foot):
         free = self.free
         stiffness, pull = laplacian.fixed_rim
-        normals = laplacian.normals
-        force = np.einsum("ic,ic->i", normals, pull @ foot - stiffness @ points)[free]
-        bend = np.maximum(4.0 * laplacian.mean_bend**2 - 2.0 * laplacian.gaussian_curvature, 0.0)
+        pulled = (pull @ foot - stiffness @ points)[free]
+        normals, areas = laplacian.normals[free], laplacian.areas[free]
+        bend = 4.0 * laplacian.mean_bend[free] ** 2 - 2.0 * laplacian.gaussian_curvature[free]
+        bend = np.sqrt(np.maximum(bend, 0.0))  # |A|
         stiffness = stiffness[free][:, free]
-        turned = sparse.diags_array(laplacian.areas[free] * bend[free])
-        step = np.zeros(len(points))
-        solution, definite = conjugate_gradients(stiffness - turned, force)
-        if not definite:
-            solution, _ = conjugate_gradients(stiffness + turned, force)
-        step[free] = solution
-        bend = np.sqrt(bend)
-        savings = 0.5 * float(solution @ force)
-        longest = np.max(np.abs(step) * bend, initial=0.0)
-        if longest > _TURN:
-            step *= _TURN / longest
-        neck = bend[free] * laplacian.smoothing_lengths[free]
-        neck = np.partition(neck, -min(_FEW, len(neck)))[-min(_FEW, len(neck))]
-        import os
-        if os.environ.get("MS"):
-            print("area %.5f savings %.2e max %.2e scale %.2f definite %s neck %.3f"%(laplacian.areas.sum(),savings,np.abs(step).max(),min(1,_TURN/max(longest,1e-30)),definite,neck),flush=True)
-        return _State(points, laplacian, float(laplacian.areas.sum()), step, savings, definite, float(neck))
+        force = np.einsum("ic,ic->i", normals, pulled)
+        jacobi = (stiffness - sparse.diags_array(areas * bend**2)).tocsr()
+        along, definite = conjugate_gradients(jacobi, force)
+        step = np.zeros_like(points)
+        if definite and np.max(np.abs(along) * bend) <= _TURN:
+            step[free] = along[:, None] * normals
+        else:
+            for axis in range(3):
+                step[free, axis] = conjugate_gradients(stiffness, pulled[:, axis])[0]
+        few = min(_FEW, len(free))
+        return _State(
+            points=points,
+            laplacian=laplacian,
+            area=float(laplacian.areas.sum()),
+            step=step,
+            savings=0.5 * float(along @ force),
+            definite=definite,
+            bent=float(np.partition(bend * laplacian.smoothing_lengths[free], -few)[-few]),
+        )
 
-    def advance(self, before, limit):
-        """Take a step, a shorter one if need be; returns the new state, or None and why there is none."""
-        share = 1.0
-        for _ in range(_HALVINGS + 1):
-            reason = "stalled"
+    def advance(self, before, bent):
+        """Take a step, or a part of it, to a surface that bends no more than so much.
+
+        Returns
+        -------
+        _State
+            The next one; the same if there is none.
+        str
+            Why there is none.
+        """
+        for halving in range(_HALVINGS + 1):
+            failure = "unresolved" if before.definite else "pinching"
             try:
-                points = before.points + (share * before.step)[:, None] * before.laplacian.normals
-                state = self.state(points, before.laplacian)
-                if state.neck > limit:
-                    reason = "pinching"
-                elif np.isfinite(state.area) and state.area <= (1.0 + _RISE) * before.area:
-                    return state, ""
-            except PointCloudError as error:
-                print("error", error)
-                reason = "pinching"
-            share *= 0.5
-        return None, reason
+                state = self.state(before.points + 0.5**halving * before.step, before.laplacian)
+            except PointCloudError:
+                continue
+            if state.bent > bent:
+                continue
+            if state.area <= (1.0 + _RISE) * before.area:
+                return state, ""
+            failure = "stalled"
+        return before, failure
 
 
 def _rim_points(laplacian, fixed):
-    """Return those of the fixed points that lie at the rim, (k,) int."""
-    found = laplacian.boundary
-    points = laplacian.points
+    """Return those of the fixed points that lie at a rim, (k,) int, after checks."""
+    points, found, component = laplacian.points, laplacian.boundary, laplacian.component
     rows = np.flatnonzero(fixed)
     if len(np.unique(points[rows], axis=0)) < FEWEST or len(rows) == len(points):
         raise InvalidPointsError(
             f"{len(rows)} of {len(points)} points are fixed. Fix the points of the rim, at least {FEWEST} different"
             " ones, and leave the others free."
         )
-    spacing = np.median(cKDTree(points).query(points, k=13)[0][:, 12]) * np.sqrt(np.pi / 12)
-    if found.any():
-        away = cKDTree(points[rows]).query(points[found])[0] > 4 * spacing
-        if np.count_nonzero(away) >= FEWEST:
-            raise InvalidPointsError(
-                f"The surface also ends at {np.count_nonzero(away)} points that are not fixed. A free edge would only"
-                " shrink: fix it too."
-            )
-        sure = np.flatnonzero(fixed & found)
-        if len(sure) >= FEWEST:
-            foot, _ = RimCurve(points[sure]).nearest(points[rows])
-            rows = rows[np.linalg.norm(points[rows] - foot, axis=1) < 0.5 * spacing]
-    return rows
+    loose = np.setdiff1d(component[component >= 0], component[rows])
+    if len(loose):
+        raise InvalidPointsError(
+            f"{np.count_nonzero(np.isin(component, loose))} of {len(points)} points are in parts of the surface without"
+            " fixed points, which would shrink to nothing. Fix their rims, or delete them."
+        )
+    nearest = find_nearest(points)
+    tree = cKDTree(points[rows])
+    edge = np.count_nonzero(tree.query(points[found])[0] > _FREE_EDGE * nearest.spacing[found]) if found.any() else 0
+    if edge > _FEW:
+        raise InvalidPointsError(
+            f"The surface also ends at {edge} points that are far from the {len(rows)} fixed ones. Such an edge would"
+            " only shrink: fix it too."
+        )
+    sure = np.flatnonzero(fixed & found)
+    if len(np.unique(points[sure], axis=0)) >= FEWEST:
+        foot, _ = RimCurve(points[sure]).nearest(points[rows])
+        away = np.linalg.norm(points[rows] - foot, axis=1)
+        return rows[away < _ON_CURVE * nearest.spacing[rows]]
+    # No rim was found there: the fixed points are one if they have neighbours on one side only.
+    offset = points[nearest.index[rows]] - points[rows, None]
+    mean = np.linalg.norm(np.einsum("ik,ikc->ic", nearest.weight[rows], offset), axis=1)
+    lopsided = mean > _LOPSIDED * np.einsum("ik,ik->i", nearest.weight[rows], nearest.distance[rows])
+    return rows if np.median(lopsided) > 0.5 else rows[:0]
 
 
 def conjugate_gradients(matrix, right):

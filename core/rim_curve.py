@@ -20,10 +20,12 @@ class RimCurve:
     ----------
     points : ndarray, (m, 3)
         The different ones among them.
+    first : ndarray, (m,) int
+        Where each was first given.
     """
 
     def __init__(self, points):
-        self.points = np.unique(points, axis=0)
+        self.points, self.first = np.unique(points, axis=0, return_index=True)
         self._tree = cKDTree(self.points)
         _, other = self._tree.query(self.points, k=min(_AROUND, len(self.points)))
         way = self.points[other[:, 1:]] - self.points[:, None]
