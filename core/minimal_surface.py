@@ -229,9 +229,10 @@ class _Film:
         distance, foot = None, points
         if len(self.rim):
             foot, index = self.curve.nearest(points)
-            normals = before.normals[self.rim[self.curve.first]]
-            distance = self.curve.distance(points, before.normals, foot, index, normals)
-            distance[distance > _REACH * before.smoothing_lengths] = np.inf
+            if not self.curve.rough:  # otherwise the operator fits a rim's course to them
+                normals = before.normals[self.rim[self.curve.first]]
+                distance = self.curve.distance(points, before.normals, foot, index, normals)
+                distance[distance > _REACH * before.smoothing_lengths] = np.inf
         laplacian = build_laplacian(
             points, options=self.options, boundary=self.rim, boundary_distance=distance, progress=self.progress
         )
@@ -241,8 +242,8 @@ class _Film:
         return self._with_step(points, laplacian, foot)
 
     def _with_step(self, points, laplacian, foot):
-        free = self.free
         stiffness, pull = laplacian.fixed_rim
+        free = self.free[stiffness.diagonal()[self.free] > 0.0]  # in noise a point may lie on a sheet of its own
         pulled = (pull @ foot - stiffness @ points)[free]
         normals, areas = laplacian.normals[free], laplacian.areas[free]
         bend = 4.0 * laplacian.mean_bend[free] ** 2 - 2.0 * laplacian.gaussian_curvature[free]
