@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 _AROUND = 9  # nearest points of the rim among which those before and after a point are sought
 _OPPOSITE = -0.3  # cosine between the ways to both, at most
-_ROUGH = 0.1  # height of typical points over the line between their neighbours, in units of its length
+_ROUGH = 0.07  # height of typical points over the line between their neighbours, in units of its length
 _ROUNDS = 3  # of Newton's iteration for the foot
 
 
@@ -41,8 +41,8 @@ class RimCurve:
         back, forth = way[:, 0] / p, way[every, after] / q
         bend = (back + forth) / (p + q)
         chord = way[every, after] - way[:, 0]
-        height = np.linalg.norm(np.cross(way[:, 0], chord), axis=1) / np.einsum("ic,ic->i", chord, chord)
-        self.rough = bool(ends.all() or np.median(height[~ends]) > _ROUGH)
+        height = np.linalg.norm(np.cross(way[:, 0], chord), axis=1)[~ends] / np.sum(chord**2, axis=1)[~ends]
+        self.rough = bool(ends.all() or np.median(height) > _ROUGH)
         # Where there is none after it, at the end of a wire or in a corner, the curve ends.
         self._bend = np.where(ends[:, None], 0.0, bend)
         self._slope = np.where(ends[:, None], -back, forth - q * bend)
