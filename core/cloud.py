@@ -18,6 +18,7 @@ from .rims import FEWEST, Rim, find_rim_points, given_rim, measure_rim, no_rim
 from .sheets import fit_sheets
 from .surface import fit_surface
 
+_SAME_RIM = 0.5  # spacings between the measured and the given distance to a rim, near a corner
 _RIM_REACH = 20.0  # spacings from a rim at which no kernel sees it
 
 
@@ -174,8 +175,12 @@ def _rim(nearest, normals, options, scaled, boundary, boundary_distance):
         return no_rim(len(normals))
     rim = measure_rim(nearest, normals, at_rim, _RIM_REACH * nearest.spacing)
     if distance is not None:
-        alone = ~np.isfinite(rim.distance[:, 1])
-        rim.distance[alone, 0] = distance[alone]
+        nearer = np.argmin(rim.distance, axis=1)[:, None]
+        measured = np.take_along_axis(rim.distance, nearer, axis=1)[:, 0]
+        # Around a corner that the surface fills, the nearest place is the corner, which mirrors nothing.
+        low, high = (measured + side * _SAME_RIM * nearest.spacing for side in (-1.0, 1.0))
+        same = np.isinf(rim.distance[:, 1]) | ((low < distance) & (distance < high))
+        np.put_along_axis(rim.distance, nearer, np.where(same, distance, measured)[:, None], axis=1)
     return rim
 
 
