@@ -20,6 +20,7 @@ from .fields import harmonic_field, solve_poisson
 from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
 from .geodesics import geodesic_distance
 from .laplacian import LaplaceBeltrami, build_laplacian
+from .minimal_surface import MinimalSurface, minimal_surface
 from .options import LaplacianOptions
 from .points import check_points
 from .segmentation import modes_needed, nodal_domains, segment
@@ -36,6 +37,7 @@ __all__ = [
     "IslandError",
     "LaplaceBeltrami",
     "LaplacianOptions",
+    "MinimalSurface",
     "NotASurfaceError",
     "PointCloudError",
     "SolverError",
@@ -60,6 +62,7 @@ __all__ = [
     "harmonic_field",
     "heat_kernel_signature",
     "mean_curvature",
+    "minimal_surface",
     "modes_needed",
     "nodal_domains",
     "segment",

@@ -18,6 +18,7 @@ from .rims import FEWEST, Rim, find_rim_points, given_rim, measure_rim, no_rim
 from .sheets import fit_sheets
 from .surface import fit_surface
 
+_SAME_RIM = 0.5  # spacings between the measured and the given distance to a rim, near a corner
 _RIM_REACH = 20.0  # spacings from a rim at which no kernel sees it
 _NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
 
@@ -179,9 +180,11 @@ def _fit(nearest, options):
 
 
 def _rim(nearest, normals, options, scaled, boundary, boundary_distance):
+    distance = None
     if boundary_distance is not None:
         distance = check_distances(boundary_distance, len(scaled.inverse))[scaled.first] / scaled.scale
-        return given_rim(nearest, normals, distance)
+        if boundary is None:
+            return given_rim(nearest, normals, distance)
     if boundary is not None:
         at_rim = as_mask(boundary, len(scaled.inverse))[scaled.first]
         if 0 < np.count_nonzero(at_rim) < FEWEST:
@@ -192,7 +195,15 @@ def _rim(nearest, normals, options, scaled, boundary, boundary_distance):
         at_rim = find_rim_points(nearest, normals)
     else:
         return no_rim(len(normals))
-    return measure_rim(nearest, normals, at_rim, _RIM_REACH * nearest.spacing)
+    rim = measure_rim(nearest, normals, at_rim, _RIM_REACH * nearest.spacing)
+    if distance is not None:
+        nearer = np.argmin(rim.distance, axis=1)[:, None]
+        measured = np.take_along_axis(rim.distance, nearer, axis=1)[:, 0]
+        # Around a corner that the surface fills, the nearest place is the corner, which mirrors nothing.
+        low, high = (measured + side * _SAME_RIM * nearest.spacing for side in (-1.0, 1.0))
+        same = np.isinf(rim.distance[:, 1]) | ((low < distance) & (distance < high))
+        np.put_along_axis(rim.distance, nearer, np.where(same, distance, measured)[:, None], axis=1)
+    return rim
 
 
 def _leave_out(scaled, label, options):

@@ -180,6 +180,7 @@ def build_laplacian(
         The points at the rim, instead of those that the options would find.
     boundary_distance : array_like, (n,), optional
         Distance of every point to the rim along the surface [L], instead of a measured one; infinity where it is far.
+        With `boundary`, measured ones stand next to corners, where there are two rims.
     progress : callable, optional
         Called as ``progress(stage, fraction)`` at the beginning of each stage; may raise `Cancelled`.
 

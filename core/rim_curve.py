@@ -1,0 +1,98 @@
+"""The curve through the points of a rim that is known, and how far other points are from it."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+_AROUND = 9  # nearest points of the rim among which those before and after a point are sought
+_OPPOSITE = -0.3  # cosine between the ways to both, at most
+_ROUGH = 0.07  # height of typical points over the line between their neighbours, in units of its length
+_ROUNDS = 3  # of Newton's iteration for the foot
+
+
+class RimCurve:
+    """Parabolas through each point of a rim, the one before and the one after.
+
+    Parameters
+    ----------
+    points : ndarray, (k, 3)
+        Points of the rim in any order, at least two different ones [L].
+
+    Attributes
+    ----------
+    points : ndarray, (m, 3)
+        The different ones among them.
+    first : ndarray, (m,) int
+        Where each was first given.
+    rough : bool
+        The points are scattered about a curve, as those found at the rim of a random cloud, instead of along it.
+    """
+
+    def __init__(self, points):
+        self.points, self.first = np.unique(points, axis=0, return_index=True)
+        self._tree = cKDTree(self.points)
+        _, other = self._tree.query(self.points, k=min(_AROUND, len(self.points)))
+        way = self.points[other[:, 1:]] - self.points[:, None]
+        length = np.linalg.norm(way, axis=2)
+        every = np.arange(len(way))
+        cosine = np.einsum("ikc,ic->ik", way, way[:, 0]) / (length * length[:, :1])
+        after = np.argmax(cosine < _OPPOSITE, axis=1)
+        ends = cosine[every, after] >= _OPPOSITE
+        p, q = length[:, 0, None], length[every, after, None]
+        back, forth = way[:, 0] / p, way[every, after] / q
+        bend = (back + forth) / (p + q)
+        chord = way[every, after] - way[:, 0]
+        height = np.linalg.norm(np.cross(way[:, 0], chord), axis=1)[~ends] / np.sum(chord**2, axis=1)[~ends]
+        self.rough = bool(ends.all() or np.median(height) > _ROUGH)
+        # Where there is none after it, at the end of a wire or in a corner, the curve ends.
+        self._bend = np.where(ends[:, None], 0.0, bend)
+        self._slope = np.where(ends[:, None], -back, forth - q * bend)
+        self._range = -p[:, 0], np.where(ends, 0.0, q[:, 0])
+
+    def nearest(self, points):
+        """Find the nearest places on the curve.
+
+        Parameters
+        ----------
+        points : ndarray, (n, 3)
+
+        Returns
+        -------
+        foot : ndarray, (n, 3)
+            The nearest places.
+        index : ndarray, (n,) int
+            The nearest points of the rim.
+        """
+        index = self._tree.query(points)[1]
+        slope, bend = self._slope[index], self._bend[index]
+        offset = points - self.points[index]
+        t = np.zeros(len(points))
+        for _ in range(_ROUNDS):
+            along = slope + 2.0 * t[:, None] * bend
+            left = t[:, None] * slope + t[:, None] ** 2 * bend - offset
+            squared = np.einsum("ic,ic->i", along, along)
+            curvature = squared + 2.0 * np.einsum("ic,ic->i", left, bend)
+            t = t - np.einsum("ic,ic->i", left, along) / np.maximum(curvature, 0.3 * squared)
+            t = np.clip(t, self._range[0][index], self._range[1][index])
+        return self.points[index] + t[:, None] * slope + t[:, None] ** 2 * bend, index
+
+    def distance(self, points, normals, foot, index, rim_normals):
+        """Return the distances of points from their feet along a surface, to fourth order.
+
+        Parameters
+        ----------
+        points, normals : ndarray, (n, 3)
+            Points of the surface and its unit normals, of any sign.
+        foot, index : ndarray
+            From `nearest`.
+        rim_normals : ndarray, (m, 3)
+            Unit normals of the surface at the rim's points.
+
+        Returns
+        -------
+        ndarray, (n,)
+        """
+        way = points - foot
+        other = rim_normals[index]
+        side = np.where(np.einsum("ic,ic->i", normals, other) < 0.0, -1.0, 1.0)
+        turn = np.einsum("ic,ic->i", way, normals - side[:, None] * other)
+        return np.sqrt(np.einsum("ic,ic->i", way, way) + turn**2 / 12.0)

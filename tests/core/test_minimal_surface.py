@@ -1,0 +1,345 @@
+"""Minimal surfaces: known ones, rims that none spans, and the ways to end."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import core
+from benchmarks.plateau import cap, catenoid, catenoid_errors, helicoid, tube
+from benchmarks.samplings import fibonacci_sphere, grid_points, hemisphere_random, square_grid
+from core.minimal_surface import conjugate_gradients
+from core.rim_curve import RimCurve
+
+
+@pytest.fixture(scope="module")
+def cylinder():
+    return tube(98, 20)
+
+
+@pytest.fixture(scope="module")
+def settled(cylinder):
+    return core.minimal_surface(*cylinder)
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    """A smaller one, and what becomes of it."""
+    points, fixed = tube(60, 12)
+    return points, fixed, core.minimal_surface(points, fixed)
+
+
+def circle(count, radius=1.0):
+    angle = 2.0 * np.pi * np.arange(count) / count
+    return radius * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+
+
+class TestCatenoid:
+    def test_known_figures(self):
+        waist, area = catenoid()
+        assert waist == pytest.approx(1.6967, abs=5e-5)
+        assert area == pytest.approx(23.9672, abs=5e-5)
+
+    def test_area_waist_and_profile(self, settled):
+        assert settled.converged
+        assert settled.reason == "converged"
+        area, waist, profile = catenoid_errors(settled.points, settled.areas)
+        assert abs(area) < 2e-3
+        assert abs(waist) < 2e-3
+        assert profile < 3e-3
+
+    def test_history(self, cylinder, settled):
+        assert settled.initial_area == pytest.approx(8.0 * np.pi, rel=3e-3)
+        assert len(settled.area_history) == settled.steps
+        assert settled.area_history[-1] == pytest.approx(settled.areas.sum(), rel=1e-12)
+        assert np.all(np.diff([settled.initial_area, *settled.area_history]) < 1e-4)
+        assert settled.notices == []
+
+    def test_fixed_points_stay(self, cylinder, settled):
+        points, fixed = cylinder
+        np.testing.assert_array_equal(settled.points[fixed], points[fixed])
+        assert np.all(np.linalg.norm(settled.points - points, axis=1)[~fixed] > 1e-3)
+
+    def test_nothing_changes_in_further_steps(self, cylinder, settled):
+        further = core.minimal_surface(settled.points, cylinder[1], epsilon=0.0, max_steps=3)
+        assert further.steps == 3
+        assert not further.converged
+        assert np.abs(further.points - settled.points).max() < 1e-3
+
+    def test_irregular_points(self):
+        random = np.random.default_rng(3)
+        angle, z = 2.0 * np.pi * random.random(900), 2.0 * random.random(900) - 1.0
+        rings = np.concatenate([circle(75, 2.0) - [0, 0, 1], circle(75, 2.0) + [0, 0, 1]])
+        points = np.concatenate([rings, np.column_stack([2.0 * np.cos(angle), 2.0 * np.sin(angle), z])])
+        film = core.minimal_surface(points, np.arange(150))
+        assert film.converged
+        area, waist, profile = catenoid_errors(film.points, film.areas)
+        assert abs(area) < 1e-2
+        assert abs(waist) < 1e-2
+        assert profile < 3e-2
+
+    def test_noise_is_smoothed(self):
+        points, fixed = tube(60, 12)
+        points += 0.02 * np.random.default_rng(0).standard_normal(points.shape) * ~fixed[:, None]
+        film = core.minimal_surface(points, fixed)
+        assert film.converged
+        assert catenoid_errors(film.points, film.areas)[2] < 1e-2
+
+
+class TestFlat:
+    @pytest.mark.parametrize("deepest", [0.0, -0.6])
+    def test_caps_become_discs(self, deepest):
+        points = fibonacci_sphere(1200)
+        radius = np.sqrt(1.0 - deepest**2)
+        ring = circle(round(62 * radius), radius) + [0.0, 0.0, deepest]
+        points = np.concatenate([ring, points[points[:, 2] > deepest + 0.03]])
+        film = core.minimal_surface(points, np.arange(len(ring)))
+        assert film.converged
+        assert np.abs(film.points[:, 2] - deepest).max() < 1e-2
+        assert film.areas.sum() == pytest.approx(np.pi * radius**2, rel=5e-3)
+
+    def test_random_hemisphere(self):
+        film = core.minimal_surface(*cap(hemisphere_random(800), 70))
+        assert film.converged
+        assert np.abs(film.points[:, 2]).max() < 1e-2
+        assert film.areas.sum() == pytest.approx(np.pi, rel=5e-3)
+
+    def test_open_box(self):
+        # Without sharp edges and with four corners of the rim.
+        side = np.linspace(0.0, 1.0, 17)
+        box = grid_points(side, side, side[:9])
+        across = np.minimum(box, 1.0 - box)[:, :2].min(axis=1) == 0.0
+        box = box[across | (box[:, 2] == side[8])]
+        fixed = box[:, 2] == 0.0
+        film = core.minimal_surface(box, fixed)
+        assert film.converged
+        assert np.abs(film.points[:, 2]).max() < 1e-2
+        assert film.areas.sum() == pytest.approx(1.0, rel=5e-3)
+
+    def test_a_band_of_fixed_points(self):
+        points = square_grid(30)
+        inset = np.minimum(points, 1.0 - points)[:, :2].min(axis=1)
+        points[:, 2] = 3.0 * np.maximum(inset - 0.1, 0.0) ** 2
+        film = core.minimal_surface(points, inset < 0.1)
+        assert film.converged
+        assert np.abs(film.points[:, 2]).max() < 1e-3
+        assert film.areas.sum() == pytest.approx(1.0, rel=5e-3)
+
+    def test_pinned_part_of_a_closed_surface(self):
+        points = fibonacci_sphere(1200)
+        free = points[:, 2] > 0.6
+        film = core.minimal_surface(points, ~free)
+        assert film.converged
+        np.testing.assert_array_equal(film.points[~free], points[~free])
+        # Across a crease the kernel sees both sides: within a spacing, which is 0.1 here.
+        assert np.abs(film.points[free, 2] - 0.6).max() < 0.1
+        assert film.areas.sum() == pytest.approx(np.pi * (3.2 + 0.64), rel=2e-2)
+
+    def test_the_rim_that_was_found(self):
+        points = hemisphere_random(1000, 2)
+        rim = core.build_laplacian(points).boundary
+        film = core.minimal_surface(points, rim, max_steps=3)
+        assert film.points[:, 2].max() < points[rim, 2].max() + 1e-2
+
+
+def test_helicoid_between_four_corners():
+    points, rim, area = helicoid(25)
+    film = core.minimal_surface(points, rim)
+    assert film.converged
+    x, y, z = film.points.T
+    assert np.abs(x * np.sin(z) - y * np.cos(z)).max() < 2e-3
+    assert film.areas.sum() == pytest.approx(area, rel=4e-3)
+
+
+class TestInvariance:
+    def test_motion_and_scale(self, coarse):
+        points, fixed, expected = coarse
+        turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
+        film = core.minimal_surface(30.0 * points @ turn.T + [5.0, -70.0, 20.0], fixed)
+        assert film.steps == expected.steps
+        moved = 30.0 * expected.points @ turn.T + [5.0, -70.0, 20.0]
+        np.testing.assert_allclose(film.points, moved, atol=30.0 * 1e-3)
+        np.testing.assert_allclose(film.area_history, 900.0 * expected.area_history, rtol=2e-3)
+
+    def test_order(self, coarse):
+        points, fixed, expected = coarse
+        order = np.random.default_rng(2).permutation(len(points))
+        film = core.minimal_surface(points[order], np.flatnonzero(fixed[order]))
+        np.testing.assert_allclose(film.points, expected.points[order], atol=1e-3)
+
+    def test_the_same_twice(self, coarse):
+        points, fixed, expected = coarse
+        np.testing.assert_array_equal(core.minimal_surface(points, fixed).points, expected.points)
+
+
+class TestPinching:
+    @pytest.mark.parametrize("height", [2.8, 5.0])
+    def test_rings_too_far_apart(self, height):
+        points, fixed = tube(48, round(5.0 * height), height=height)
+        film = core.minimal_surface(points, fixed)
+        assert not film.converged
+        assert film.reason == "pinching"
+        assert any("pinches" in notice for notice in film.notices)
+        assert np.isfinite(film.points).all()
+        assert np.isfinite(film.areas).all()
+        assert len(film.area_history) == film.steps
+        # The last sound surface still is one piece, smaller than the first.
+        assert core.build_laplacian(film.points).component.max() == 0
+        assert film.areas.sum() < film.initial_area
+
+    def test_rings_just_near_enough(self):
+        points, fixed = tube(60, 16, height=2.6)
+        film = core.minimal_surface(points, fixed)
+        assert film.converged
+        assert abs(catenoid_errors(film.points, film.areas, height=2.6)[1]) < 2e-2
+
+
+class TestEnding:
+    def test_step_limit(self, coarse):
+        points, fixed, expected = coarse
+        film = core.minimal_surface(points, fixed, max_steps=1)
+        assert (film.steps, film.converged, film.reason) == (1, False, "step limit")
+        assert film.area_history[0] == expected.area_history[0]
+        assert len(film.notices) == 1
+
+    def test_no_steps(self, coarse):
+        points, fixed, expected = coarse
+        film = core.minimal_surface(points, fixed, max_steps=0)
+        np.testing.assert_array_equal(film.points, points)
+        assert film.areas.sum() == film.initial_area == expected.initial_area
+        assert len(film.area_history) == 0
+
+    @pytest.mark.parametrize("raising", [False, True])
+    def test_callback(self, coarse, raising):
+        points, fixed, expected = coarse
+        seen = []
+
+        def callback(step, moved, area):
+            seen.append((step, moved.copy(), area))
+            moved[:] = np.nan
+            if step == 2:
+                if raising:
+                    raise core.Cancelled
+                return False
+            return None
+
+        film = core.minimal_surface(points, fixed, callback=callback)
+        assert film.reason == ("cancelled" if raising else "stopped")
+        assert not film.converged
+        assert [step for step, _, _ in seen] == [1, 2]
+        np.testing.assert_array_equal(film.points, seen[-1][1])
+        np.testing.assert_array_equal(film.area_history, [area for _, _, area in seen])
+        np.testing.assert_array_equal(film.area_history, expected.area_history[:2])
+
+    def test_cancelled_within_a_step(self, coarse):
+        points, fixed, expected = coarse
+        builds = []
+
+        def progress(stage, fraction):
+            builds.append(stage)
+            if builds.count("Areas") == 4:  # of the given points twice, then of each step
+                raise core.Cancelled
+
+        film = core.minimal_surface(points, fixed, progress=progress)
+        assert (film.steps, film.reason) == (1, "cancelled")
+        np.testing.assert_array_equal(film.area_history, expected.area_history[:1])
+
+    def test_cancelled_before_the_first_operator(self, coarse):
+        def progress(stage, fraction):
+            raise core.Cancelled
+
+        with pytest.raises(core.Cancelled):
+            core.minimal_surface(*coarse[:2], progress=progress)
+
+
+class TestRefusals:
+    @pytest.mark.parametrize("fixed", [[], [0, 1, 2], np.ones(720, dtype=bool)])
+    def test_too_few_or_too_many_fixed(self, coarse, fixed):
+        with pytest.raises(core.InvalidPointsError, match="points are fixed"):
+            core.minimal_surface(coarse[0], fixed)
+
+    def test_a_free_edge(self, coarse):
+        with pytest.raises(core.InvalidPointsError, match="ends at 60 points"):
+            core.minimal_surface(coarse[0], coarse[0][:, 2] == -1.0)
+
+    def test_a_part_without_fixed_points(self, coarse):
+        points, fixed, _ = coarse
+        both = np.concatenate([points, fibonacci_sphere(500) + [9.0, 0.0, 0.0]])
+        with pytest.raises(core.InvalidPointsError, match="500 of 1220 points are in parts"):
+            core.minimal_surface(both, np.flatnonzero(fixed))
+
+    @pytest.mark.parametrize(
+        "settings", [{"epsilon": -1.0}, {"epsilon": np.nan}, {"max_steps": -1}, {"max_steps": 1.5}]
+    )
+    def test_settings_out_of_range(self, coarse, settings):
+        with pytest.raises(core.InvalidPointsError, match="tolerance"):
+            core.minimal_surface(*coarse[:2], **settings)
+
+    def test_bad_coordinates(self, coarse):
+        points, fixed, _ = coarse
+        with pytest.raises(core.InvalidPointsError, match="not finite"):
+            core.minimal_surface(np.where(points > 1.99, np.nan, points), fixed)
+        with pytest.raises(core.InvalidPointsError, match="720 truth values"):
+            core.minimal_surface(points, fixed[:-1])
+
+
+class TestRimCurve:
+    def test_feet_on_a_circle(self):
+        curve = RimCurve(np.roll(circle(60), 7, axis=0))
+        assert not curve.rough
+        inside = circle(113, 0.8) + [0.0, 0.0, 0.1]
+        foot, index = curve.nearest(inside)
+        np.testing.assert_allclose(foot, circle(113), atol=2e-5)
+        assert np.linalg.norm(curve.points[index] - inside, axis=1).max() < 0.25
+
+    def test_corners_and_ends(self):
+        along = np.arange(6.0)
+        wire = np.concatenate([grid_points(along, [0.0], [0.0]), grid_points([0.0], along[1:], [0.0])])
+        points = np.array([[2.5, 1.0, 0.0], [1.0, 3.3, 0.0], [-1.0, -1.0, 0.0], [7.0, 1.0, 0.0]])
+        foot, _ = RimCurve(wire).nearest(points)
+        np.testing.assert_allclose(foot, [[2.5, 0, 0], [0, 3.3, 0], [0, 0, 0], [5, 0, 0]], atol=1e-12)
+
+    def test_distances_along_a_sphere(self):
+        curve = RimCurve(circle(200))
+        height = np.array([0.1, 0.3, 0.6])
+        points = np.column_stack([np.cos(height), 0.0 * height, np.sin(height)])
+        foot, index = curve.nearest(points)
+        distance = curve.distance(points, points, foot, index, -curve.points)
+        np.testing.assert_allclose(distance, height, rtol=1e-3)
+
+    def test_scattered_points_are_rough(self):
+        scatter = 1.0 - 0.08 * np.random.default_rng(0).random(80)
+        assert RimCurve(circle(80) * scatter[:, None]).rough
+        assert not RimCurve(circle(80)[np.random.default_rng(0).permutation(80)]).rough
+
+    def test_points_given_twice(self):
+        ring = circle(40)
+        curve = RimCurve(np.concatenate([ring, ring]))
+        assert len(curve.points) == 40
+        np.testing.assert_array_equal(np.concatenate([ring, ring])[curve.first], curve.points)
+
+
+class TestConjugateGradients:
+    def test_a_known_solution(self):
+        matrix = sparse.diags_array([[2.0] * 50, [-1.0] * 49, [-1.0] * 49], offsets=[0, 1, -1]).tocsr()
+        exact = np.sin(np.arange(50.0))
+        solution, definite = conjugate_gradients(matrix, matrix @ exact)
+        assert definite
+        np.testing.assert_allclose(solution, exact, atol=1e-4)
+
+    def test_an_indefinite_matrix(self):
+        matrix = sparse.diags_array([[1.0] * 50, [-1.0] * 49, [-1.0] * 49], offsets=[0, 1, -1]).tocsr()
+        assert not conjugate_gradients(matrix, np.ones(50))[1]
+        assert not conjugate_gradients(-matrix, np.ones(50))[1]
+
+
+def test_given_distances_hold_beside_corners_only():
+    points = square_grid(30)
+    inset = np.sort(np.minimum(points, 1.0 - points)[:, :2], axis=1)
+    rim = inset[:, 0] == 0.0
+    both = core.build_laplacian(points, boundary=rim, boundary_distance=inset[:, 0])
+    alone = core.build_laplacian(points, boundary_distance=inset[:, 0])
+    # Corners want both of their sides, which one distance cannot tell.
+    assert abs(both.areas.sum() - 1.0) < 1e-3 < abs(alone.areas.sum() - 1.0)
+    # Otherwise the distances that were given are taken: a rim a little further out leaves more area inside.
+    wider = core.build_laplacian(points, boundary=rim, boundary_distance=inset[:, 0] + 0.2 / 29)
+    assert wider.areas.sum() > both.areas.sum() + 1e-2
