@@ -2,10 +2,23 @@
 
 
 def _classes():
-    from .operators import analyze, deform, fields, segment, selecting, smooth, spectrum
+    from .operators import analyze, deform, fields, minimal, segment, selecting, smooth, spectrum
     from .ui import applications, colormap, panel, settings
 
-    modules = (settings, analyze, spectrum, smooth, segment, fields, deform, selecting, colormap, panel, applications)
+    modules = (
+        settings,
+        analyze,
+        spectrum,
+        smooth,
+        segment,
+        fields,
+        deform,
+        minimal,
+        selecting,
+        colormap,
+        panel,
+        applications,
+    )
     return [cls for module in modules for cls in module.CLASSES]
 
 

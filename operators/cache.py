@@ -50,6 +50,7 @@ def build(points, options, rim, progress) -> Built:
 
 def lowest_modes(laplacian, count: int, progress) -> Spectrum:
     """Return the lowest modes of an operator, computed only if there are not as many from before."""
+    progress("Spectrum", 0.0)
     known = _spectra.get(laplacian)
     if known is None or len(known.eigenvalues) < count:
         known = _spectra[laplacian] = laplacian.eigenpairs(count, progress=progress)

@@ -80,4 +80,21 @@ class MESHFREE_PT_deform(ReadyPanel, bpy.types.Panel):
         row.operator("meshfree.deform_update")
 
 
-CLASSES = (MESHFREE_PT_points, MESHFREE_PT_shape, MESHFREE_PT_segment, MESHFREE_PT_fields, MESHFREE_PT_deform)
+class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
+    """Minimal surfaces"""
+
+    bl_label = "Minimal Surface"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        self.layout.operator("meshfree.minimal_surface", text="Minimal Surface...")
+
+
+CLASSES = (
+    MESHFREE_PT_points,
+    MESHFREE_PT_shape,
+    MESHFREE_PT_segment,
+    MESHFREE_PT_fields,
+    MESHFREE_PT_deform,
+    MESHFREE_PT_minimal,
+)
