@@ -257,6 +257,17 @@ class TestSegment:
         turned = core.Spectrum(spectrum.eigenvalues, spectrum.eigenvectors * signs)
         np.testing.assert_array_equal(core.segment(body.laplacian, 5, turned), body.labels)
 
+    def test_a_basis_of_modes_of_one_eigenvalue_does_not_matter(self, body):
+        count = core.modes_needed(body.laplacian, 5)
+        spectrum = body.laplacian.eigenpairs(count)
+        values, vectors = spectrum.eigenvalues.copy(), spectrum.eigenvectors.copy()
+        values[1:4] = values[1:4].mean()
+        values[-3:] = values[-1]  # the last ones are cut off in the middle of their space
+        plain = core.segment(body.laplacian, 5, core.Spectrum(values, vectors))
+        vectors[:, 1:4] = vectors[:, 1:4] @ TURN
+        vectors[:, -3:] = vectors[:, -3:] @ TURN
+        np.testing.assert_array_equal(core.segment(body.laplacian, 5, core.Spectrum(values, vectors)), plain)
+
     def test_a_longer_spectrum_gives_the_same_and_a_shorter_one_is_not_used(self, body):
         count = core.modes_needed(body.laplacian, 5)
         assert agreement(core.segment(body.laplacian, 5, body.laplacian.eigenpairs(count + 9)), body.labels) > 0.999
