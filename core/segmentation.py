@@ -265,10 +265,10 @@ def _main_axis(points, weight):
 
 
 def _lloyd(points, weight, centers, rtol):
-    """Move centers to the means of their clusters until the sum of squares falls by less than rtol of itself."""
-    centers, total = centers.copy(), np.inf
+    """Move centers to the means of their clusters until these stay, or their squares fall by less than rtol."""
+    centers, total, label = centers.copy(), np.inf, None
     for _ in range(_STEPS):
-        label = _nearest(points, centers)
+        last, label = label, _nearest(points, centers)
         share = sparse.csr_array((weight, (label, np.arange(len(label)))), shape=(len(centers), len(label)))
         size = share.sum(axis=1)
         filled = size > 0.0
@@ -277,7 +277,7 @@ def _lloyd(points, weight, centers, rtol):
         before, total = total, weight @ squares
         if not filled.all():  # a cluster that lost its points starts again where the others fit worst
             centers[np.flatnonzero(~filled)[0]] = points[np.argmax(squares)]
-        elif before - total <= rtol * total:
+        elif before - total < rtol * total or np.array_equal(label, last):
             break
     return centers, total
 

@@ -188,7 +188,7 @@ class TestNodalDomains:
         assert np.all(core.nodal_domains(np.zeros(2500), square) == 0)
         assert np.all(core.nodal_domains(np.full(2500, -3), square) == 0)
 
-    @pytest.mark.parametrize(("mode", "count"), [(2, 2), (4, 4), (10, 9)])
+    @pytest.mark.parametrize(("mode", "count"), [(4, 4), (10, 9)])
     def test_isometric_surfaces_have_the_same_domains(self, rectangle, mode, count):
         flat = rectangle.eigenpairs(11).eigenvectors[:, mode - 1]
         bent = core.build_laplacian(parabolic_cylinder(1.0))
