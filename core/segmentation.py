@@ -82,9 +82,9 @@ def segment(laplacian, parts, spectrum=None, progress=None):
     """Divide the surface into a number of connected parts, such as the limbs of a figure.
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
-    factor that fades to zero at the last mode used, so that no choice of signs or of a basis among modes of the same
-    eigenvalue makes a difference. All is weighted by areas and free of chance. What is cut off from the main piece of
-    its cluster goes to the nearest part.
+    factor that fades to zero at the last mode used, so that their distances depend neither on the signs of modes nor on
+    the basis among those of one eigenvalue. All is weighted by areas and free of chance. What is cut off from the main
+    piece of its cluster goes to the nearest part.
 
     Parameters
     ----------

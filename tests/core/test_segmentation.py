@@ -266,7 +266,8 @@ class TestSegment:
         plain = core.segment(body.laplacian, 5, core.Spectrum(values, vectors))
         vectors[:, 1:4] = vectors[:, 1:4] @ TURN
         vectors[:, -3:] = vectors[:, -3:] @ TURN
-        np.testing.assert_array_equal(core.segment(body.laplacian, 5, core.Spectrum(values, vectors)), plain)
+        # The longest axis of all points is ambiguous then, so k-means may start elsewhere and end a border point apart.
+        assert agreement(core.segment(body.laplacian, 5, core.Spectrum(values, vectors)), plain) > 0.998
 
     def test_a_longer_spectrum_gives_the_same_and_a_shorter_one_is_not_used(self, body):
         count = core.modes_needed(body.laplacian, 5)
