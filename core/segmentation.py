@@ -12,6 +12,7 @@ _NEIGHBORS = 8  # nearest points on the same sheet that a domain may continue to
 _STEP = 0.75  # from level to level, on the way down the hills of a function
 _LOWEST = 1e-4  # the last but one of these levels, if all signs are trusted
 _MODES = 3  # modes for each part: with fewer, limbs are missed; with more, small features get parts
+_WEAK = 1e-6  # of the largest eigenvalue: what hangs on by less is as good as cut off, and must not outweigh all else
 _STEPS = 300  # of k-means at most; a few dozen are needed
 _ROUGH = 1e-3  # accuracy at which the starts of k-means are compared
 _LEAST = 0.03  # a cluster of a smaller share of the mean area is no part, but a spike or an outlier
@@ -81,9 +82,9 @@ def segment(laplacian, parts, spectrum=None, progress=None):
     """Divide the surface into a number of connected parts, such as the limbs of a figure.
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
-    factor that fades to zero at the last mode used, so that no choice of signs or of a basis among modes of the same
-    eigenvalue makes a difference. The clusters start at points far from each other, which are the ends of limbs; all is
-    weighted by areas and free of chance. What is cut off from the main piece of its cluster goes to the nearest part.
+    factor that fades to zero at the last mode used, so that their distances depend neither on the signs of modes nor on
+    the basis among those of one eigenvalue. All is weighted by areas and free of chance. What is cut off from the main
+    piece of its cluster goes to the nearest part.
 
     Parameters
     ----------
@@ -187,6 +188,7 @@ def _signature(laplacian, parts, spectrum, progress):
             " for fewer parts."
         )
     values, last = spectrum.eigenvalues[constant : count - 1], spectrum.eigenvalues[count - 1]
+    values = np.maximum(values, _WEAK * last)
     return spectrum.eigenvectors[:, constant : count - 1] * ((1.0 - values / last) / np.sqrt(values))
 
 
@@ -216,45 +218,57 @@ def _cluster(signature, weight, count):
 
 
 def _k_means(signature, weight, count):
-    """Return the centers, (count, modes), of the best clusters that Lloyd's steps find from three starts.
+    """Return the centers, (count, modes), of the better clusters that Lloyd's steps find from two starts.
 
-    All starts choose among points far from each other: the farthest ones; the same around the middle of all; and those
-    that lower the sum of squares the most.
+    One start are points far from each other, which are the ends of limbs; the other halves the most scattered cluster
+    across its longest axis, again and again.
     """
     known = weight > 0.0
     points, weight = signature[known], weight[known]
-    middle = weight @ points / weight.sum()
-    far = points[_farthest(points, middle, 2 * count + 8)]
-    starts = [far[:count], np.vstack([middle, far[: count - 1]]), _best_seeds(points, weight, far, count)]
+    starts = (_far_points(points, weight, count), _halves(points, weight, count))
     found = min((_lloyd(points, weight, start, _ROUGH) for start in starts), key=lambda result: result[1])
     return _lloyd(points, weight, found[0], 0.0)[0]
 
 
-def _farthest(points, middle, count):
-    """Return the rows of the point farthest from the middle, then again and again of the one farthest from those."""
-    rows = [int(np.argmax(_squares(points, middle)))]
+def _far_points(points, weight, count):
+    """Return the point farthest from the middle of all, then again and again the one farthest from those."""
+    chosen = [points[np.argmax(_squares(points, weight @ points / weight.sum()))]]
     away = np.full(len(points), np.inf)
-    while len(rows) < count:
-        away = np.minimum(away, _squares(points, points[rows[-1]]))
-        rows.append(int(np.argmax(away)))
-    return rows
+    while len(chosen) < count:
+        away = np.minimum(away, _squares(points, chosen[-1]))
+        chosen.append(points[np.argmax(away)])
+    return np.array(chosen)
 
 
-def _best_seeds(points, weight, candidates, count):
-    """Choose seeds from the candidates, one after the other, that leave the least sum of squares."""
-    squares = np.stack([_squares(points, candidate) for candidate in candidates])
-    left, rows = np.full(len(points), np.inf), []
-    for _ in range(count):
-        rows.append(int(np.argmin(np.minimum(left, squares) @ weight)))
-        left = np.minimum(left, squares[rows[-1]])
-    return candidates[rows]
+def _halves(points, weight, count):
+    """Return the centers of clusters that halving across the axis of largest scatter gives."""
+    clusters = [np.arange(len(points))]
+    axes = [_main_axis(points, weight)]
+    while len(clusters) < count:
+        widest = max(range(len(axes)), key=lambda number: axes[number][0])
+        own, (_, middle, axis) = clusters.pop(widest), axes.pop(widest)
+        beyond = (points[own] - middle) @ axis > 0.0
+        for half in (own[beyond], own[~beyond]):
+            clusters.append(half)
+            axes.append(_main_axis(points[half], weight[half]))
+    return np.array([middle for _, middle, _ in axes])
+
+
+def _main_axis(points, weight):
+    """Return the scatter along the axis where it is largest, the middle of the points, and the axis."""
+    if not len(points):
+        return 0.0, np.zeros(points.shape[1]), np.zeros(points.shape[1])
+    middle = weight @ points / weight.sum()
+    offset = points - middle
+    scatter, axes = np.linalg.eigh((offset * weight[:, None]).T @ offset)
+    return scatter[-1], middle, axes[:, -1]
 
 
 def _lloyd(points, weight, centers, rtol):
-    """Move centers to the means of their clusters until the sum of squares falls by less than rtol of itself."""
-    centers, total = centers.copy(), np.inf
+    """Move centers to the means of their clusters until these stay, or their squares fall by less than rtol."""
+    centers, total, label = centers.copy(), np.inf, None
     for _ in range(_STEPS):
-        label = _nearest(points, centers)
+        last, label = label, _nearest(points, centers)
         share = sparse.csr_array((weight, (label, np.arange(len(label)))), shape=(len(centers), len(label)))
         size = share.sum(axis=1)
         filled = size > 0.0
@@ -263,7 +277,7 @@ def _lloyd(points, weight, centers, rtol):
         before, total = total, weight @ squares
         if not filled.all():  # a cluster that lost its points starts again where the others fit worst
             centers[np.flatnonzero(~filled)[0]] = points[np.argmax(squares)]
-        elif before - total <= rtol * total:
+        elif before - total < rtol * total or np.array_equal(label, last):
             break
     return centers, total
 

@@ -188,7 +188,7 @@ class TestNodalDomains:
         assert np.all(core.nodal_domains(np.zeros(2500), square) == 0)
         assert np.all(core.nodal_domains(np.full(2500, -3), square) == 0)
 
-    @pytest.mark.parametrize(("mode", "count"), [(2, 2), (4, 4), (10, 9)])
+    @pytest.mark.parametrize(("mode", "count"), [(4, 4), (10, 9)])
     def test_isometric_surfaces_have_the_same_domains(self, rectangle, mode, count):
         flat = rectangle.eigenpairs(11).eigenvectors[:, mode - 1]
         bent = core.build_laplacian(parabolic_cylinder(1.0))
@@ -256,6 +256,18 @@ class TestSegment:
         signs = np.where(np.arange(len(spectrum.eigenvalues)) % 2, 1.0, -1.0)
         turned = core.Spectrum(spectrum.eigenvalues, spectrum.eigenvectors * signs)
         np.testing.assert_array_equal(core.segment(body.laplacian, 5, turned), body.labels)
+
+    def test_a_basis_of_modes_of_one_eigenvalue_does_not_matter(self, body):
+        count = core.modes_needed(body.laplacian, 5)
+        spectrum = body.laplacian.eigenpairs(count)
+        values, vectors = spectrum.eigenvalues.copy(), spectrum.eigenvectors.copy()
+        values[1:4] = values[1:4].mean()
+        values[-3:] = values[-1]  # the last ones are cut off in the middle of their space
+        plain = core.segment(body.laplacian, 5, core.Spectrum(values, vectors))
+        vectors[:, 1:4] = vectors[:, 1:4] @ TURN
+        vectors[:, -3:] = vectors[:, -3:] @ TURN
+        # The longest axis of all points is ambiguous then, so k-means may start elsewhere and end a border point apart.
+        assert agreement(core.segment(body.laplacian, 5, core.Spectrum(values, vectors)), plain) > 0.998
 
     def test_a_longer_spectrum_gives_the_same_and_a_shorter_one_is_not_used(self, body):
         count = core.modes_needed(body.laplacian, 5)
