@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from .bandwidth import depth, smoothing_lengths
-from .components import label_islands, label_sheets, move_apart
+from .components import SMALLEST, label_islands, label_sheets, move_apart
 from .distances import pairs_on_one_sheet
 from .errors import InvalidPointsError, IslandError
 from .nearest import find_nearest
@@ -158,19 +159,24 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
 
 def _last_pairs(pairs, same):
-    """Tell which pairs are the nearest of a point that would be left without any, (p,) bool.
+    """Tell which pairs join the few points that would be left on their own to the rest, (p,) bool.
 
-    A point between two sheets may belong to neither by its normal; it stays with what is nearest.
+    Points in a sharp fold may belong to no sheet by their normals; each such group stays with what is nearest to it.
     """
-    count = sum(np.bincount(end[same], minlength=len(pairs.points)) for end in (pairs.first, pairs.second))
     result = np.zeros(len(same), dtype=bool)
-    for ends in (pairs.first, pairs.second), (pairs.second, pairs.first):
-        rows = np.flatnonzero(count[ends[0]] == 0)
-        least = np.full(len(pairs.points), np.inf)
-        for end in ends:
-            np.minimum.at(least, end[rows], pairs.distance[rows])
-        result[rows[pairs.distance[rows] <= least[ends[0][rows]]]] = True
-    return result
+    while True:
+        joined = pairs.keep(same | result)
+        label = connected_components(joined.half(np.ones(len(joined.first))), directed=False)[1]
+        size = np.bincount(label)
+        size[size.argmax()] = len(label)  # the largest group is the rest, however small
+        ends = label[np.stack([pairs.first, pairs.second])]
+        between = np.flatnonzero((ends[0] != ends[1]) & (size[ends].min(axis=0) < SMALLEST))
+        if not len(between):
+            return result
+        between = between[np.argsort(pairs.distance[between], kind="stable")]
+        for side in ends[:, between]:
+            group, nearest = np.unique(side, return_index=True)
+            result[between[nearest[size[group] < SMALLEST]]] = True
 
 
 def _fit(nearest, options):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.sparse.csgraph import connected_components
 
 import core
 from benchmarks.samplings import (
@@ -209,7 +210,9 @@ class TestLabels:
         ids=["plate", "capsule", "sphere", "torus"],
     )
     def test_what_hangs_together_is_one(self, points):
-        assert np.all(core.build_laplacian(points).component == 0)
+        laplacian = core.build_laplacian(points)
+        assert np.all(laplacian.component == 0)
+        assert connected_components(laplacian.stiffness, directed=False)[0] == 1
 
     def test_parts_are_components_of_the_operator(self):
         points = parallel_sheets(30)[0]
@@ -222,17 +225,17 @@ class TestLabels:
 
 
 class TestLastPairs:
-    """Of a point between two sheets, which belongs to neither by its normal."""
+    """Of points in sharp folds, which belong to no sheet by their normals."""
 
-    def test_a_point_left_without_pairs_keeps_the_nearest(self):
+    def test_few_points_on_their_own_are_joined_to_what_is_nearest(self):
         points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.5, 0.0, 0.0], [2.5, 1.0, 0.0]])
         first, second = np.array([0, 0, 1, 1, 2]), np.array([1, 2, 2, 3, 3])
         distance = np.linalg.norm(points[first] - points[second], axis=1)
         pairs = Neighborhoods(points, np.ones(4), first, second, distance)
         same = np.array([False, False, False, False, True])
-        np.testing.assert_array_equal(_last_pairs(pairs, same), [True, False, False, False, False])
+        np.testing.assert_array_equal(_last_pairs(pairs, same), [True, False, True, False, False])
         same = np.array([True, False, False, False, False])
-        np.testing.assert_array_equal(_last_pairs(pairs, same), [False, False, False, False, True])
+        np.testing.assert_array_equal(_last_pairs(pairs, same), [False, False, True, False, True])
 
     def test_none_where_all_have_pairs(self):
         pairs = Neighborhoods(np.eye(3), np.ones(3), np.array([0, 0]), np.array([1, 2]), np.ones(2))
