@@ -8,9 +8,10 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from scipy.spatial import cKDTree
 
 from .errors import SolverError, TooFewPointsError, UnresolvedModesError
-from .kernel import inverse_symbol
+from .kernel import inverse_symbol, symbol
 
 _DEGREE = 6  # of the polynomial that the Lanczos steps work on
+_FLAT = 4.0  # the symbol hardly rises beyond
 
 
 @dataclass(frozen=True)
@@ -103,9 +104,12 @@ def lowest_eigenpairs(laplacian, stiffness, count, progress):
         return eigsh(operator, which="LA", v0=random.standard_normal(n), maxiter=maxiter, **settings)
 
     top = 1.02 * solve(multiply, k=1, tol=1e-2, return_eigenvectors=False)[0]
-    cut = 8.0 * np.pi * count / laplacian.areas.sum()
+    # What the wide kernel makes of twice Weyl's estimate, where many modes are asked for.
+    squared = np.mean(laplacian.smoothing_lengths**2)
+    frequency = 8.0 * np.pi * count / laplacian.areas.sum() * squared
+    cut = symbol(np.sqrt(min(frequency, _FLAT**2))) / squared
     while True:
-        if cut < 0.25 * top:
+        if cut < 0.7 * top:
             degree, center, radius = _DEGREE, 0.5 * (top + cut), 0.5 * (top - cut)
         else:  # too few points for a polynomial: a shift to [1, 2], right wherever the cut lies
             degree, center, radius = 1, 2.0 * top, top
