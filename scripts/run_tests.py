@@ -12,7 +12,7 @@ import pythons
 from environments import ROOT, ensure, ensure_blender, isolated
 
 RESULTS = ROOT / "build" / "tests"
-LIMIT = 600  # seconds for one run of pytest
+LIMIT = 1200  # seconds for one run of pytest
 
 
 def run_pytest(name, python, folder):
