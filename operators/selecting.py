@@ -131,7 +131,7 @@ class FrontOnly:
         """Tell which points face the viewer by their normals, (n,) bool."""
         reading, laplacian = analyzed(context, obj)
         view = np.array(self.direction, dtype=np.float64)
-        space = context.region_data if context.area is not None and context.area.type == "VIEW_3D" else None
+        space = context.space_data.region_3d if context.area is not None and context.area.type == "VIEW_3D" else None
         if view.any():
             rays = view
         elif space is None:

@@ -171,3 +171,15 @@ def test_groups_that_cannot_be_changed(obj, settings, text):
     with pytest.raises(RuntimeError, match=text):
         bpy.ops.meshfree.group_from_selection(**settings)
     assert everything(obj) == before
+
+
+def test_a_mesh_that_another_object_edits(obj):
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    obj.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.view_layer.objects.active = other
+    with pytest.raises(RuntimeError, match="is not in Object Mode"):
+        bpy.ops.meshfree.select_component()
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="OBJECT")
