@@ -58,7 +58,7 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
                 group = obj.vertex_groups.new(name=GROUP.format(label))
                 group.add(np.flatnonzero(result == label).tolist(), 1.0, "REPLACE")
         obj.data.update()
-        return f"{obj.name}: {count} parts"
+        return f"{obj.name}: {count} part{'s' if count > 1 else ''}"
 
     def draw(self, context):
         layout = self.layout
@@ -127,7 +127,7 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
             for collection in obj.users_collection:
                 collection.objects.link(part)
         _keep(obj.data, ~np.isin(result, numbers))
-        return f"{obj.name}: {len(numbers)} parts are objects of their own"
+        return f"{obj.name}: {len(numbers) + 1} parts are objects of their own"
 
 
 def _keep(mesh, kept):
