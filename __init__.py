@@ -26,13 +26,14 @@ def register():
     """Add the extension's classes, the settings of objects and the command line to Blender."""
     import bpy
 
-    from .operators import command
+    from .operators import command, deform
     from .ui import settings
 
     for cls in _classes():
         bpy.utils.register_class(cls)
     settings.attach()
     command.attach()
+    deform.attach()
 
 
 def unregister():
@@ -42,9 +43,9 @@ def unregister():
     from .operators import cache, command, deform
     from .ui import settings
 
+    deform.detach()
     command.detach()
     settings.detach()
     for cls in reversed(_classes()):
         bpy.utils.unregister_class(cls)
     cache.clear()
-    deform.clear()

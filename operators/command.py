@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 from pathlib import Path
 
 import bpy
@@ -15,6 +16,7 @@ from .result import analysis_names, check_writable, write_result
 
 # Operators that need nothing picked, beside the analysis.
 VERBS = ("smooth", "mode_shape", "segment", "signature", "minimal_surface")
+_SETTINGS = (*options.ALL_NAMES, "make_single_user")  # of the object
 _handles = []
 
 
@@ -52,7 +54,7 @@ def run(argv) -> int:
             result = _process(path, arguments)
         except (PointCloudError, OSError, RuntimeError) as error:  # Blender's importers raise RuntimeError
             failed = True
-            result = {"error": str(error).strip()}
+            result = {"error": str(error).strip().removeprefix("Error: ")}  # as operators raise what they report
         print(json.dumps({"file": str(path), **result}), flush=True)
     return 1 if failed else 0
 
@@ -127,7 +129,7 @@ def _add_files(parser):
     )
     parser.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
     settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
-    for name in options.ALL_NAMES:
+    for name in _SETTINGS:
         _add_setting(parser, settings[name])
 
 
@@ -140,9 +142,23 @@ def _add_setting(parser, setting):
         kind.update(action=argparse.BooleanOptionalAction)
     elif setting.type == "STRING":
         kind.update(metavar="NAME")
+    elif setting.subtype == "ANGLE":
+        kind.update(type=_number(setting, lambda text: math.radians(float(text))), metavar="DEGREES")
     else:
-        kind.update(type=int if setting.type == "INT" else float, metavar=setting.type)
+        kind.update(type=_number(setting, int if setting.type == "INT" else float), metavar=setting.type)
     parser.add_argument(f"--{setting.identifier.replace('_', '-')}", **kind)
+
+
+def _number(setting, convert):
+    """Return what turns a text into a number for a setting, and refuses those that Blender would silently replace."""
+
+    def number(text):
+        value = convert(text)
+        if not setting.hard_min <= value <= setting.hard_max:
+            raise argparse.ArgumentTypeError(f"{text} is not from {setting.hard_min:g} to {setting.hard_max:g}")
+        return value
+
+    return number
 
 
 def _output_path(path, arguments):
@@ -160,7 +176,7 @@ def _process(path, arguments) -> dict:
     reason = obstacle(obj)
     if reason:
         raise PointCloudError(reason)
-    for name in options.ALL_NAMES:
+    for name in _SETTINGS:
         value = getattr(arguments, name)
         if value is not None:
             setattr(obj.meshfree, name, value)

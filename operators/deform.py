@@ -1,18 +1,19 @@
 """Deform objects by handles: bind once, then update for every move."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
 from ..core import Deformer, PointCloudError
 from .application import ApplicationOperator, operator_reader
 from .attributes import DISPLACEMENT, write_attribute
 from .groups import ANCHOR, HANDLE, chosen_weights
 from .positions import check_movable, fill_key, target_property, write_positions
-from .reading import Reading, read_points
+from .reading import Reading, mesh_positions
 from .result import length_text
 
 
@@ -29,18 +30,18 @@ class Binding:
         Where the deformed points go.
     key : str
         Name of the shape key that holds them, if they go to one.
-    controller : str
-        Name of the empty that moves the handles; without one they are moved in Edit Mode.
-    start : Matrix
-        Of the controller when it was bound, in the object's space.
+    controller : int or None
+        The session_uid of the empty that moves the handles; without one they are moved in Edit Mode.
+    start : ndarray, (4, 4), or None
+        Matrix of the controller when it was bound, in the object's space.
     """
 
     deformer: Deformer
     reading: Reading
     target: str
     key: str = ""
-    controller: str = ""
-    start: Matrix | None = None
+    controller: int | None = None
+    start: np.ndarray | None = None
 
 
 _bindings = {}  # by the object's session_uid, which undo does not change
@@ -52,9 +53,25 @@ def binding(obj):
     return bound if bound is not None and len(bound.reading.points) == len(obj.data.vertices) else None
 
 
-def clear():
-    """Give the memory back."""
+def attach():
+    """Forget the bindings of a file when another one is opened."""
+    bpy.app.handlers.load_post.append(_forget)
+
+
+def detach():
+    """Give the memory back, and leave no handler behind."""
+    bpy.app.handlers.load_post.remove(_forget)
     _bindings.clear()
+
+
+@persistent
+def _forget(*_):
+    _bindings.clear()
+
+
+def _find(uid):
+    """Find an object by its session_uid, which neither undo nor another name changes; None if it is gone."""
+    return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
 
 
 class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
@@ -115,10 +132,12 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
             obj.active_shape_key_index = obj.data.shape_keys.key_blocks.find(key.name)
         if self.controller:
             empty = _add_controller(context, obj, reading, deformer.handles)
-            bound.controller, bound.start = empty.name, obj.matrix_world.inverted() @ empty.matrix_world
+            bound.controller, bound.start = empty.session_uid, _in_space_of(obj, empty)
+        for uid in _bindings.keys() - {other.session_uid for other in bpy.data.objects}:
+            del _bindings[uid]  # of objects that were deleted
         _bindings[obj.session_uid] = bound
         write_attribute(obj.data, DISPLACEMENT, np.zeros(len(reading.points)))
-        way = f'Move "{bound.controller}"' if self.controller else "Move the handles in Edit Mode"
+        way = f'Move "{empty.name}"' if self.controller else "Move the handles in Edit Mode"
         counts = f"{len(deformer.handles):,} handles and {len(deformer.anchors):,} anchors"
         return f"{obj.name}: {counts} are bound. {way}, then update"
 
@@ -167,15 +186,24 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
         soft_max=100,
     )
 
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if binding(context.object) is None:
+            name = context.object.name
+            cls.poll_message_set(
+                f'"{name}" is not bound, or has got or lost points since. Bind it to its handles first'
+            )
+            return False
+        return True
+
     def plan(self, context, obj):
         bound = binding(obj)
-        if bound is None:
-            raise PointCloudError(
-                f'"{obj.name}" is not bound, or its points have changed since. Bind it to its handles first.'
-            )
+        check_movable(obj, bound.target)
         if bound.key and (obj.data.shape_keys is None or bound.key not in obj.data.shape_keys.key_blocks):
             raise PointCloudError(f'The shape key "{bound.key}" of "{obj.name}" is gone. Bind the object again.')
-        goal = _handle_goal(context, obj, bound)
+        goal = _handle_goal(obj, bound)
         steps = self.steps
         return lambda progress: (bound, bound.deformer.solve(goal, steps=steps, progress=progress))
 
@@ -184,7 +212,8 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
         if bound.key:
             fill_key(obj, obj.data.shape_keys.key_blocks[bound.key], points - bound.reading.points, bound.reading)
         else:
-            write_positions(obj, read_points(context, obj), points, bound.target, "")
+            now = replace(bound.reading, points=_placed(mesh_positions(obj.data), bound))
+            write_positions(obj, now, points, bound.target, "")
         distance = np.linalg.norm(points - bound.reading.points, axis=1)
         write_attribute(obj.data, DISPLACEMENT, distance)
         if not bound.deformer.converged:
@@ -192,19 +221,43 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
         return f"{obj.name}: moved at most by {length_text(distance.max())}"
 
 
-def _handle_goal(context, obj, bound):
+def _handle_goal(obj, bound):
     """Return where the handles are to be: where the controller took them, or where they are in the mesh, (h, 3)."""
-    handles, reading = bound.deformer.handles, bound.reading
-    if not bound.controller:
-        return read_points(context, obj).points[handles]
-    empty = bpy.data.objects.get(bound.controller)
-    if empty is None:
-        raise PointCloudError(f'The controller "{bound.controller}" is gone. Bind "{obj.name}" again.')
-    context.view_layer.update()
-    change = obj.matrix_world.inverted() @ empty.matrix_world @ bound.start.inverted()
-    linear, shift = np.array(change.to_3x3(), dtype=np.float64), np.array(change.translation, dtype=np.float64)
-    local = reading.points[handles] @ np.linalg.inv(reading.matrix).T
-    return (local @ linear.T + shift) @ reading.matrix.T
+    handles = bound.deformer.handles
+    if bound.controller is not None:
+        empty = _find(bound.controller)
+        if empty is None:
+            raise PointCloudError(f'The controller of "{obj.name}" is gone. Bind the object again.')
+        change = _in_space_of(obj, empty) @ np.linalg.inv(bound.start)
+        local = bound.reading.points[handles] @ np.linalg.inv(bound.reading.matrix).T
+        return _placed(local @ change[:3, :3].T + change[:3, 3], bound)
+    if not bound.key:
+        return _placed(mesh_positions(obj.data)[handles], bound)
+    # By what the key does, not by what is seen, which other keys and the key's value change too.
+    keys = obj.data.shape_keys
+    moved = _key_positions(keys.key_blocks[bound.key]) - _key_positions(keys.reference_key)
+    return bound.reading.points[handles] + _placed(moved[handles], bound)
+
+
+def _key_positions(key):
+    positions = np.empty((len(key.points), 3), np.float32)
+    key.points.foreach_get("co", positions.reshape(-1))
+    return positions
+
+
+def _placed(local, bound):
+    """Turn local positions or shifts into those that the binding was computed in."""
+    return local @ bound.reading.matrix.T
+
+
+def _in_space_of(obj, empty):
+    """Return the matrix of an empty in the space of an object, (4, 4) float64."""
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
+        raise PointCloudError(
+            f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
+        )
+    return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
 
 
 CLASSES = (MESHFREE_OT_deform_bind, MESHFREE_OT_deform_update)

@@ -51,13 +51,24 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
                 )
             fixed, values = low | high, np.where(high, self.high, self.low)
         elif self.group or not self.source:
-            chosen_weights(obj, self.group, "Group")
+            chosen_weights(obj, self.group, "Group", least=0)
             weights = group_weights(obj, self.group, outside=np.nan)
             fixed = np.isfinite(weights)  # with weight 0 too
+            if not fixed.any():
+                raise PointCloudError(
+                    f'The vertex group "{self.group}" of "{obj.name}" holds no points. Assign some to it in Edit Mode.'
+                )
             values = self.low + (self.high - self.low) * weights
         else:
             fixed = values = np.zeros(len(obj.data.vertices), dtype=bool)
-        source = read_attribute(obj.data, self.source).astype(np.float64) if self.source else None
+        source = None
+        if self.source:
+            source = read_attribute(obj.data, self.source).astype(np.float64)
+            if source.ndim > 1:
+                raise PointCloudError(
+                    f'The attribute "{self.source}" of "{obj.name}" holds vectors. Choose one with a number for each'
+                    " point as the source."
+                )
         _, operator = operator_reader(context, obj)
 
         def compute(progress):
@@ -105,6 +116,11 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
             sources = chosen_members(obj, self.group, "Sources")
         else:
             sources = selected(obj)
+        if sources.all():
+            raise PointCloudError(
+                f'All points of "{obj.name}" are sources, so that all distances are 0. Select fewer of them in Edit'
+                " Mode, or choose a smaller group."
+            )
         _, operator = operator_reader(context, obj)
 
         def compute(progress):

@@ -139,10 +139,13 @@ def analysis_arrays(obj, analysis):
 
 
 def attribute_arrays(obj):
-    """Return the points in the world, and the attributes of this extension by their names without the lb_."""
+    """Return the points in the world, and what this extension wrote by its names without the lb_."""
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     arrays = {"points": mesh_positions(obj.data).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]}
     for attribute in obj.data.attributes:
         if attribute.name.startswith(PREFIX):
             arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)
+    for name, values in obj.items():
+        if name.startswith(PREFIX):
+            arrays[name.removeprefix(PREFIX)] = np.array(values)
     return arrays

@@ -34,6 +34,11 @@ def check_movable(obj, target: str):
         raise PointCloudError(
             f'The shape keys of "{obj.name}" are absolute. Turn on Relative, so that a key can be added to them.'
         )
+    if keys is not None and obj.show_only_shape_key:
+        raise PointCloudError(
+            f'"{obj.name}" shows its active shape key alone, which hides a new one. Turn off Solo Active Shape Key (pin'
+            " icon)."
+        )
 
 
 def write_positions(obj, reading, points, target: str, name: str):

@@ -28,7 +28,7 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
         return f'"{obj.name}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
     if not obj.is_editable or not obj.data.is_editable:
         return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
-    if obj.mode not in modes or (obj.data.is_editmode and "EDIT" not in modes):
+    if obj.mode not in modes or (obj.data.is_editmode and obj.mode != "EDIT"):  # by another object of that mesh
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
     if not obj.data.vertices:
         return f'"{obj.name}" has no vertices. Add points, or select another mesh'

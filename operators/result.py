@@ -35,9 +35,13 @@ def check_writable(obj, names, make_single_user: bool, among=()):
     make_single_user : bool
         Whether the object gets a mesh of its own.
     among : sequence of bpy.types.Object
-        Objects that may share the mesh, because they are worked on too.
+        Objects that may share the mesh, because they are worked on too: with the same scale, or a mesh of their own.
     """
-    others = [other.name for other in sharing_objects(obj) if other not in among]
+    others = [
+        other.name
+        for other in sharing_objects(obj)
+        if other not in among or not (other.meshfree.make_single_user or _same(metric(other), metric(obj)))
+    ]
     if others and not make_single_user:
         shown = ", ".join(f'"{name}"' for name in others[:3]) + (", ..." if len(others) > 3 else "")
         raise PointCloudError(
@@ -102,8 +106,12 @@ def is_stale(obj, glance=False) -> bool:
     kept = obj.meshfree
     if kept.fingerprint != fingerprint(obj, glance) or kept.settings_used != repr(settings_values(kept)):
         return True
-    now = metric(obj).reshape(-1)
-    return not np.allclose(now, kept.metric, rtol=0.0, atol=1e-5 * np.abs(now).max())
+    return not _same(np.reshape(kept.metric, (3, 3)), metric(obj))
+
+
+def _same(before, now) -> bool:
+    """Whether two metrics give the same lengths."""
+    return np.allclose(before, now, rtol=0.0, atol=1e-5 * np.abs(now).max())
 
 
 def area_text(area: float) -> str:

@@ -7,10 +7,9 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ..core import PointCloudError, heat_kernel_signature, nodal_domains, segment, wave_kernel_signature
 from . import cache
-from .application import ShownOperator, operator_reader
+from .application import ApplicationOperator, ShownOperator, operator_reader
 from .attributes import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE, read_attribute, remove_numbered, write_attribute
-from .ready import ReadyOperator
-from .result import check_writable
+from .result import EIGENVALUES, check_writable
 
 GROUP = "Segment {}"  # of vertex groups and objects
 
@@ -36,6 +35,8 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
     vertex_groups: BoolProperty(name="Vertex Groups", description="Make a vertex group of each part", default=False)
 
     def plan(self, context, obj):
+        if self.vertex_groups:
+            _check_groups(obj)
         _, operator = operator_reader(context, obj)
         by_mode, parts, mode = self.method == "NODAL", self.parts, self.mode
 
@@ -57,7 +58,7 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
                 group = obj.vertex_groups.new(name=GROUP.format(label))
                 group.add(np.flatnonzero(result == label).tolist(), 1.0, "REPLACE")
         obj.data.update()
-        return f"{obj.name}: {count} parts"
+        return f"{obj.name}: {count} part{'s' if count > 1 else ''}"
 
     def draw(self, context):
         layout = self.layout
@@ -71,33 +72,62 @@ def _is_numbered(name):
     return name.startswith(start) and name.removeprefix(start).isdecimal()
 
 
-class MESHFREE_OT_separate_by_segment(ReadyOperator, bpy.types.Operator):
+def _check_groups(obj):
+    """Refuse an object where groups of parts cannot take the place of those from before."""
+    locked = [group.name for group in obj.vertex_groups if _is_numbered(group.name) and group.lock_weight]
+    if locked:
+        raise PointCloudError(
+            f'The vertex groups {", ".join(locked)} of "{obj.name}" are locked, and would be replaced. Unlock or rename'
+            " them."
+        )
+    taken = [attribute.name for attribute in obj.data.attributes if _is_numbered(attribute.name)]
+    if taken:
+        raise PointCloudError(
+            f'"{obj.name}" has attributes named {", ".join(taken)}, and vertex groups share their names. Rename these'
+            " attributes."
+        )
+
+
+class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
     """Make an object of each part; the largest one stays in this object"""
 
     bl_idname = "meshfree.separate_by_segment"
     bl_label = "Separate by Segment"
 
-    def execute(self, context):
-        obj = context.object
-        try:
-            check_writable(obj, (), False)
-            labels = read_attribute(obj.data, SEGMENT)
-            if labels.dtype.kind != "i" or labels.max() < 1:
-                raise PointCloudError(f'All points of "{obj.name}" are in one part. Segment it into more parts first.')
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        numbers = [number for number in np.unique(labels) if number > 0]
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if SEGMENT not in context.object.data.attributes:
+            cls.poll_message_set(f'"{context.object.name}" has no parts. Segment it first')
+            return False
+        return True
+
+    def invoke(self, context, event):
+        return self.execute(context)
+
+    def plan(self, context, obj):
+        leaving = [other for other in context.selected_objects if other.meshfree.make_single_user]
+        check_writable(obj, (), obj.meshfree.make_single_user, among=leaving)  # others would lose points
+        labels = read_attribute(obj.data, SEGMENT)
+        if labels.dtype.kind != "i" or len(np.unique(labels[labels >= 0])) < 2:
+            raise PointCloudError(f'All points of "{obj.name}" are in one part. Segment it into more parts first.')
+        return lambda progress: labels
+
+    def write(self, context, obj, result):
+        numbers, counts = np.unique(result[result >= 0], return_counts=True)
+        numbers = np.delete(numbers, np.argmax(counts))
+        obj.pop(EIGENVALUES, None)  # those of the whole
         for number in numbers:
             part = obj.copy()
-            part.data = obj.data.copy()
             part.name = f"{obj.name} {GROUP.format(number)}"
-            _keep(part.data, labels == number)
+            part.data = obj.data.copy()
+            part.data.name = part.name
+            _keep(part.data, result == number)
             for collection in obj.users_collection:
                 collection.objects.link(part)
-        _keep(obj.data, labels <= 0)
-        self.report({"INFO"}, f"{obj.name}: {len(numbers)} parts are objects of their own")
-        return {"FINISHED"}
+        _keep(obj.data, ~np.isin(result, numbers))
+        return f"{obj.name}: {len(numbers) + 1} parts are objects of their own"
 
 
 def _keep(mesh, kept):

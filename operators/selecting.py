@@ -26,7 +26,7 @@ class SelectionOperator:
 
     def execute(self, context):
         obj = context.object
-        with object_mode(obj):
+        with object_mode(context, obj):
             try:
                 message = self.change(context, obj)
             except PointCloudError as error:
@@ -37,16 +37,23 @@ class SelectionOperator:
 
 
 @contextmanager
-def object_mode(obj):
-    """Leave Edit Mode, where vertices cannot be read as arrays, and come back to it."""
-    editing = obj.mode == "EDIT"
-    if editing:
-        bpy.ops.object.mode_set(mode="OBJECT")
+def object_mode(context, obj):
+    """Leave Edit Mode, where vertices cannot be read as arrays, and come back to it with the same objects."""
+    if obj.mode != "EDIT":
+        yield
+        return
+    others = [other for other in context.view_layer.objects if other != obj]
+    edited = [other for other in others if other.mode == "EDIT"]
+    chosen = [other for other in others if other.select_get()]
+    bpy.ops.object.mode_set(mode="OBJECT")
     try:
         yield
     finally:
-        if editing:
-            bpy.ops.object.mode_set(mode="EDIT")
+        for other in others:  # selected ones come along into Edit Mode
+            other.select_set(other in edited)
+        bpy.ops.object.mode_set(mode="EDIT")
+        for other in others:
+            other.select_set(other in chosen)
 
 
 def selected(obj):
@@ -58,11 +65,15 @@ def selected(obj):
     return chosen
 
 
-def select(obj, chosen) -> str:
-    """Select these vertices, (n,) bool, and no others."""
-    obj.data.vertices.foreach_set("select", chosen)
+def select(context, obj, chosen) -> str:
+    """Select these vertices, (n,) bool, and no others, in the mode that selects vertices; hidden ones never."""
+    hidden = np.empty(len(chosen), dtype=bool)
+    obj.data.vertices.foreach_get("hide", hidden)
+    shown = chosen & ~hidden
+    context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
+    obj.data.vertices.foreach_set("select", shown)
     obj.data.update()
-    return f"{np.count_nonzero(chosen):,} of {len(chosen):,} points are selected"
+    return f"{np.count_nonzero(shown):,} of {len(shown):,} points are selected"
 
 
 def analyzed(context, obj):
@@ -90,7 +101,7 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
         chosen = selected(obj)
         _, laplacian = analyzed(context, obj)
         distance = self.distance or 4.0 * np.sqrt(np.median(laplacian.areas))
-        return select(obj, grow(laplacian, chosen, distance))
+        return select(context, obj, grow(laplacian, chosen, distance))
 
 
 class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
@@ -102,7 +113,8 @@ class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
     def change(self, context, obj):
         chosen = selected(obj)
         component = analyzed(context, obj)[1].component
-        return select(obj, np.isin(component, component[chosen]))
+        parts = np.unique(component[chosen & (component >= 0)])  # points left out belong to none
+        return select(context, obj, chosen | np.isin(component, parts))
 
 
 class FrontOnly:
@@ -119,7 +131,7 @@ class FrontOnly:
         """Tell which points face the viewer by their normals, (n,) bool."""
         reading, laplacian = analyzed(context, obj)
         view = np.array(self.direction, dtype=np.float64)
-        space = context.region_data if context.area is not None and context.area.type == "VIEW_3D" else None
+        space = context.space_data.region_3d if context.area is not None and context.area.type == "VIEW_3D" else None
         if view.any():
             rays = view
         elif space is None:
@@ -139,7 +151,7 @@ class MESHFREE_OT_select_front(SelectionOperator, FrontOnly, bpy.types.Operator)
     bl_label = "Front Only"
 
     def change(self, context, obj):
-        return select(obj, selected(obj) & self.facing(context, obj))
+        return select(context, obj, selected(obj) & self.facing(context, obj))
 
 
 class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.Operator):
@@ -160,7 +172,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         ],
         default="HANDLE",
     )
-    name: StringProperty(name="Name", description="Name of the group; empty for that of its role")
+    name: StringProperty(name="Name", description="Name of the group; empty for that of its role", maxlen=63)
     action: EnumProperty(
         name="Action",
         description="What happens to points that the group holds already",
@@ -182,6 +194,11 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         chosen = selected(obj)
         if self.front_only:
             chosen &= self.facing(context, obj)
+            if not chosen.any():
+                raise PointCloudError(
+                    f'All selected points of "{obj.name}" face away from the viewer. Turn off Front Only, or look from'
+                    " the other side."
+                )
         name = self.name or self.role.title()
         if name in obj.data.attributes:
             raise PointCloudError(
@@ -189,6 +206,14 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                 " name, or rename the attribute."
             )
         group = obj.vertex_groups.get(name)
+        if group is not None and group.lock_weight:
+            raise PointCloudError(
+                f'The vertex group "{name}" of "{obj.name}" is locked. Unlock it, or choose another name.'
+            )
+        if group is None and self.action == "REMOVE":
+            raise PointCloudError(
+                f'"{obj.name}" has no vertex group named "{name}" to remove points from. Choose another.'
+            )
         if group is None:
             group = obj.vertex_groups.new(name=name)
         if self.action == "REPLACE":

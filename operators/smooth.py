@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..core import boost, displace_by_mode, exponential, fair_points, smooth_points
+from ..core import PointCloudError, boost, displace_by_mode, exponential, fair_points, smooth_points
 from . import cache
 from .application import ApplicationOperator, operator_reader
 from .groups import chosen_weights
@@ -74,12 +74,18 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         mask = chosen_weights(obj, self.group, "Vertex Group") if self.group else None
         method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
         shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
-        keep_rim = self.keep_rim
+        keep_rim, name = self.keep_rim, obj.name
 
         def compute(progress):
             laplacian = operator(progress)
             length = np.median(laplacian.smoothing_lengths)
-            settings = {**shared, "fixed_rim": keep_rim and bool(laplacian.boundary.any()), "progress": progress}
+            fixed_rim = keep_rim and bool(laplacian.boundary.any())
+            if fixed_rim and shared["keep"]:
+                raise PointCloudError(
+                    f'"{name}" has a rim, which stays and fixes the size already. Set Keep to Nothing, or turn off Keep'
+                    " Rim."
+                )
+            settings = {**shared, "fixed_rim": fixed_rim, "progress": progress}
             if method == "NOISE":
                 time = (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None
                 return reading, fair_points(laplacian, time, **settings)

@@ -2,8 +2,6 @@
 
 import bpy
 
-from ..operators.attributes import SEGMENT
-from ..operators.deform import binding
 from .panel import ReadyPanel, SidebarPanel
 
 
@@ -47,9 +45,7 @@ class MESHFREE_PT_segment(ReadyPanel, bpy.types.Panel):
     def draw(self, context):
         column = self.layout.column(align=True)
         column.operator("meshfree.segment", text="Segment...")
-        row = column.row(align=True)
-        row.enabled = SEGMENT in context.object.data.attributes
-        row.operator("meshfree.separate_by_segment")
+        column.operator("meshfree.separate_by_segment")
         self.layout.operator("meshfree.signature", text="Signatures...")
 
 
@@ -74,10 +70,8 @@ class MESHFREE_PT_deform(ReadyPanel, bpy.types.Panel):
     def draw(self, context):
         column = self.layout.column(align=True)
         column.operator("meshfree.deform_bind", text="Bind...")
-        row = column.row(align=True)
-        row.enabled = binding(context.object) is not None
-        row.operator_context = "EXEC_DEFAULT"
-        row.operator("meshfree.deform_update")
+        column.operator_context = "EXEC_DEFAULT"
+        column.operator("meshfree.deform_update")
 
 
 class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):

@@ -104,12 +104,12 @@ def _number_color(tree, number, values, settings):
 
 
 def _with_lines(tree, number, color, count):
-    """Darken a colour along so many even steps of a number from 0 to 1."""
+    """Darken a colour in the middle of so many even steps of a number from 0 to 1, where values beyond end."""
     scaled = add_node(tree, "ShaderNodeMath", 2, -300, operation="MULTIPLY")
     scaled.inputs[1].default_value = count
     part = add_node(tree, "ShaderNodeMath", 3, -300, operation="FRACT")
-    line = add_node(tree, "ShaderNodeMath", 4, -300, operation="LESS_THAN")
-    line.inputs[1].default_value = _LINE
+    line = add_node(tree, "ShaderNodeMath", 4, -300, operation="COMPARE")
+    line.inputs[1].default_value, line.inputs[2].default_value = 0.5, 0.5 * _LINE
     mixed = add_node(tree, "ShaderNodeMixRGB", 5, -300)
     mixed.inputs["Color2"].default_value = _DARK
     for source, target in (

@@ -309,3 +309,49 @@ class TestVerbs:
         obj = bpy.context.object
         assert "lb_segment" in obj.data.attributes
         assert obj.modifiers
+
+    def test_the_history_of_the_area(self, run, tmp_path):
+        points, _ = grid_points()
+        np.savetxt(tmp_path / "a.xyz", points + np.sin(points[:, :1]) * [0.0, 0.0, 0.3])
+        code, (line,) = run("minimal-surface", tmp_path / "a.xyz", "--steps", 3, "--out", tmp_path / "a.npz")
+        assert code == 0
+        assert f"in {len(np.load(tmp_path / 'a.npz')['area_history'])} steps" in line["done"]
+
+    def test_angles_are_in_degrees(self, run, tmp_path):
+        np.savetxt(tmp_path / "a.xyz", POINTS)
+        moved = {}
+        for phase in (0, 180):
+            assert run("mode-shape", tmp_path / "a.xyz", "--phase", phase, "--out", tmp_path / "a.npz")[0] == 0
+            moved[phase] = np.load(tmp_path / "a.npz")["points"] - POINTS
+        assert_allclose(moved[0], -moved[180], atol=1e-5)
+
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            ("smooth", "--strength", "1.5"),
+            ("smooth", "--strength", "nan"),
+            ("smooth", "--wavelength", "-1"),
+            ("segment", "--parts", "0"),
+            ("segment", "--parts", "2.5"),
+            ("segment", "--parts", "99999999999"),
+            ("signature", "--count", "1000"),
+            ("analyze", "--neighbors", "2"),
+        ],
+    )
+    def test_numbers_that_blender_would_silently_replace(self, run, arguments, capfd):
+        assert run(*arguments, "a.ply") == (2, [])
+
+    def test_errors_read_as_those_of_analyze(self, run, tmp_path):
+        np.savetxt(tmp_path / "a.xyz", POINTS)
+        code, (line,) = run("smooth", tmp_path / "a.xyz", "--group", "Nowhere")
+        assert code == 1
+        assert line["error"].startswith('"a" has no vertex group named "Nowhere"')
+
+    def test_linked_duplicates_by_choice(self, run, tmp_path):
+        obj = add_object(POINTS)
+        bpy.context.scene.collection.objects.link(obj.copy())
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+        code, (line,) = run("segment", tmp_path / "a.blend", "--object", "Cloud")
+        assert code == 1
+        assert "shares its mesh" in line["error"]
+        assert run("segment", tmp_path / "a.blend", "--object", "Cloud", "--make-single-user")[0] == 0

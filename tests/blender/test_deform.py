@@ -1,5 +1,7 @@
 """Deformation: bound once, updated for every move of a controller or of the handles themselves."""
 
+import importlib
+
 import bpy
 import numpy as np
 import pytest
@@ -118,5 +120,80 @@ def test_a_controller_that_was_deleted(strip):
     bpy.data.objects.remove(bpy.data.objects["Cloud Handle"])
     before = everything(strip)
     with pytest.raises(RuntimeError, match="is gone. Bind"):
+        bpy.ops.meshfree.deform_update()
+    assert everything(strip) == before
+
+
+def test_the_value_of_the_key_does_not_count_for_handles_moved_in_it(strip):
+    bpy.ops.meshfree.deform_bind(controller=False)
+    key = strip.data.shape_keys.key_blocks["Deform"]
+    points = key_points(strip, "Deform")
+    handles = points[:, 0] > 5.65
+    points[handles, 2] += 0.7
+    key.points.foreach_set("co", points.astype(np.float32).reshape(-1))
+    key.value = 0.5
+    other = strip.shape_key_add(name="Other", from_mix=False)
+    other.points.foreach_set("co", (2.0 * local_points(strip)).astype(np.float32).reshape(-1))
+    other.value = 1.0
+    for _ in range(2):
+        bpy.ops.meshfree.deform_update()
+        assert_allclose(key_points(strip, "Deform")[handles], points[handles], atol=1e-5)
+
+
+@pytest.mark.parametrize("target", ["SHAPE_KEY", "IN_PLACE"])
+@pytest.mark.parametrize("controller", [True, False])
+def test_an_object_that_is_scaled_and_moved_after_binding(strip, target, controller):
+    bpy.ops.meshfree.deform_bind(controller=controller, target=target)
+    before = local_points(strip)
+    strip.scale, strip.location = (-1.0, 2.0, 0.5), (3.0, 0.0, 0.0)
+    if controller:
+        empty = bpy.data.objects["Cloud Handle"]
+        empty.matrix_world = Matrix.LocRotScale(strip.location, None, strip.scale) @ empty.matrix_world
+    bpy.ops.meshfree.deform_update()
+    assert_allclose(shown_points(strip), before, atol=1e-5)
+
+
+def test_new_names_and_undo_do_not_loosen_the_controller(strip):
+    bpy.ops.meshfree.deform_bind()
+    bpy.data.objects["Cloud Handle"].name = "Lever"
+    strip.name = "Strip"
+    bpy.ops.ed.undo_push(message="Renamed")
+    bpy.data.objects["Lever"].location.z += 1.0
+    bpy.ops.meshfree.deform_update("EXEC_DEFAULT", True)
+    bpy.ops.ed.undo()
+    bpy.data.objects["Lever"].location.z += 0.5
+    bpy.ops.meshfree.deform_update()
+    strip = bpy.data.objects["Strip"]
+    handles = local_points(strip)[:, 0] > 5.65
+    assert_allclose(key_points(strip, "Deform")[handles, 2], 0.5, atol=1e-5)
+
+
+def test_bindings_end_with_their_object_and_with_the_file(extension, strip):
+    deform = importlib.import_module(f"{extension.__name__}.operators.deform")
+    bpy.ops.meshfree.deform_bind()
+    other = add_object(local_points(strip), "Other")
+    add_group(other, "Handle", range(20))
+    bpy.data.objects.remove(strip)
+    bpy.ops.meshfree.deform_bind()
+    assert list(deform._bindings) == [other.session_uid]
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert not deform._bindings
+
+
+def test_an_object_scaled_to_nothing(strip):
+    bpy.ops.meshfree.deform_bind()
+    strip.scale.x = 0.0
+    bpy.context.view_layer.update()
+    before = everything(strip)
+    with pytest.raises(RuntimeError, match="scaled to nothing along an axis"):
+        bpy.ops.meshfree.deform_update()
+    assert everything(strip) == before
+
+
+def test_shape_keys_that_came_after_binding_in_place(strip):
+    bpy.ops.meshfree.deform_bind(target="IN_PLACE")
+    strip.shape_key_add(name="Basis")
+    before = everything(strip)
+    with pytest.raises(RuntimeError, match="has shape keys"):
         bpy.ops.meshfree.deform_update()
     assert everything(strip) == before

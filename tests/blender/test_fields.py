@@ -49,6 +49,25 @@ class TestHarmonicField:
         field = attribute(obj, "lb_field")
         assert_allclose(field - field.mean(), 0.5 * (z - z.mean()), atol=0.02)
 
+    def test_a_rim_held_at_zero_with_a_source(self, strip):
+        x = local_points(strip)[:, 0]
+        add_group(strip, "Value", (x < 0.05) | (x > 5.85), weight=0.0)
+        strip.data.attributes.new("heat", "FLOAT", "POINT").data.foreach_set("value", np.ones(1200, np.float32))
+        bpy.ops.meshfree.harmonic_field(source="heat")
+        assert_allclose(attribute(strip, "lb_field"), 0.5 * x * (5.9 - x), atol=0.25)
+
+    def test_a_group_without_points(self, strip):
+        add_group(strip, "Value", [])
+        with pytest.raises(RuntimeError, match='"Value" of "Cloud" holds no points. Assign some'):
+            bpy.ops.meshfree.harmonic_field()
+
+    def test_a_source_of_vectors(self, strip):
+        strip.data.attributes.new("flow", "FLOAT_VECTOR", "POINT")
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match='"flow" of "Cloud" holds vectors. Choose one with a number'):
+            bpy.ops.meshfree.harmonic_field(source="flow", group="")
+        assert everything(strip) == before
+
     def test_points_in_both_groups(self, strip):
         add_group(strip, "A", range(100))
         add_group(strip, "B", range(90, 200))
@@ -90,6 +109,11 @@ class TestGeodesicDistance:
         with pytest.raises(RuntimeError, match="No points.*are selected"):
             bpy.ops.meshfree.geodesic_distance()
 
+    def test_all_points_as_sources(self, strip):
+        strip.data.vertices.foreach_set("select", np.ones(1200, dtype=bool))
+        with pytest.raises(RuntimeError, match="All points.*are sources.*Select fewer"):
+            bpy.ops.meshfree.geodesic_distance()
+
     def test_iso_lines_are_a_setting_of_the_display(self, strip):
         strip.data.vertices.foreach_set("select", np.arange(1200) < 5)
         strip.meshfree.iso_lines = 12
@@ -99,3 +123,6 @@ class TestGeodesicDistance:
             node.inputs[1].default_value for node in nodes if node.type == "MATH" and node.operation == "MULTIPLY"
         ]
         assert factors == [12.0]
+        [line] = [node for node in nodes if node.type == "MATH" and node.operation == "COMPARE"]
+        middle, width = line.inputs[1].default_value, line.inputs[2].default_value
+        assert 0.0 < middle - width < middle + width < 1.0  # none where the range is left

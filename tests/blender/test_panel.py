@@ -10,7 +10,26 @@ import pytest
 
 from tests.blender.clouds import add_object, grid_points, sphere_points
 
-OPERATORS = ("analyze", "spectrum", "colormap")
+OPERATORS = (
+    "analyze",
+    "colormap",
+    "deform_bind",
+    "deform_update",
+    "geodesic_distance",
+    "group_from_selection",
+    "harmonic_field",
+    "minimal_surface",
+    "mode_shape",
+    "segment",
+    "select_component",
+    "select_front",
+    "select_grow",
+    "separate_by_segment",
+    "signature",
+    "smooth",
+    "spectrum",
+)
+PANELS = ("main", "settings", "spectrum", "display", "points", "shape", "segment", "fields", "deform", "minimal")
 
 
 class Layout:
@@ -41,11 +60,21 @@ class Layout:
         self.texts.append(text if text is not None else kind.name)
         return SimpleNamespace(**dict.fromkeys(item.identifier for item in kind.properties))
 
+    def operator_menu_enum(self, idname, path):
+        assert path in self.operator(idname).__dict__
+
+
+class Settings(SimpleNamespace):
+    """Stands in for an operator whose dialog is drawn: the values of its properties."""
+
+    def path_resolve(self, path):
+        return getattr(self, path)
+
 
 def draw():
     """Texts of all panels for the active object."""
     texts = []
-    for name in ("main", "settings", "spectrum", "display"):
+    for name in PANELS:
         panel = getattr(bpy.types, f"MESHFREE_PT_{name}")
         if not hasattr(panel, "poll") or panel.poll(bpy.context):
             panel.draw(SimpleNamespace(layout=Layout(texts)), bpy.context)
@@ -145,8 +174,12 @@ def described():
         kind = getattr(bpy.ops.meshfree, name).get_rna_type()
         yield kind.identifier, kind.name, kind.description
         for item in kind.properties:
-            if item.identifier != "rna_type":
-                yield f"{kind.identifier}.{item.identifier}", item.name, item.description
+            if item.identifier == "rna_type":
+                continue
+            yield f"{kind.identifier}.{item.identifier}", item.name, item.description
+            if item.type == "ENUM":
+                for choice in item.enum_items:
+                    yield f"{kind.identifier}.{item.identifier}.{choice.identifier}", choice.name, choice.description
     for group in ("MESHFREE_PG_settings", "MESHFREE_PG_stage"):
         for item in bpy.types.PropertyGroup.bl_rna_get_subclass_py(group).bl_rna.properties:
             if item.identifier in {"rna_type", "name"}:
@@ -157,10 +190,32 @@ def described():
                     yield f"{group}.{item.identifier}.{choice.identifier}", choice.name, choice.description
 
 
+def test_all_operators_and_panels_are_known_to_these_tests():
+    assert sorted(dir(bpy.ops.meshfree)) == sorted(OPERATORS)
+    panels = [name for name in dir(bpy.types) if name.startswith("MESHFREE_PT_")]
+    assert sorted(panels) == sorted(f"MESHFREE_PT_{name}" for name in PANELS)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_dialogs_show_every_setting(name):
+    add_object(sphere_points())
+    operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
+    if not hasattr(operator, "draw"):
+        return
+    properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if item.type != "POINTER"]
+    values = {item.identifier: item.default for item in properties}
+    choices = [item for item in properties if item.type == "ENUM"]
+    variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]
+    texts = []
+    for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
+        operator.draw(Settings(layout=Layout(texts), **values | variant), bpy.context)
+    assert set(texts) == set(values)
+
+
 def test_names_and_tooltips():
-    small = {"of", "to", "as", "the", "and"}
+    small = {"of", "to", "as", "the", "and", "a", "by"}
     items = list(described())
-    assert len(items) > 40
+    assert len(items) > 120
     for path, name, description in items:
         words = name.replace("(", "").split()
         assert all(word in small or word[0].isupper() for word in words), f"{path}: label {name!r}"
@@ -189,5 +244,5 @@ def test_operators_can_be_undone_and_found():
 
 
 def test_tab():
-    for name in ("main", "settings", "spectrum", "display"):
+    for name in PANELS:
         assert getattr(bpy.types, f"MESHFREE_PT_{name}").bl_category == "Mesh-Free"

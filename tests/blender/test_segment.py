@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_group, add_object, attribute, everything, local_points, result_names, sphere_points
+from tests.blender.test_smooth import key_points
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ def test_separating_keeps_every_point_and_what_it_holds(dumbbell):
 
 def test_separating_without_parts(dumbbell):
     before = everything(dumbbell)
-    with pytest.raises(RuntimeError, match="no attribute lb_segment"):
+    with pytest.raises(RuntimeError, match="has no parts. Segment it first"):
         bpy.ops.meshfree.separate_by_segment()
     assert everything(dumbbell) == before
 
@@ -86,3 +87,69 @@ def test_signatures(core, dumbbell, kind):
         np.testing.assert_allclose(attribute(dumbbell, name), values, rtol=1e-3)
     bpy.ops.meshfree.signature(kind=kind, count=2, modes=20)
     assert [name for name in result_names(dumbbell) if "signature" in name] == names[:2]
+
+
+def test_separating_keeps_shape_keys_and_drops_what_was_of_the_whole(dumbbell):
+    points = local_points(dumbbell)
+    dumbbell.shape_key_add(name="Basis")
+    key = dumbbell.shape_key_add(name="Wide")
+    key.points.foreach_set("co", (2.0 * points).astype(np.float32).reshape(-1))
+    key.value = 0.25
+    dumbbell.active_shape_key_index = 1
+    bpy.ops.meshfree.spectrum(count=5)
+    bpy.ops.meshfree.segment(parts=2)
+    labels = attribute(dumbbell, "lb_segment")
+    assert bpy.ops.meshfree.separate_by_segment() == {"FINISHED"}
+    for number, name in enumerate(["Cloud", "Cloud Segment 1"]):
+        part = bpy.data.objects[name]
+        np.testing.assert_allclose(local_points(part), points[labels == number], atol=1e-6)
+        np.testing.assert_allclose(key_points(part, "Wide"), 2.0 * points[labels == number], atol=1e-6)
+        assert part.data.shape_keys.key_blocks["Wide"].value == 0.25
+        assert "lb_eigenvalues" not in part
+        assert part.modifiers.keys() == ["Mesh-Free Display"]
+
+
+def test_a_part_is_not_separated_from_itself(dumbbell):
+    bpy.ops.meshfree.segment(parts=3)
+    bpy.ops.meshfree.separate_by_segment()
+    part = bpy.data.objects["Cloud Segment 2"]
+    bpy.context.view_layer.objects.active = part
+    dumbbell.select_set(False)
+    before = everything(part)
+    with pytest.raises(RuntimeError, match="are in one part. Segment it"):
+        bpy.ops.meshfree.separate_by_segment()
+    assert everything(part) == before
+
+
+def test_the_largest_part_stays(dumbbell):
+    labels = np.repeat([3, 5], [500, 2000]).astype(np.int32)
+    dumbbell.data.attributes.new("lb_segment", "INT", "POINT").data.foreach_set("value", labels)
+    bpy.ops.meshfree.separate_by_segment()
+    assert len(dumbbell.data.vertices) == 2000
+    assert len(bpy.data.objects["Cloud Segment 3"].data.vertices) == 500
+
+
+def test_separating_one_of_two_linked_duplicates(dumbbell):
+    bpy.ops.meshfree.segment(parts=2)
+    other = dumbbell.copy()
+    bpy.context.scene.collection.objects.link(other)
+    before = everything(dumbbell)
+    with pytest.raises(RuntimeError, match="shares its mesh.*Make Single User"):
+        bpy.ops.meshfree.separate_by_segment()
+    assert everything(dumbbell) == before
+    dumbbell.meshfree.make_single_user = True
+    assert bpy.ops.meshfree.separate_by_segment() == {"FINISHED"}
+    assert len(dumbbell.data.vertices) < len(other.data.vertices) == 2500
+
+
+def test_groups_that_cannot_be_replaced(dumbbell):
+    group = add_group(dumbbell, "Segment 1", [0])
+    group.lock_weight = True
+    before = everything(dumbbell)
+    with pytest.raises(RuntimeError, match="Segment 1 of .* are locked.*Unlock"):
+        bpy.ops.meshfree.segment(vertex_groups=True)
+    assert everything(dumbbell) == before
+    dumbbell.vertex_groups.remove(group)
+    dumbbell.data.attributes.new("Segment 1", "FLOAT", "POINT")
+    with pytest.raises(RuntimeError, match="attributes named Segment 1.*Rename"):
+        bpy.ops.meshfree.segment(vertex_groups=True)

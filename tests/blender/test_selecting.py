@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, local_points, sphere_points
+from tests.blender.clouds import add_object, everything, local_points, sphere_points
 
 
 @pytest.fixture
@@ -103,3 +103,83 @@ def test_an_attribute_of_that_name(obj):
     obj.data.attributes.new("Handle", "FLOAT", "POINT")
     with pytest.raises(RuntimeError, match='attribute named "Handle".*share'):
         bpy.ops.meshfree.group_from_selection(role="HANDLE")
+
+
+def test_hidden_points_are_never_selected(obj, mode):
+    hidden = np.arange(1200) % 2 == 0
+    bpy.ops.object.mode_set(mode="OBJECT")
+    obj.data.vertices.foreach_set("hide", hidden)
+    choose(obj, lambda points: (points[:, 2] > 0.95) & ~hidden)
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.ops.meshfree.select_component()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert (selected(obj) == (local_points(obj)[:, 0] < 2.0) & ~hidden).all()
+    bpy.ops.object.mode_set(mode=mode)
+
+
+def test_points_that_belong_to_no_part():
+    obj = add_object(np.concatenate([sphere_points(900), [[30.0, 0.0, 0.0], [0.0, 30.0, 0.0]]]))
+    choose(obj, lambda points: points[:, 0] > 20.0)
+    bpy.ops.meshfree.select_component()
+    assert np.flatnonzero(selected(obj)).tolist() == [900]
+
+
+@pytest.mark.parametrize("kind", ["EDGE", "FACE"])
+def test_loose_points_stay_selected_whatever_is_selected_in_edit_mode(obj, kind):
+    bpy.context.tool_settings.mesh_select_mode = (False, kind == "EDGE", kind == "FACE")
+    bpy.ops.meshfree.select_grow(distance=0.5)
+    count = selected(obj).sum()
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert selected(obj).sum() == count > 20
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_several_objects_in_edit_mode(obj, fails):
+    partner, bystander = add_object(sphere_points(), "Partner"), add_object(sphere_points(), "Bystander")
+    obj.select_set(True)
+    partner.select_set(True)
+    bystander.select_set(False)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    bystander.select_set(True)
+    partner.select_set(False)
+    if fails:
+        obj.meshfree.rim_group = "Nowhere"
+        with pytest.raises(RuntimeError, match="Nowhere"):
+            bpy.ops.meshfree.select_grow()
+    else:
+        bpy.ops.meshfree.select_grow()
+    assert [item.mode for item in (obj, partner, bystander)] == ["EDIT", "EDIT", "OBJECT"]
+    assert [item.select_get() for item in (obj, partner, bystander)] == [True, False, True]
+    assert bpy.context.object == obj
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({"role": "HANDLE"}, '"Handle" of "Cloud" is locked. Unlock it'),
+        ({"role": "FIXED", "action": "REMOVE"}, 'no vertex group named "Fixed" to remove points from'),
+        ({"role": "FIXED", "front_only": True, "direction": (0.0, 0.0, 1.0)}, "face away.*Turn off Front Only"),
+    ],
+)
+def test_groups_that_cannot_be_changed(obj, settings, text):
+    bpy.ops.meshfree.group_from_selection(role="HANDLE")
+    obj.vertex_groups["Handle"].lock_weight = True
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=text):
+        bpy.ops.meshfree.group_from_selection(**settings)
+    assert everything(obj) == before
+
+
+def test_a_mesh_that_another_object_edits(obj):
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    obj.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.view_layer.objects.active = other
+    with pytest.raises(RuntimeError, match="is not in Object Mode"):
+        bpy.ops.meshfree.select_component()
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="OBJECT")

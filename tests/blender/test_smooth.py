@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import add_group, add_object, everything, local_points, sphere_points
+from tests.blender.clouds import add_group, add_object, everything, grid_points, local_points, sphere_points
 
 
 def rough_sphere(count=1500, noise=0.03):
@@ -124,6 +124,15 @@ def test_an_error_in_one_object_leaves_all_others():
     with pytest.raises(RuntimeError, match="points"):
         bpy.ops.meshfree.smooth()
     assert everything(good) == before
+
+
+def test_a_rim_that_stays_fixes_the_size():
+    obj = add_object(grid_points()[0])
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match='"Cloud" has a rim.*Set Keep to Nothing, or turn off Keep Rim'):
+        bpy.ops.meshfree.smooth(keep="AREA")
+    assert everything(obj) == before
+    assert bpy.ops.meshfree.smooth(keep="AREA", keep_rim=False) == {"FINISHED"}
 
 
 def test_in_place_is_refused_where_shape_keys_would_hide_it():
