@@ -104,12 +104,13 @@ def _number_color(tree, number, values, settings):
 
 
 def _with_lines(tree, number, color, count):
-    """Darken a colour along so many even steps of a number from 0 to 1."""
+    """Darken a colour along so many even steps of a number from 0 to 1, in the middle of each."""
     scaled = add_node(tree, "ShaderNodeMath", 2, -300, operation="MULTIPLY")
     scaled.inputs[1].default_value = count
-    part = add_node(tree, "ShaderNodeMath", 3, -300, operation="FRACT")
-    line = add_node(tree, "ShaderNodeMath", 4, -300, operation="LESS_THAN")
-    line.inputs[1].default_value = _LINE
+    part = add_node(tree, "ShaderNodeMath", 3, -300, operation="FRACT")  # 0 at the ends, where values are clamped
+    line = add_node(tree, "ShaderNodeMath", 4, -300, operation="COMPARE")
+    line.inputs[1].default_value = 0.5
+    line.inputs[2].default_value = 0.5 * _LINE
     mixed = add_node(tree, "ShaderNodeMixRGB", 5, -300)
     mixed.inputs["Color2"].default_value = _DARK
     for source, target in (
