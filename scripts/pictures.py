@@ -63,7 +63,7 @@ def rim(path):
 
 def smooth(path):
     """The shape with noise, and without it again."""
-    objects = coral(noise=0.5), coral(noise=0.5)
+    objects = coral(noise=0.6), coral(noise=0.6)
     bpy.ops.meshfree.smooth(method="NOISE", target="IN_PLACE")
     for obj in objects:
         studio.show_shape(obj)
@@ -108,7 +108,7 @@ def signature(path):
 def distance(path):
     """Distances from one point, with lines of equal distance."""
     obj = coral()
-    obj.meshfree.iso_lines = LINES
+    obj.meshfree.iso_lines, obj.meshfree.coverage = LINES, 100.0
     studio.group(obj, tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
     bpy.ops.meshfree.geodesic_distance()
     single(obj, "lb_distance", path)
@@ -119,7 +119,7 @@ def field(path):
     obj = coral()
     obj.meshfree.iso_lines = LINES
     for name, direction in (("Low", (-1.0, 0.0, 0.0)), ("High", (1.0, -1.0, 0.0))):
-        studio.group(obj, tip(obj, direction), "VALUE", name, grown=0.2)
+        studio.group(obj, tip(obj, direction), "VALUE", name, grown=0.5)
     bpy.ops.meshfree.harmonic_field(values="GROUPS", low_group="Low", high_group="High")
     single(obj, "lb_field", path)
 
@@ -127,9 +127,9 @@ def field(path):
 def deform(path):
     """An arm bent by its tip."""
     rest, obj = coral(), coral()
-    studio.group(obj, tip(obj, (0.0, 0.0, 1.0)), "HANDLE", grown=0.3)
-    studio.group(obj, studio.world_points(obj)[:, 2] < -0.3, "ANCHOR")
-    studio.deform(obj, move=(0.7, 0.0, 0.2), turn=(0.0, 0.9, 0.0))
+    studio.group(obj, tip(obj, (1.0, -1.0, 0.5)), "HANDLE", grown=0.35)
+    studio.group(obj, studio.world_points(obj)[:, 2] < -0.7, "ANCHOR")
+    studio.deform(obj, move=(0.0, 0.0, 1.0), turn=(-0.5, -0.5, 0.0))
     studio.deformed_row(rest, obj, path)
 
 
@@ -143,11 +143,15 @@ def minimal(path):
         if name == "Catenoid":
             bpy.ops.meshfree.minimal_surface(target="IN_PLACE")
         bpy.ops.meshfree.analyze(show=False)
-        obj.meshfree.coverage = 100.0
+        obj.meshfree.color_map = "COOL_WARM"  # gray where the mean curvature is zero
         studio.show(obj, "lb_mean_curvature")
+        studio.set_range(obj, -0.4, 0.4)
         objects.append(obj)
-    studio.same_range(objects)
-    row(objects, path, legend=objects[0])
+    studio.line_up(objects)
+    for obj in objects:
+        ends = studio.world_points(obj)[np.abs(points[:, 2]) == 1.0]
+        studio.mark(ends, studio.ANCHORS, studio.MARKS * 2.0 / 40)
+    studio.take(path, legend=objects[0])
 
 
 PICTURES = {

@@ -39,14 +39,14 @@ def figure12(path):
         studio.activate(obj)
         bpy.ops.meshfree.analyze(show=False)
         studio.show_shape(obj, normals="lb_normal")
-    studio.row(objects, path, legend=None, view=(-0.3, 1.0, 0.1), size=(1200, 400))
+    studio.row(objects, path, legend=None, view=(0.3, -1.0, 0.1), size=(1200, 400))
 
 
 def figure11(path):
     """The armadillo in parts: Figure 11 of the paper."""
     (obj,) = scan("armadillo")
     bpy.ops.meshfree.segment(parts=7)
-    studio.single(obj, "lb_segment", path, view=(-0.3, 1.0, 0.1))
+    studio.single(obj, "lb_segment", path, view=(0.3, -1.0, 0.1))
 
 
 def figure13_planck(path):
@@ -55,9 +55,9 @@ def figure13_planck(path):
     points = own_points(obj)
     crown = points[points[:, 1].argmax()]
     studio.group(obj, np.linalg.norm(points - crown, axis=1) < 25.0, "HANDLE")
-    studio.group(obj, points[:, 1] < -130.0, "ANCHOR")
+    studio.group(obj, points[:, 1] < 0.0, "ANCHOR")
     studio.deform(obj, move=(0.0, 0.0, 80.0))
-    studio.deformed_row(rest, obj, path, view=(0.6, -1.0, 0.2))
+    studio.deformed_row(rest, obj, path, view=(-0.6, 1.0, 0.1))
 
 
 def figure13_camel(path):
@@ -68,8 +68,8 @@ def figure13_camel(path):
     away = np.linalg.norm(points - cheek, axis=1)
     studio.group(obj, away < 0.03, "HANDLE")
     studio.group(obj, away > 0.3, "ANCHOR")
-    studio.deform(obj, move=(-0.06, 0.0, 0.0))
-    studio.deformed_row(rest, obj, path, view=(1.0, -0.8, 0.2))
+    studio.deform(obj, move=(-0.09, 0.0, 0.0))
+    studio.deformed_row(rest, obj, path, view=(0.7, -1.0, 0.3))
 
 
 PICTURES = {

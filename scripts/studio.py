@@ -17,10 +17,12 @@ LEGEND_WIDTH = 0.38  # of the picture's height
 VIEW = (0.45, -1.0, 0.35)  # direction towards the camera
 LENS = 50.0  # focal length, mm
 TOUCHING = 1.6  # radius of points that make a closed surface, in units of their spacing
-SIZE, WIDE = (640, 400), (800, 400)  # of pictures of the manual, in pixels
+CLOSED = 2.0  # without any gap, which would show as dark holes in clay
+SIZE, WIDE = (640, 400), (800, 360)  # of pictures of the manual, in pixels
 SAMPLES = 64  # rays per pixel of these
-HANDLES, ANCHORS = (0.8, 0.02, 0.02, 1.0), (0.02, 0.02, 0.02, 1.0)
 CLAY = (0.62, 0.58, 0.52, 1.0)
+HANDLES, ANCHORS = (0.8, 0.05, 0.02, 1.0), (0.03, 0.12, 0.4, 1.0)
+MARKS = 1.1 * CLOSED  # radius of their points
 
 
 @contextlib.contextmanager
@@ -79,9 +81,11 @@ def set_up(scene, obj, size=(1280, 800), samples=16, view=VIEW, legend=True):
     scene.cycles.device = "CPU"
     scene.cycles.samples = samples
     scene.cycles.use_denoising = False
+    scene.cycles.max_bounces = 0  # objects shed none of their colour on each other
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.image_settings.compression = 100
+    scene.render.image_settings.color_mode = "RGB"
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     world = bpy.data.worlds.new("Studio")
@@ -197,7 +201,7 @@ def show(obj, attribute, radius=TOUCHING):
     bpy.ops.meshfree.colormap(attribute=attribute, radius=radius * part("operators.reading").spacing(obj.data))
 
 
-def show_shape(obj, normals="", radius=TOUCHING):
+def show_shape(obj, normals="", radius=CLOSED):
     """Show an object as if made of clay; an attribute of normals makes its shading smooth."""
     modifier = add_display(obj, radius * part("operators.reading").spacing(obj.data))
     part("ui.display").set_input(modifier, "Material", paint("Clay", CLAY, normals))
@@ -274,12 +278,10 @@ def take(path, legend, view=VIEW, size=WIDE):
     render(scene, path)
 
 
-def same_range(objects):
-    """Give the colours of all objects the range of the first one's."""
-    nodes = [part("ui.display").range_node(obj) for obj in objects]
-    for name in ("From Min", "From Max"):
-        for node in nodes[1:]:
-            node.inputs[name].default_value = nodes[0].inputs[name].default_value
+def set_range(obj, low, high):
+    """Set the range of the colours of an object, as in the panel."""
+    node = part("ui.display").range_node(obj)
+    node.inputs["From Min"].default_value, node.inputs["From Max"].default_value = low, high
 
 
 def activate(obj):
@@ -308,13 +310,20 @@ def deform(obj, move, turn=(0.0, 0.0, 0.0)):
 
 
 def deformed_row(rest, obj, path, view=VIEW):
-    """Render an object at rest beside a deformed one, coloured by displacement, with its handles and anchors."""
-    show_shape(rest)
-    obj.meshfree.coverage = 100.0
-    show(obj, "lb_displacement")
-    line_up([rest, obj], view)
-    radius = 1.0 * part("operators.reading").spacing(obj.data)
+    """Render an object at rest and deformed, with its handles and anchors, and deformed with its displacement."""
+    colored = obj.copy()
+    colored.data = obj.data.copy()
+    bpy.context.scene.collection.objects.link(colored)
+    colored.meshfree.coverage = 100.0
+    show(colored, "lb_displacement")
+    for shape in (rest, obj):
+        activate(shape)
+        bpy.ops.meshfree.analyze(show=False)
+        show_shape(shape, normals="lb_normal")
+    line_up([rest, obj, colored], view)
+    radius = MARKS * part("operators.reading").spacing(rest.data)
     for name, color in (("Handle", HANDLES), ("Anchor", ANCHORS)):
         members = part("operators.groups").chosen_members(obj, name, name)
-        mark(world_points(obj)[members], color, radius)
-    take(path, obj, view)
+        for shape in (rest, obj):
+            mark(world_points(shape)[members], color, radius)
+    take(path, colored, view, (960, 340))
