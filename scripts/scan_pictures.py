@@ -42,8 +42,8 @@ def figure12(path):
     studio.row(objects, path, legend=None, view=(0.3, -1.0, 0.1), size=(1200, 400))
 
 
-def figure11(path):
-    """The armadillo in parts: Figure 11 of the paper."""
+def armadillo(path):
+    """The armadillo in parts."""
     (obj,) = scan("armadillo")
     bpy.ops.meshfree.segment(parts=7)
     studio.single(obj, "lb_segment", path, view=(0.3, -1.0, 0.1))
@@ -57,7 +57,7 @@ def figure13_planck(path):
     studio.group(obj, np.linalg.norm(points - crown, axis=1) < 25.0, "HANDLE")
     studio.group(obj, points[:, 1] < 0.0, "ANCHOR")
     studio.deform(obj, move=(0.0, 0.0, 80.0))
-    studio.deformed_row(rest, obj, path, view=(-0.6, 1.0, 0.1))
+    studio.deformed_row(rest, obj, path, view=(-0.6, 1.0, 0.1), size=(760, 360))
 
 
 def figure13_camel(path):
@@ -73,7 +73,7 @@ def figure13_camel(path):
 
 
 PICTURES = {
-    "figure11": figure11,
+    "armadillo": armadillo,
     "figure12": figure12,
     "figure13_planck": figure13_planck,
     "figure13_camel": figure13_camel,

@@ -15,7 +15,7 @@ import package
 MODULE = "bl_ext.user_default.meshfree_laplacian"
 LEGEND_WIDTH = 0.38  # of the picture's height
 VIEW = (0.45, -1.0, 0.35)  # direction towards the camera
-LENS = 50.0  # focal length, mm
+LENS, FAR_LENS = 50.0, 250.0  # focal length, mm; objects in a row are seen from the same side by the latter
 TOUCHING = 1.6  # radius of points that make a closed surface, in units of their spacing
 CLOSED = 2.0  # without any gap, which would show as dark holes in clay
 SIZE, WIDE = (640, 400), (800, 360)  # of pictures of the manual, in pixels
@@ -109,7 +109,7 @@ def set_up(scene, obj, size=(1280, 800), samples=16, view=VIEW, legend=True):
     sun.data.angle = 0.3
     scene.collection.objects.link(sun)
     objects = obj if isinstance(obj, list) else [obj]
-    scene.camera.data.lens = LENS * len(objects)  # a row is seen from farther away, each of it from the same side
+    scene.camera.data.lens = LENS if len(objects) == 1 else FAR_LENS
     points = np.concatenate([world_points(one) for one in objects])
     rotation = aim(scene, points, view, room=LEGEND_WIDTH if legend else 0.0)
     sun.matrix_world = (rotation @ Euler((-0.6, -0.6, 0.0)).to_matrix()).to_4x4()  # behind the camera's left shoulder
@@ -135,7 +135,7 @@ def world_points(obj):
     return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def line_up(objects, view=VIEW, gap=0.15):
+def line_up(objects, view=VIEW, gap=0.2):
     """Move objects into a row from left to right in the picture, with gaps in shares of the first one's width."""
     right = Vector((0.0, 0.0, 1.0)).cross(Vector(view)).normalized()
     end = width = 0.0
@@ -309,7 +309,7 @@ def deform(obj, move, turn=(0.0, 0.0, 0.0)):
     bpy.ops.meshfree.deform_update()
 
 
-def deformed_row(rest, obj, path, view=VIEW):
+def deformed_row(rest, obj, path, view=VIEW, size=(960, 340)):
     """Render an object at rest and deformed, with its handles and anchors, and deformed with its displacement."""
     colored = obj.copy()
     colored.data = obj.data.copy()
@@ -326,4 +326,4 @@ def deformed_row(rest, obj, path, view=VIEW):
         members = part("operators.groups").chosen_members(obj, name, name)
         for shape in (rest, obj):
             mark(world_points(shape)[members], color, radius)
-    take(path, colored, view, (960, 340))
+    take(path, colored, view, size)
