@@ -57,17 +57,6 @@ class Coral:
         return radii[kept, None] * directions[kept]
 
 
-def make_object(points):
-    """Add an object of loose vertices, (n, 3), and make it active."""
-    mesh = bpy.data.meshes.new("Coral")
-    mesh.vertices.add(len(points))
-    mesh.vertices.foreach_set("co", points.astype(np.float32).reshape(-1))
-    obj = bpy.data.objects.new("Coral", mesh)
-    bpy.context.scene.collection.objects.link(obj)
-    bpy.context.view_layer.objects.active = obj
-    return obj
-
-
 def load_scan(path, up):
     """Open a scan as the command line does, and put it upright."""
     obj = studio.part("operators.files").load(path)
@@ -93,7 +82,7 @@ def demonstrate(scan, up):
     """Analyze the points, print the results, and write a .blend file and a picture."""
     shape = Coral()
     with studio.silence():
-        obj = make_object(shape.sample(POINTS)) if scan is None else load_scan(scan, up)
+        obj = studio.make_object(shape.sample(POINTS), "Coral") if scan is None else load_scan(scan, up)
     print(f"points       {len(obj.data.vertices):,}", flush=True)
     timed("analyze", bpy.ops.meshfree.analyze, show=False)
     timed("spectrum", bpy.ops.meshfree.spectrum, count=MODES, show=False)

@@ -1,46 +1,197 @@
-"""Render the pictures of the manual into docs/pictures/, in Blender's module. Started by in_blender.py."""
+"""Render the pictures of the manual into docs/pictures/, in Blender's module: pictures.py [NAME ...].
+
+Started by in_blender.py. Names are those of the pictures to renew; without any all are. Pictures of scans need a folder
+of them, named by the environment variable MESHFREE_SCANS.
+"""
+
+import argparse
+from time import perf_counter
 
 import bpy
+import numpy as np
 
 import demo
 import package
+import scan_pictures
 import studio
+from studio import row, single
 
 OUTPUT = package.ROOT / "docs" / "pictures"
-SHOWN = {
-    "area": "lb_area",
-    "normal": "lb_normal",
-    "curvature": "lb_mean_curvature",
-    "gaussian": "lb_gaussian_curvature",
-    "mode": "lb_eigenvector_020",
-}
 CUT = 0.45  # height at which the shape is cut open for the picture of a rim
+SPACING = 0.038  # of the points of the demonstration's shape
+LINES = 15
 
 
-def take(obj, shown):
-    """Render attributes of an object, by the names of their pictures."""
-    for name, attribute in shown.items():
-        path = OUTPUT / f"{name}.png"
-        with studio.silence():
-            studio.picture(bpy.context.scene, obj, attribute, path)
-        print(f"written  {path.relative_to(package.ROOT)}", flush=True)
+def coral(noise=0.0):
+    """Add the demonstration's shape, with noise of its points in units of their spacing."""
+    points = demo.Coral().sample(demo.POINTS)
+    points += noise * SPACING * np.random.default_rng(1).standard_normal(points.shape)
+    return studio.make_object(points, "Coral")
+
+
+def tip(obj, direction):
+    """Return which point of an object lies farthest in a direction, (n,) bool."""
+    along = studio.world_points(obj) @ np.array(direction, dtype=float)
+    return np.arange(len(along)) == along.argmax()
+
+
+def result(attribute):
+    """Return a function that renders a result of the analysis."""
+
+    def take(path):
+        obj = coral()
+        bpy.ops.meshfree.analyze(show=False)
+        single(obj, attribute, path)
+
+    return take
+
+
+def mode(path):
+    """One vibration mode."""
+    obj = coral()
+    bpy.ops.meshfree.spectrum(count=20, show=False)
+    single(obj, "lb_eigenvector_020", path)
+
+
+def rim(path):
+    """The rim of the shape cut open."""
+    points = demo.Coral().sample(demo.POINTS)
+    obj = studio.make_object(points[points[:, 2] < CUT], "Coral")
+    bpy.ops.meshfree.analyze(show=False)
+    single(obj, "lb_boundary", path)
+
+
+def smooth(path):
+    """The shape with noise, and without it again."""
+    objects = coral(noise=0.6), coral(noise=0.6)
+    bpy.ops.meshfree.smooth(method="NOISE", target="IN_PLACE")
+    for obj in objects:
+        studio.show_shape(obj)
+    row(objects, path, legend=None)
+
+
+def mode_shape(path):
+    """A spherical harmonic as a displacement: found among the modes of a sphere, and exact.
+
+    The eleven modes of the fifth frequency are any basis of their space, so the harmonic is put together from them.
+    """
+    core = studio.part("core")
+    points = demo.spread_directions(8000)
+    x, y, z = points.T
+    exact = z * ((x + 1j * y) ** 4).real  # Y_5^4 up to a factor
+    laplacian = core.build_laplacian(points)
+    modes = laplacian.eigenpairs(36).eigenvectors[:, 25:]
+    found = modes @ (modes.T @ (laplacian.areas * exact))
+    objects = []
+    for values in (found, exact):
+        obj = studio.make_object(core.displace_by_mode(laplacian, values, 0.3), "Sphere")
+        studio.part("operators.attributes").write_attribute(obj.data, "Mode", values / np.abs(values).max())
+        studio.show(obj, "Mode")
+        objects.append(obj)
+    row(objects, path, legend=objects[0])
+
+
+def segment(path):
+    """The shape in parts: a body and its arms."""
+    obj = coral()
+    bpy.ops.meshfree.segment(parts=7)
+    single(obj, "lb_segment", path)
+
+
+def signature(path):
+    """A heat signature: high at the tips of arms, low between them."""
+    obj = coral()
+    bpy.ops.meshfree.signature(kind="HEAT", count=8)
+    single(obj, "lb_heat_signature_004", path)
+
+
+def distance(path):
+    """Distances from one point, with lines of equal distance."""
+    obj = coral()
+    obj.meshfree.iso_lines, obj.meshfree.coverage = LINES, 100.0
+    studio.group(obj, tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
+    bpy.ops.meshfree.geodesic_distance()
+    single(obj, "lb_distance", path)
+
+
+def field(path):
+    """A harmonic field between the tips of two arms."""
+    obj = coral()
+    obj.meshfree.iso_lines = LINES
+    for name, direction in (("Low", (-1.0, 0.0, 0.0)), ("High", (1.0, -1.0, 0.0))):
+        studio.group(obj, tip(obj, direction), "VALUE", name, grown=0.5)
+    bpy.ops.meshfree.harmonic_field(values="GROUPS", low_group="Low", high_group="High")
+    single(obj, "lb_field", path)
+
+
+def deform(path):
+    """An arm bent by its tip."""
+    rest, obj = coral(), coral()
+    studio.group(obj, tip(obj, (1.0, -1.0, 0.5)), "HANDLE", grown=0.35)
+    studio.group(obj, studio.world_points(obj)[:, 2] < -0.7, "ANCHOR")
+    studio.deform(obj, move=(0.0, 0.0, 1.0), turn=(-0.5, -0.5, 0.0))
+    studio.deformed_row(rest, obj, path)
+
+
+def minimal(path):
+    """A cylinder that becomes a catenoid, the least area between its rims."""
+    around, height = np.meshgrid(2.0 * np.pi * np.arange(196) / 196, np.linspace(-1.0, 1.0, 40))
+    points = np.column_stack([2.0 * np.cos(around.ravel()), 2.0 * np.sin(around.ravel()), height.ravel()])
+    objects = []
+    for name in ("Cylinder", "Catenoid"):
+        obj = studio.make_object(points, name)
+        if name == "Catenoid":
+            bpy.ops.meshfree.minimal_surface(target="IN_PLACE")
+        bpy.ops.meshfree.analyze(show=False)
+        obj.meshfree.color_map = "COOL_WARM"  # gray where the mean curvature is zero
+        studio.show(obj, "lb_mean_curvature")
+        studio.set_range(obj, -0.4, 0.4)
+        objects.append(obj)
+    studio.line_up(objects)
+    for obj in objects:
+        ends = studio.world_points(obj)[np.abs(points[:, 2]) == 1.0]
+        studio.mark(ends, studio.ANCHORS, studio.MARKS * 2.0 / 40)
+    studio.take(path, legend=objects[0])
+
+
+PICTURES = {
+    "area": result("lb_area"),
+    "normal": result("lb_normal"),
+    "curvature": result("lb_mean_curvature"),
+    "gaussian": result("lb_gaussian_curvature"),
+    "mode": mode,
+    "rim": rim,
+    "smooth": smooth,
+    "mode_shape": mode_shape,
+    "segment": segment,
+    "signature": signature,
+    "distance": distance,
+    "field": field,
+    "deform": deform,
+    "minimal": minimal,
+    **scan_pictures.PICTURES,
+}
 
 
 def main():
-    """Show each result on the demonstration's shape, and the rim on a part of it."""
+    """Render the pictures that are asked for, each in a scene of its own."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"pictures to renew: {', '.join(PICTURES)}")
+    names = parser.parse_args().names or list(PICTURES)
+    unknown = [name for name in names if name not in PICTURES]
+    if unknown:
+        parser.error(f"there is no picture {', '.join(unknown)}")
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    points = demo.Coral().sample(demo.POINTS)
     with studio.extension():
-        with studio.silence():
-            whole = demo.make_object(points)
-            bpy.ops.meshfree.spectrum(count=20, show=False)
-            studio.set_up(bpy.context.scene, whole, size=(640, 400), samples=64)
-        take(whole, SHOWN)
-        with studio.silence():
-            whole.hide_render = True
-            part = demo.make_object(points[points[:, 2] < CUT])
-            bpy.ops.meshfree.analyze(show=False)
-        take(part, {"rim": "lb_boundary"})
+        for name in names:
+            if name in scan_pictures.PICTURES and not scan_pictures.FOLDER:
+                print(f"left out {name}: MESHFREE_SCANS names no folder of scans", flush=True)
+                continue
+            began, path = perf_counter(), OUTPUT / f"{name}.png"
+            with studio.silence():
+                bpy.ops.wm.read_homefile(use_empty=True)
+                PICTURES[name](path)
+            print(f"written  {path.relative_to(package.ROOT)}  {perf_counter() - began:.1f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,15 @@ import package
 
 MODULE = "bl_ext.user_default.meshfree_laplacian"
 LEGEND_WIDTH = 0.38  # of the picture's height
+VIEW = (0.45, -1.0, 0.35)  # direction towards the camera
+LENS, FAR_LENS = 50.0, 250.0  # focal length, mm; objects in a row are seen from the same side by the latter
+TOUCHING = 1.6  # radius of points that make a closed surface, in units of their spacing
+CLOSED = 2.0  # without any gap, which would show as dark holes in clay
+SIZE, WIDE = (640, 400), (800, 360)  # of pictures of the manual, in pixels
+SAMPLES = 64  # rays per pixel of these
+CLAY = (0.62, 0.58, 0.52, 1.0)
+HANDLES, ANCHORS = (0.8, 0.05, 0.02, 1.0), (0.03, 0.12, 0.4, 1.0)
+MARKS = 1.1 * CLOSED  # radius of their points
 
 
 @contextlib.contextmanager
@@ -51,28 +60,32 @@ def part(name):
     return importlib.import_module(f"{MODULE}.{name}")
 
 
-def set_up(scene, obj, size=(1280, 800), samples=16, view=(0.45, -1.0, 0.35)):
-    """Set up a scene for pictures of an object: Cycles on the processor, colours as in the legend, a light surrounding.
+def set_up(scene, obj, size=(1280, 800), samples=16, view=VIEW, legend=True):
+    """Set up a scene for pictures of objects: Cycles on the processor, colours as in the legend, a light surrounding.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-    obj : bpy.types.Object
-        A mesh object of any size and place.
+    obj : bpy.types.Object or list of them
+        Mesh objects of any size and place.
     size : tuple of 2 int
         Width and height of the pictures in pixels.
     samples : int
         Rays per pixel.
     view : sequence of 3 floats
-        Direction from the object towards the camera.
+        Direction from the objects towards the camera.
+    legend : bool
+        Leave room for a legend.
     """
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
     scene.cycles.samples = samples
     scene.cycles.use_denoising = False
+    scene.cycles.max_bounces = 0  # objects shed none of their colour on each other
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.image_settings.compression = 100
+    scene.render.image_settings.color_mode = "RGB"
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     world = bpy.data.worlds.new("Studio")
@@ -95,9 +108,23 @@ def set_up(scene, obj, size=(1280, 800), samples=16, view=(0.45, -1.0, 0.35)):
     sun.data.energy = 1.3
     sun.data.angle = 0.3
     scene.collection.objects.link(sun)
-    rotation = aim(scene, world_points(obj), view)
+    objects = obj if isinstance(obj, list) else [obj]
+    scene.camera.data.lens = LENS if len(objects) == 1 else FAR_LENS
+    points = np.concatenate([world_points(one) for one in objects])
+    rotation = aim(scene, points, view, room=LEGEND_WIDTH if legend else 0.0)
     sun.matrix_world = (rotation @ Euler((-0.6, -0.6, 0.0)).to_matrix()).to_4x4()  # behind the camera's left shoulder
     bpy.context.view_layer.update()
+
+
+def make_object(points, name):
+    """Add an object of loose vertices, (n, 3), and make it active."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(points))
+    mesh.vertices.foreach_set("co", points.astype(np.float32).reshape(-1))
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    return obj
 
 
 def world_points(obj):
@@ -108,7 +135,20 @@ def world_points(obj):
     return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def aim(scene, points, view, margin=0.05):
+def line_up(objects, view=VIEW, gap=0.2):
+    """Move objects into a row from left to right in the picture, with gaps in shares of the first one's width."""
+    right = Vector((0.0, 0.0, 1.0)).cross(Vector(view)).normalized()
+    end = width = 0.0
+    for index, obj in enumerate(objects):
+        along = world_points(obj) @ np.array(right)
+        width = width or np.ptp(along)
+        if index:
+            obj.location += float(end + gap * width - along.min()) * right
+        bpy.context.view_layer.update()
+        end = (world_points(obj) @ np.array(right)).max()
+
+
+def aim(scene, points, view, margin=0.05, room=LEGEND_WIDTH):
     """Put the camera where it sees all points as large as the picture allows, left of the legend.
 
     Parameters
@@ -120,6 +160,8 @@ def aim(scene, points, view, margin=0.05):
         Direction from the points towards the camera; the world's z axis points upwards in the picture.
     margin : float
         Free border as a share of the picture's height.
+    room : float
+        For the legend, as a share of the picture's height.
 
     Returns
     -------
@@ -138,7 +180,7 @@ def aim(scene, points, view, margin=0.05):
     slope = math.tan(data.angle / 2) * height / max(width, height)  # of the upper edge of the view
     vertical = slope * (1 - 2 * margin)
     leftmost = slope * (width / height - 2 * margin)
-    rightmost = leftmost - 2 * slope * LEGEND_WIDTH
+    rightmost = leftmost - 2 * slope * room
     # A camera at (cx, cy, -distance) sees a point if x - cx <= rightmost (depth + distance), and so on for each edge.
     east, west = (x - rightmost * depth).max(), (-x - leftmost * depth).max()
     north, south = (y - vertical * depth).max(), (-y - vertical * depth).max()
@@ -153,11 +195,135 @@ def aim(scene, points, view, margin=0.05):
     return rotation
 
 
+def show(obj, attribute, radius=TOUCHING):
+    """Show an attribute of an object as colours on its points, whose radius is given in units of their spacing."""
+    activate(obj)
+    bpy.ops.meshfree.colormap(attribute=attribute, radius=radius * part("operators.reading").spacing(obj.data))
+
+
+def show_shape(obj, normals="", radius=CLOSED):
+    """Show an object as if made of clay; an attribute of normals makes its shading smooth."""
+    modifier = add_display(obj, radius * part("operators.reading").spacing(obj.data))
+    part("ui.display").set_input(modifier, "Material", paint("Clay", CLAY, normals))
+
+
+def mark(points, color, radius):
+    """Add points of one colour to the scene, (n, 3), such as the handles of a deformation."""
+    obj = make_object(points, "Marks")
+    part("ui.display").set_input(add_display(obj, radius), "Material", paint("Mark", color))
+    return obj
+
+
+def add_display(obj, radius):
+    """Make an object's vertices round points of this radius, and return the modifier."""
+    modifier = part("ui.display").find_display(obj) or obj.modifiers.new("Points", "NODES")
+    modifier.node_group = part("ui.nodes").display_group()
+    part("ui.display").set_input(modifier, "Radius", radius)
+    return modifier
+
+
+def paint(name, color, normals=""):
+    """Return a matt material of one colour."""
+    add_node = part("ui.nodes").add_node
+    material = bpy.data.materials.new(name)
+    tree = part("ui.nodes").new_tree(material)
+    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", 2, 0)
+    diffuse.inputs["Color"].default_value = color
+    output = add_node(tree, "ShaderNodeOutputMaterial", 3, 0)
+    tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    if normals:
+        attribute = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=normals)
+        turned = add_node(
+            tree, "ShaderNodeVectorTransform", 1, 0, vector_type="NORMAL", convert_from="OBJECT", convert_to="WORLD"
+        )
+        tree.links.new(attribute.outputs["Vector"], turned.inputs[0])
+        tree.links.new(turned.outputs[0], diffuse.inputs["Normal"])
+    return material
+
+
 def picture(scene, obj, attribute, path):
     """Render an attribute of an object with its legend into a PNG file."""
-    radius = 1.4 * part("operators.reading").spacing(obj.data)  # points that touch: a closed surface
-    bpy.ops.meshfree.colormap(attribute=attribute, radius=radius)
+    show(obj, attribute)
     part("ui.legend").make_legend(scene, obj, scene.camera)
+    render(scene, path)
+
+
+def render(scene, path):
+    """Render the scene as it is into a PNG file."""
     scene.render.image_settings.file_format = "PNG"
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
+
+
+def single(obj, attribute, path, view=VIEW):
+    """Render an attribute of one object into a picture of the manual."""
+    scene = bpy.context.scene
+    activate(obj)
+    set_up(scene, obj, SIZE, SAMPLES, view)
+    picture(scene, obj, attribute, path)
+
+
+def row(objects, path, legend, view=VIEW, size=WIDE):
+    """Render objects side by side as they are shown, with the legend of one of them, or none."""
+    line_up(objects, view)
+    take(path, legend, view, size)
+
+
+def take(path, legend, view=VIEW, size=WIDE):
+    """Render all that is in the scene into a picture of the manual."""
+    scene = bpy.context.scene
+    set_up(scene, [obj for obj in scene.objects if obj.type == "MESH"], size, SAMPLES, view, legend is not None)
+    if legend is not None:
+        part("ui.legend").make_legend(scene, legend, scene.camera)
+    render(scene, path)
+
+
+def set_range(obj, low, high):
+    """Set the range of the colours of an object, as in the panel."""
+    node = part("ui.display").range_node(obj)
+    node.inputs["From Min"].default_value, node.inputs["From Max"].default_value = low, high
+
+
+def activate(obj):
+    """Make an object the active one."""
+    bpy.context.view_layer.objects.active = obj
+
+
+def group(obj, chosen, role, name="", grown=0.0):
+    """Put points of an object, (n,) bool, and those within a distance of them, into a vertex group."""
+    activate(obj)
+    part("operators.selecting").select(obj, chosen)
+    if grown:
+        bpy.ops.meshfree.select_grow(distance=grown)
+    bpy.ops.meshfree.group_from_selection(role=role, name=name)
+
+
+def deform(obj, move, turn=(0.0, 0.0, 0.0)):
+    """Deform an object by its groups: move its controller by a way and turn it by angles, in the world."""
+    activate(obj)
+    before = set(bpy.data.objects)
+    bpy.ops.meshfree.deform_bind(target="IN_PLACE")
+    (controller,) = set(bpy.data.objects) - before
+    controller.location += Vector(move)
+    controller.rotation_euler = turn
+    bpy.ops.meshfree.deform_update()
+
+
+def deformed_row(rest, obj, path, view=VIEW, size=(960, 340)):
+    """Render an object at rest and deformed, with its handles and anchors, and deformed with its displacement."""
+    colored = obj.copy()
+    colored.data = obj.data.copy()
+    bpy.context.scene.collection.objects.link(colored)
+    colored.meshfree.coverage = 100.0
+    show(colored, "lb_displacement")
+    for shape in (rest, obj):
+        activate(shape)
+        bpy.ops.meshfree.analyze(show=False)
+        show_shape(shape, normals="lb_normal")
+    line_up([rest, obj, colored], view)
+    radius = MARKS * part("operators.reading").spacing(rest.data)
+    for name, color in (("Handle", HANDLES), ("Anchor", ANCHORS)):
+        members = part("operators.groups").chosen_members(obj, name, name)
+        for shape in (rest, obj):
+            mark(world_points(shape)[members], color, radius)
+    take(path, colored, view, size)

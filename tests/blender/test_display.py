@@ -312,3 +312,36 @@ def test_legend_lies_inside_the_picture_and_is_made_once(extension, obj, kind, n
             assert 0.6 < x < 1.0
             assert 0.1 < y < 0.9
             assert camera.data.clip_start < depth
+
+
+def dark_share(path):
+    """Render what there is, seen from above, and return which share of it is nearly black."""
+    scene = bpy.context.scene
+    camera = scene.camera or bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    if scene.camera is None:
+        scene.collection.objects.link(camera)
+        scene.camera = camera
+        camera.data.type, camera.data.ortho_scale = "ORTHO", 4.0
+        camera.location.z = 5.0
+    scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", 4
+    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene.render.film_transparent, scene.view_settings.view_transform = True, "Standard"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    pixels = np.array(image.pixels).reshape(-1, 4)
+    return np.mean(pixels[pixels[:, 3] == 1.0][:, :3].max(axis=1) < 0.2)
+
+
+def test_iso_lines_lie_inside_the_range(obj, tmp_path):
+    height = attribute(obj, "position")[:, 1]
+    values = obj.data.attributes.new("ends", "FLOAT", "POINT")
+    values.data.foreach_set("value", np.where(height > 0.0, 1.0, 0.0).astype(np.float32))
+    obj.data.attributes.new("height", "FLOAT", "POINT").data.foreach_set("value", height)
+    bpy.ops.meshfree.colormap(attribute="ends", radius=0.1)
+    assert dark_share(tmp_path / "plain.png") == 0.0
+    obj.meshfree.iso_lines = 5
+    bpy.ops.meshfree.colormap(attribute="ends")
+    assert dark_share(tmp_path / "ends.png") == 0.0
+    bpy.ops.meshfree.colormap(attribute="height")
+    assert 0.01 < dark_share(tmp_path / "lines.png") < 0.4
