@@ -6,13 +6,16 @@ from dataclasses import dataclass, field
 import bpy
 from bpy.props import BoolProperty
 
-from ..core import PointCloudError
+from ..core import Cancelled, PointCloudError
 from . import cache
 from .options import laplacian_options
 from .reading import obstacle, read_points, sharing_objects
 from .ready import ReadyOperator
 from .result import check_writable
-from .stages import Stages
+from .stages import Stages, Work
+
+_TICK = 0.1  # seconds between two looks at the work
+_VIEWING = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
 
 
 @dataclass
@@ -37,28 +40,64 @@ class ApplicationOperator(ReadyOperator):
 
     only_active = False  # for what has one object by nature
     writes = ()  # names of the attributes that `write` makes
+    _attended = False  # somebody at the window waits for it, and may press Esc
 
     def invoke(self, context, event):
+        self._attended = True
         return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context):
+        """Do all at once for scripts; let somebody at the window stop it."""
         context.view_layer.update()  # a script may have moved or scaled an object a line ago
         objects, left_out = ([context.object], []) if self.only_active else chosen_objects(context)
-        plans, results = [], []
+        plans = []
         try:
             for obj in objects:
-                with naming(obj):
+                with naming(obj.name):
                     check_writable(obj, self.writes, obj.meshfree.make_single_user, among=context.selected_objects)
-                    plans.append(self.plan(context, obj))
-            with Stages(context.window_manager) as stages:
-                for obj, plan in zip(objects, plans, strict=True):
-                    with naming(obj):
-                        results.append(plan(stages))
+                    plans.append((obj.name, self.plan(context, obj)))
         except PointCloudError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        self._objects, self._left_out = objects, left_out
+        attended, self._attended = self._attended, False  # Adjust Last Operation comes here again, and waits
+        if attended and not bpy.app.background:
+            self._work = Work(lambda progress: compute_all(plans, progress))
+            self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+            context.window_manager.modal_handler_add(self)
+            return {"RUNNING_MODAL"}
+        with Stages(context.window_manager) as stages:
+            return self._finish(context, lambda: compute_all(plans, stages), stages)
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self._work.cancel()
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"} if event.type in _VIEWING else {"RUNNING_MODAL"}
+        if not self._work.ended:
+            context.workspace.status_text_set(
+                f"{self.bl_label}: stopping"
+                if self._work.stopping
+                else f"{self.bl_label}: {self._work.stage}, {self._work.fraction:.0%}    Esc to stop"
+            )
+            return {"RUNNING_MODAL"}
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
+        return self._finish(context, self._work.result, self._work)
+
+    def _finish(self, context, compute, stages):
+        """Write what was computed, or report why there is nothing."""
+        objects = self._objects
+        try:
+            results = compute()
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except Cancelled:
+            self.report({"INFO"}, "Stopped: nothing was changed")
+            return {"CANCELLED"}
         done.messages, done.notices, done.seconds = [], [], stages.seconds
-        self.warn([f"Left out: {reason}." for reason in left_out])
+        self.warn([f"Left out: {reason}." for reason in self._left_out])
         for obj in objects:  # before anything is written to a mesh that is copied
             if obj.meshfree.make_single_user and sharing_objects(obj):
                 obj.data = obj.data.copy()
@@ -90,16 +129,24 @@ class ShownOperator(ApplicationOperator):
                     bpy.ops.meshfree.colormap(attribute=self.writes[0])
 
 
+def compute_all(plans, progress):
+    """Carry out what was planned for some objects, given by name, and return the results."""
+    results = []
+    for name, plan in plans:
+        with naming(name):
+            results.append(plan(progress))
+    return results
+
+
 @contextmanager
-def naming(obj):
+def naming(name):
     """Let errors say which object they are about."""
-    name = f'"{obj.name}"'
     try:
         yield
     except PointCloudError as error:
-        if name in str(error):
+        if f'"{name}"' in str(error):
             raise
-        raise PointCloudError(f"{name}: {error}") from error
+        raise PointCloudError(f'"{name}": {error}') from error
 
 
 def chosen_objects(context):

@@ -147,6 +147,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
     """What is shown as colors on the points"""
 
     bl_label = "Display"
+    bl_order = 1  # below the tools
 
     def draw(self, context):
         layout = self.layout
