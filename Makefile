@@ -35,8 +35,8 @@ lint: ## Check style and format
 benchmark: ## Compute the tables and figures of the paper and the peers
 	@$(run)environments.py benchmark -m benchmarks.run $(ARGUMENTS)
 
-pictures: ## Render the pictures of the manual
-	@$(run)in_blender.py pictures.py
+pictures: ## Render the pictures of the manual, or some: ARGUMENTS="smooth rim"; those of scans from MESHFREE_SCANS=folder
+	@$(run)in_blender.py pictures.py $(ARGUMENTS)
 
 clean: ## Remove everything that was made, the environments too
 	rm -rf .venv build dist .pytest_cache .ruff_cache .hypothesis

@@ -66,10 +66,10 @@ def figure13_camel(path):
     points = own_points(obj)
     cheek = points[np.where(np.abs(points[:, 2]) < 0.05, points[:, 0], -np.inf).argmax()]
     away = np.linalg.norm(points - cheek, axis=1)
-    studio.group(obj, away < 0.03, "HANDLE")
+    studio.group(obj, away < 0.05, "HANDLE")
     studio.group(obj, away > 0.3, "ANCHOR")
-    studio.deform(obj, move=(-0.09, 0.0, 0.0))
-    studio.deformed_row(rest, obj, path, view=(0.7, -1.0, 0.3))
+    studio.deform(obj, move=(-0.12, 0.0, 0.0))
+    studio.deformed_row(rest, obj, path, view=(0.4, -1.0, 0.3))
 
 
 PICTURES = {
