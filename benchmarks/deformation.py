@@ -1,4 +1,4 @@
-"""What deformation must reach: ``python -m benchmarks.deformation``.
+"""What deformation must reach.
 
 The comparison with Blender needs a Python with bpy: the environment .venv/blender-4.5, or what MESHFREE_BLENDER names.
 """
@@ -15,7 +15,7 @@ import core
 
 from .samplings import bar, bent_end, random_sphere
 from .speed import SCANS, read_ply
-from .targets import HEADER, Goal, judge, percent
+from .targets import Goal, judge, percent
 
 ROOT = Path(__file__).parents[1]
 BLENDER = Path(os.environ.get("MESHFREE_BLENDER", ROOT / ".venv" / "blender-4.5" / "bin" / "python"))
@@ -198,18 +198,12 @@ def pushed_cheek(points):
     return away < 0.03, away > 0.3, np.array([-0.06, 0.0, 0.0])
 
 
-def rows():
-    """Yield all rows."""
+def on_bar():
+    """Both on the bar."""
     points, quads, section = bar()
     laplacian = core.build_laplacian(points)
     yield from moves(laplacian)
     yield from bend(laplacian, quads, section)
-    yield from scans()
-    yield from cost()
 
 
-if __name__ == "__main__":
-    for line in (HEADER, ["---"] * len(HEADER)):
-        print("| " + " | ".join(line) + " |")
-    for row in rows():
-        print("| " + " | ".join(row) + " |", flush=True)
+GROUPS = {"bar": on_bar, "scans": scans, "cost": cost}

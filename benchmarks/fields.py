@@ -1,4 +1,4 @@
-"""Poisson's equation, harmonic fields and geodesic distances: ``python -m benchmarks.fields``."""
+"""Poisson's equation, harmonic fields and geodesic distances."""
 
 import time
 from pathlib import Path
@@ -18,8 +18,7 @@ from .samplings import (
     torus_potential,
 )
 from .speed import SCANS, read_ply
-from .tables import Table
-from .targets import HEADER, Goal, judge, percent
+from .targets import Goal, judge, percent
 
 try:
     import potpourri3d
@@ -138,11 +137,4 @@ def cost():
     )
 
 
-def main():
-    """Print all rows."""
-    rows = [row for group in (poisson, harmonic, geodesic, cost) for row in group()]
-    print(Table("Fields and distances", HEADER, rows).markdown())
-
-
-if __name__ == "__main__":
-    main()
+GROUPS = {"poisson": poisson, "harmonic": harmonic, "geodesic": geodesic, "cost": cost}

@@ -1,6 +1,5 @@
-"""Minimal surfaces, Figure 14 of the paper: ``python -m benchmarks.plateau [group ...]``."""
+"""Minimal surfaces, Figure 14 of the paper."""
 
-import sys
 import time
 
 import numpy as np
@@ -9,7 +8,7 @@ from scipy.optimize import brentq
 import core
 
 from .samplings import hemisphere_random, open_cylinder
-from .targets import HEADER, Goal, judge, percent
+from .targets import Goal, judge, percent
 
 
 def tube(around, up, radius=2.0, height=2.0):
@@ -127,10 +126,3 @@ def necks():
 
 
 GROUPS = {"figure_14": figure_14, "caps": caps, "corners": corners, "necks": necks}
-
-if __name__ == "__main__":
-    for line in (HEADER, ["---"] * len(HEADER)):
-        print("| " + " | ".join(line) + " |")
-    for name in sys.argv[1:] or GROUPS:
-        for row in GROUPS[name]():
-            print("| " + " | ".join(row) + " |", flush=True)

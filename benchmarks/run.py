@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy
 import scipy
 
-from . import accuracy, speed, targets
+from . import accuracy, applications, speed, targets
 
 TABLES = {
     "figure3": accuracy.paper_figure_3,
@@ -16,28 +16,27 @@ TABLES = {
     "structure": accuracy.structure,
     "invariance": accuracy.invariance,
     "targets": targets.targets,
+    "applications": applications.applications,
     "areas": speed.areas_against_algorithm_1,
     "stages": speed.stages_and_memory,
 }
 
 
 def main(names):
-    """Print the named tables, all of them if none is named; all together are written to docs/results.md."""
-    texts = [
-        "# Results",
-        "",
-        "Made by `make benchmark`; times are of the machine it ran on, compare only those of one table."
-        f" Python {platform.python_version()}, numpy {numpy.__version__}, scipy {scipy.__version__}.",
-        "",
-    ]
+    """Print the named tables, all of them if none is named, and renew them in docs/results.md."""
+    path = Path(__file__).parents[1] / "docs" / "results.md"
+    known = path.read_text(encoding="utf-8").split("\n## ")[1:] if names and path.exists() else []
+    tables = {text.partition("\n")[0]: f"## {text.strip()}\n" for text in known}
     for name in names or TABLES:
         began = time.perf_counter()
-        texts.append(TABLES[name]().markdown())
-        print(texts[-1], f"({time.perf_counter() - began:.0f} s)\n", flush=True)
-    if not names:
-        path = Path(__file__).parents[1] / "docs" / "results.md"
-        path.parent.mkdir(exist_ok=True)
-        path.write_text("\n".join(texts), encoding="utf-8")
+        table = TABLES[name]()
+        tables[table.title] = table.markdown()
+        print(tables[table.title], f"({time.perf_counter() - began:.0f} s)\n", flush=True)
+    head = (
+        "# Results\n\nMade by `make benchmark`; times are of the machine it ran on, compare only those of one table."
+        f" Python {platform.python_version()}, numpy {numpy.__version__}, scipy {scipy.__version__}.\n"
+    )
+    path.write_text("\n".join([head, *tables.values()]), encoding="utf-8")
 
 
 if __name__ == "__main__":

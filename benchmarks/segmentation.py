@@ -1,4 +1,4 @@
-"""Nodal domains and segments against the paper's Figures 10, 11 and 16: ``python -m benchmarks.segmentation``."""
+"""Nodal domains and segments against the paper's Figures 10, 11 and 16."""
 
 import time
 from pathlib import Path
@@ -11,7 +11,7 @@ import core
 
 from .samplings import GOLDEN, fibonacci_sphere, sausage
 from .speed import SCANS, read_ply
-from .targets import HEADER, Goal, judge
+from .targets import Goal, judge
 
 SIDES = 1.2, 1.0  # of the rectangle, so that the modes that the paper shows are simple
 PARTS = range(2, 13)
@@ -186,9 +186,4 @@ def paths():
         )
 
 
-if __name__ == "__main__":
-    for line in (HEADER, ["---"] * len(HEADER)):
-        print("| " + " | ".join(line) + " |")
-    for group in (isometry, noise, sausages, paths, scans):
-        for row in group():
-            print("| " + " | ".join(row) + " |", flush=True)
+GROUPS = {"isometry": isometry, "noise": noise, "sausages": sausages, "paths": paths, "scans": scans}

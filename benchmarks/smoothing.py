@@ -1,9 +1,5 @@
-"""Filters of functions and shapes beside their targets: ``python -m benchmarks.smoothing [group ...]``.
+"""Smoothing, fairing and signatures beside their targets; the armadillo takes many minutes."""
 
-Groups: harmonics, sphere, bumpy, rim, signatures, scaling, armadillo (which takes many minutes).
-"""
-
-import sys
 import time
 from pathlib import Path
 
@@ -15,7 +11,7 @@ import core
 from .accuracy import SPHERE, relative
 from .samplings import fibonacci_sphere, open_cylinder, random_sphere, sphere_eigenvalues
 from .speed import SCANS, read_ply
-from .targets import HEADER, Goal, judge, percent
+from .targets import Goal, judge, percent
 
 COUNT = 8000
 LEVEL = 0.03  # of the noise, as a share of the radius
@@ -203,11 +199,3 @@ GROUPS = {
     "scaling": scaling,
     "armadillo": armadillo,
 }
-
-
-if __name__ == "__main__":
-    for line in (HEADER, ["---"] * len(HEADER)):
-        print("| " + " | ".join(line) + " |")
-    for group in sys.argv[1:] or GROUPS:
-        for row in GROUPS[group]():
-            print("| " + " | ".join(row) + " |", flush=True)

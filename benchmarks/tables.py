@@ -19,3 +19,24 @@ class Table:
             lines += [self.note, ""]
         lines += ["| " + " | ".join(row) + " |" for row in (self.header, ["---"] * len(self.header), *self.rows)]
         return "\n".join([*lines, ""])
+
+
+def gather(groups, names=(), report=lambda row: None):
+    """Measure groups of rows, by their names; all of them if none is named; each row is reported as it comes."""
+    unknown = sorted(set(names) - groups.keys())
+    if unknown:
+        raise ValueError(f"No groups {unknown}. Choose from {', '.join(groups)}.")
+    rows = []
+    for name in names or groups:
+        for row in groups[name]():
+            report(row)
+            rows.append(row)
+    return rows
+
+
+def print_rows(header, groups, names):
+    """Print the rows of groups as a table, each as it comes."""
+    show = lambda row: print("| " + " | ".join(row) + " |", flush=True)  # noqa: E731
+    show(header)
+    show(["---"] * len(header))
+    gather(groups, names, show)

@@ -37,7 +37,7 @@ from .samplings import (
     uneven_sphere,
 )
 from .speed import SCANS, read_ply
-from .tables import Table
+from .tables import Table, gather, print_rows
 
 SEEDS = range(3)
 HEADER = ["case", "figure", "measured", "target", "met"]
@@ -347,43 +347,27 @@ def cost():
     yield from judge("sphere, 20,000 random", goals, measure())
 
 
-GROUPS = [
-    ("square", square),
-    ("disc", disc),
-    ("fixed", fixed),
-    ("rims", rims),
-    ("torus", torus),
-    ("sphere", sphere),
-    ("scans", scans),
-    ("noise", noise),
-    ("density", density),
-    ("sheets", sheets),
-    ("bent", bent),
-    ("cost", cost),
-]
+GROUPS = {
+    "square": square,
+    "disc": disc,
+    "fixed": fixed,
+    "rims": rims,
+    "torus": torus,
+    "sphere": sphere,
+    "scans": scans,
+    "noise": noise,
+    "density": density,
+    "sheets": sheets,
+    "bent": bent,
+    "cost": cost,
+}
 
 
-def targets(names=(), report=lambda row: None):
-    """Measure the named groups, all if none is named; each row is reported as soon as it is there."""
-    unknown = set(names) - {name for name, _ in GROUPS}
-    if unknown:
-        raise ValueError(f"No groups {sorted(unknown)}. Choose from {', '.join(name for name, _ in GROUPS)}.")
-    rows = []
-    for name, group in GROUPS:
-        if names and name not in names:
-            continue
-        for row in group():
-            report(row)
-            rows.append(row)
-    return Table(
-        "Targets of the default options",
-        HEADER,
-        rows,
-        f"Relative errors; of random clouds, means of their sizes over {len(SEEDS)} seeds.",
-    )
+def targets():
+    """Measure all groups."""
+    note = f"Relative errors; of random clouds, means of their sizes over {len(SEEDS)} seeds."
+    return Table("Targets of the default options", HEADER, gather(GROUPS), note)
 
 
 if __name__ == "__main__":
-    for line in (HEADER, ["---"] * len(HEADER)):
-        print("| " + " | ".join(line) + " |")
-    targets(sys.argv[1:], report=lambda row: print("| " + " | ".join(row) + " |", flush=True))
+    print_rows(HEADER, GROUPS, sys.argv[1:])
