@@ -7,6 +7,7 @@ from scipy.special import expit
 
 from .errors import InvalidPointsError, PointCloudError
 from .kernel import SECOND_MOMENT
+from .points import check_values
 from .spectrum import symmetric_form
 
 _NODES = 4096  # at which a response is read
@@ -285,20 +286,3 @@ def check_modes(count, spectrum, areas):
             f" chosen. Keep at least {constant} modes."
         )
     return int(count)
-
-
-def check_values(values, count):
-    """Check functions on the points and return them, (count,) or (count, k), in double precision."""
-    given = np.asarray(values)
-    if given.ndim not in (1, 2) or len(given) != count or given.dtype.kind not in "iufb":
-        raise InvalidPointsError(
-            f"Values have the shape {given.shape} and type {given.dtype}, and there are {count} points. Give one row of"
-            " real numbers per point."
-        )
-    given = given.astype(np.float64)
-    bad = int(np.count_nonzero(~np.isfinite(given.reshape(count, -1)).all(axis=1)))
-    if bad:
-        raise InvalidPointsError(
-            f"{bad} of {count} points have values that are not finite (NaN or infinity). Replace them."
-        )
-    return given

@@ -202,3 +202,27 @@ def check_distances(distances, count):
             " not negative, infinity where there is no rim near."
         )
     return given.astype(np.float64)
+
+
+def check_values(values, count, columns=True):
+    """Check functions on the points and return them, (count,) or with columns (count, k), in double precision.
+
+    Raises
+    ------
+    InvalidPointsError
+        Another shape, no real numbers, or not finite.
+    """
+    given = np.asarray(values)
+    shapes = (1, 2) if columns else (1,)
+    if given.ndim not in shapes or len(given) != count or given.dtype.kind not in "iufb":
+        raise InvalidPointsError(
+            f"Values have the shape {given.shape} and type {given.dtype}, and there are {count} points. Give"
+            f" {'one row of real numbers' if columns else 'one real number'} per point."
+        )
+    given = given.astype(np.float64)
+    bad = int(np.count_nonzero(~np.isfinite(given.reshape(count, -1)).all(axis=1)))
+    if bad:
+        raise InvalidPointsError(
+            f"{bad} of {count} points have values that are not finite (NaN or infinity). Replace them."
+        )
+    return given

@@ -7,6 +7,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from .errors import InvalidPointsError, IslandError, PointCloudError, TooFewPointsError, UnresolvedModesError
 from .graph import near_graph
 from .kernel import RESOLVED
+from .points import check_values
 
 _NEIGHBORS = 8  # nearest points on the same sheet that a domain may continue to
 _STEP = 0.75  # from level to level, on the way down the hills of a function
@@ -59,7 +60,7 @@ def nodal_domains(values, laplacian, threshold=0.02, bridge=0.1, smallest=5):
     Figures 10, 11 and 16 of the paper. Counted as there, from 1, mode k is column k - 1; mode 1 is constant.
     """
     n = len(laplacian.points)
-    values = _check_values(values, n)
+    values = check_values(values, n, columns=False)
     for name, share in (("threshold", threshold), ("bridge", bridge)):
         if not 0.0 <= share < 1.0:
             raise PointCloudError(f"The {name} of nodal domains is {share!r}. Use a number from 0 to below 1.")
@@ -298,18 +299,6 @@ def _main_pieces(lengths, part, areas):
     main = np.zeros(part.max() + 1, dtype=int)
     main[part[order]] = piece[order]
     return np.where(main[part] == piece, part, -1)
-
-
-def _check_values(values, count):
-    given = np.asarray(values)
-    if given.shape != (count,) or given.dtype.kind not in "biuf":
-        raise InvalidPointsError(
-            f"Values have the shape {given.shape} and type {given.dtype}. Give {count} numbers, one per point."
-        )
-    bad = np.count_nonzero(~np.isfinite(given))
-    if bad:
-        raise InvalidPointsError(f"{bad} of {count} values are not finite (NaN or infinity). Replace them by numbers.")
-    return given.astype(np.float64)
 
 
 def _hills(lengths, sign, size, threshold, bridge):

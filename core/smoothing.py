@@ -5,7 +5,8 @@ from scipy.sparse.linalg import LinearOperator
 from scipy.spatial import cKDTree
 
 from .errors import InvalidPointsError, PointCloudError
-from .filters import chebyshev_filter, check_values, corrected_operator, fairing, spectral_filter
+from .filters import chebyshev_filter, corrected_operator, fairing, spectral_filter
+from .points import check_values
 from .sizes import SurfaceSize, match_size
 from .solvers import conjugate_gradients
 
@@ -172,9 +173,7 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
         A mode that is zero, or an amplitude or phase that is not finite.
     """
     points = laplacian.points
-    mode = check_values(mode, len(points))
-    if mode.ndim != 1:
-        raise InvalidPointsError(f"The mode has the shape {mode.shape}. Give one of its columns.")
+    mode = check_values(mode, len(points), columns=False)
     if amplitude is None:
         amplitude = 0.1 * np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))
     if not (np.isfinite(amplitude) and np.isfinite(phase)):

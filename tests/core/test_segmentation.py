@@ -218,10 +218,10 @@ class TestNodalDomains:
     @pytest.mark.parametrize(
         ("values", "match"),
         [
-            (np.ones(7), "2500 numbers"),
-            (np.ones((2500, 2)), "2500 numbers"),
-            (np.full(2500, "a"), "2500 numbers"),
-            (np.where(np.arange(2500) < 3, np.nan, 1.0), "3 of 2500 values"),
+            (np.ones(7), "2500 points. Give one real number per point"),
+            (np.ones((2500, 2)), "2500 points. Give one real number per point"),
+            (np.full(2500, "a"), "2500 points. Give one real number per point"),
+            (np.where(np.arange(2500) < 3, np.nan, 1.0), "3 of 2500 points have values"),
         ],
     )
     def test_values_that_make_no_sense(self, square, values, match):
