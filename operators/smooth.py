@@ -85,6 +85,11 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
                     f'"{name}" has a rim, which stays and fixes the size already. Set Keep to Nothing, or turn off Keep'
                     " Rim."
                 )
+            size = np.linalg.norm(np.ptp(reading.points, axis=0))
+            if wavelength > size:
+                raise PointCloudError(
+                    f'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.'
+                )
             settings = {**shared, "fixed_rim": fixed_rim, "progress": progress}
             if method == "NOISE":
                 time = (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None

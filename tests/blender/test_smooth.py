@@ -105,6 +105,7 @@ def test_several_objects_in_one_run():
     [
         ({"group": "Nowhere"}, 'no vertex group named "Nowhere"'),
         ({"method": "MODES", "modes": 900}, "modes were asked for"),
+        ({"wavelength": 1e6}, 'wavelength 1e.06 is longer than "Cloud" is large'),
     ],
 )
 def test_errors_leave_everything_as_it_was(settings, text):
