@@ -15,6 +15,7 @@ FOLDER = os.environ.get("MESHFREE_SCANS", "")
 def scan(name, copies=1):
     """Open a scan, upright, in place of everything; return so many objects of it."""
     objects = [demo.load_scan(Path(FOLDER) / f"{name}.ply", "Y")]
+    objects[0].select_set(False)  # as imported: operators work on all selected objects
     for _ in range(copies - 1):
         obj = objects[0].copy()
         obj.data = obj.data.copy()
