@@ -15,6 +15,7 @@ FOLDER = os.environ.get("MESHFREE_SCANS", "")
 def scan(name, copies=1):
     """Open a scan, upright, in place of everything; return so many objects of it."""
     objects = [demo.load_scan(Path(FOLDER) / f"{name}.ply", "Y")]
+    objects[0].select_set(False)  # as imported: operators work on all selected objects
     for _ in range(copies - 1):
         obj = objects[0].copy()
         obj.data = obj.data.copy()
@@ -36,10 +37,8 @@ def figure12(path):
         studio.activate(obj)
         bpy.ops.meshfree.smooth(method="MODES", modes=modes, target="IN_PLACE")
     for obj in objects:
-        studio.activate(obj)
-        bpy.ops.meshfree.analyze(show=False)
-        studio.show_shape(obj, normals="lb_normal")
-    studio.row(objects, path, legend=None, view=(0.3, -1.0, 0.1), size=(1200, 400))
+        studio.show_shape(obj, like=objects[0])  # ten modes leave limbs too thin for normals
+    studio.row(objects, path, legend=None, view=(0.3, -1.0, 0.1), size=(1000, 340))
 
 
 def armadillo(path):

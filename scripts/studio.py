@@ -201,9 +201,12 @@ def show(obj, attribute, radius=TOUCHING):
     bpy.ops.meshfree.colormap(attribute=attribute, radius=radius * part("operators.reading").spacing(obj.data))
 
 
-def show_shape(obj, normals="", radius=CLOSED):
-    """Show an object as if made of clay; an attribute of normals makes its shading smooth."""
-    modifier = add_display(obj, radius * part("operators.reading").spacing(obj.data))
+def show_shape(obj, normals="", like=None):
+    """Show an object as if made of clay, its points as large as those of another one.
+
+    An attribute of normals makes the shading smooth.
+    """
+    modifier = add_display(obj, CLOSED * part("operators.reading").spacing((like or obj).data))
     part("ui.display").set_input(modifier, "Material", paint("Clay", CLAY, normals))
 
 
