@@ -14,7 +14,7 @@ _NOISE = 0.10  # changes of log d100 that may be chance
 _SLOW, _FAST, _LAST = 160, 10, 2  # rounds of averaging over the 40 nearest neighbours
 
 
-def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None):
+def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, deepest=None):
     """Choose h for every point.
 
     Parameters
@@ -28,7 +28,9 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None):
     steepest : ndarray, (m,), optional
         The larger principal curvature of every point; for "adaptive".
     inside : ndarray, (m, 2), optional
-        Distances to rims; a neighbourhood that it cuts counts as whole, and h stays small in a narrow surface.
+        Distances to rims; a neighbourhood that it cuts counts as whole.
+    deepest : ndarray, (m,), optional
+        The `depth` of the surface; h stays small where it is narrow.
 
     Returns
     -------
@@ -59,8 +61,8 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None):
     bend = np.log(_BEND / np.maximum(steepest, 1e-30))
     floor = least + np.maximum(reach, own)
     length = np.maximum(np.clip(bend, least + reach, most + reach), floor)
-    if inside is not None:
-        narrow = np.log(np.maximum(_ACROSS * depth(nearest, inside), _TIGHTEST * nearest.spacing))
+    if deepest is not None:
+        narrow = np.log(np.maximum(_ACROSS * deepest, _TIGHTEST * nearest.spacing))
         length, floor = np.minimum(length, narrow), np.minimum(floor, narrow)
     length = np.maximum(_repeat(averaging, length, _LAST), floor)
     return options.bandwidth_factor * np.exp(_repeat(averaging, length, _LAST))

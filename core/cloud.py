@@ -123,8 +123,9 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     rim = _rim(nearest, oriented, options, scaled, boundary, boundary_distance)
 
     report("Neighbors", 0.2)
-    lengths = smoothing_lengths(nearest, options, label, surface.steepest, rim.distance)
-    if np.mean(lengths > _NARROW * depth(nearest, rim.distance)) > _MANY:
+    deepest = depth(nearest, rim.distance)
+    lengths = smoothing_lengths(nearest, options, label, surface.steepest, rim.distance, deepest)
+    if np.mean(lengths > _NARROW * deepest) > _MANY:
         notices.append(
             "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"
             " 10 % and more. Add points."
