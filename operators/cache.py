@@ -51,9 +51,16 @@ def build(points, options, rim, progress) -> Built:
 def lowest_modes(laplacian, count: int, progress) -> Spectrum:
     """Return the lowest modes of an operator, computed only if there are not as many from before."""
     progress("Spectrum", 0.0)
+    if known_modes(laplacian, count) is None:
+        _spectra[laplacian] = laplacian.eigenpairs(count, progress=progress)
+    return known_modes(laplacian, count)
+
+
+def known_modes(laplacian, count: int) -> Spectrum | None:
+    """Return the lowest modes of an operator if there are as many from before."""
     known = _spectra.get(laplacian)
     if known is None or len(known.eigenvalues) < count:
-        known = _spectra[laplacian] = laplacian.eigenpairs(count, progress=progress)
+        return None
     return Spectrum(known.eigenvalues[:count], known.eigenvectors[:, :count])
 
 

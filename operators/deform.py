@@ -11,9 +11,9 @@ from mathutils import Vector
 from ..core import Deformer, PointCloudError
 from .application import ApplicationOperator, operator_reader
 from .attributes import DISPLACEMENT, write_attribute
-from .groups import ANCHOR, HANDLE, chosen_weights
+from .groups import ANCHOR, HANDLE, chosen_weights, is_chosen
 from .positions import check_movable, fill_key, target_property, write_positions
-from .reading import Reading, mesh_positions
+from .reading import Reading, key_positions, mesh_positions
 from .result import length_text
 
 
@@ -109,7 +109,7 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
         check_movable(obj, self.target)
         handles = chosen_weights(obj, self.handles, "Handles")
         anchors = np.zeros_like(handles)
-        if self.anchors and (self.anchors in obj.vertex_groups or self.anchors != ANCHOR):
+        if is_chosen(obj, self.anchors, ANCHOR):
             anchors = chosen_weights(obj, self.anchors, "Anchors")
         moved, kept = np.flatnonzero(handles), np.flatnonzero(anchors)
         weights = self.weight * np.concatenate([handles[moved], anchors[kept]]) if self.soft else None
@@ -212,7 +212,7 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
         if bound.key:
             fill_key(obj, obj.data.shape_keys.key_blocks[bound.key], points - bound.reading.points, bound.reading)
         else:
-            now = replace(bound.reading, points=_placed(mesh_positions(obj.data), bound))
+            now = replace(bound.reading, points=bound.reading.placed(mesh_positions(obj.data)))
             write_positions(obj, now, points, bound.target, "")
         distance = np.linalg.norm(points - bound.reading.points, axis=1)
         write_attribute(obj.data, DISPLACEMENT, distance)
@@ -223,31 +223,20 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
 
 def _handle_goal(obj, bound):
     """Return where the handles are to be: where the controller took them, or where they are in the mesh, (h, 3)."""
-    handles = bound.deformer.handles
+    handles, reading = bound.deformer.handles, bound.reading
     if bound.controller is not None:
         empty = _find(bound.controller)
         if empty is None:
             raise PointCloudError(f'The controller of "{obj.name}" is gone. Bind the object again.')
         change = _in_space_of(obj, empty) @ np.linalg.inv(bound.start)
-        local = bound.reading.points[handles] @ np.linalg.inv(bound.reading.matrix).T
-        return _placed(local @ change[:3, :3].T + change[:3, 3], bound)
+        local = reading.local(reading.points[handles])
+        return reading.placed(local @ change[:3, :3].T + change[:3, 3])
     if not bound.key:
-        return _placed(mesh_positions(obj.data)[handles], bound)
+        return reading.placed(mesh_positions(obj.data)[handles])
     # By what the key does, not by what is seen, which other keys and the key's value change too.
     keys = obj.data.shape_keys
-    moved = _key_positions(keys.key_blocks[bound.key]) - _key_positions(keys.reference_key)
-    return bound.reading.points[handles] + _placed(moved[handles], bound)
-
-
-def _key_positions(key):
-    positions = np.empty((len(key.points), 3), np.float32)
-    key.points.foreach_get("co", positions.reshape(-1))
-    return positions
-
-
-def _placed(local, bound):
-    """Turn local positions or shifts into those that the binding was computed in."""
-    return local @ bound.reading.matrix.T
+    moved = key_positions(keys.key_blocks[bound.key]) - key_positions(keys.reference_key)
+    return reading.points[handles] + reading.placed(moved[handles])
 
 
 def _in_space_of(obj, empty):

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from ..core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
 from .application import ShownOperator, operator_reader
 from .attributes import DISTANCE, FIELD, read_attribute, write_attribute
-from .groups import SOURCE, VALUE, chosen_members, chosen_weights, group_weights
+from .groups import SOURCE, VALUE, chosen_members, chosen_weights, is_chosen
 from .result import length_text
 from .selecting import selected
 
@@ -51,8 +51,7 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
                 )
             fixed, values = low | high, np.where(high, self.high, self.low)
         elif self.group or not self.source:
-            chosen_weights(obj, self.group, "Group", least=0)
-            weights = group_weights(obj, self.group, outside=np.nan)
+            weights = chosen_weights(obj, self.group, "Group", least=0, outside=np.nan)
             fixed = np.isfinite(weights)  # with weight 0 too
             if not fixed.any():
                 raise PointCloudError(
@@ -112,7 +111,7 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
     )
 
     def plan(self, context, obj):
-        if self.group and (self.group in obj.vertex_groups or self.group != SOURCE):
+        if is_chosen(obj, self.group, SOURCE):
             sources = chosen_members(obj, self.group, "Sources")
         else:
             sources = selected(obj)

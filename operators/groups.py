@@ -4,7 +4,7 @@ import numpy as np
 
 from ..core import PointCloudError
 
-ROLES = HANDLE, ANCHOR, FIXED, SOURCE, VALUE = "Handle", "Anchor", "Fixed", "Source", "Value"
+HANDLE, ANCHOR, FIXED, SOURCE, VALUE = "Handle", "Anchor", "Fixed", "Source", "Value"
 
 
 def group_weights(obj, name: str, outside=0.0):
@@ -16,7 +16,12 @@ def group_weights(obj, name: str, outside=0.0):
     return np.fromiter(held, np.float64, count=len(obj.data.vertices))
 
 
-def chosen_weights(obj, name: str, setting: str, least: int = 1):
+def is_chosen(obj, name: str, default: str) -> bool:
+    """Whether a setting names a group that must be there: any but the default, which may be missing."""
+    return bool(name) and (name in obj.vertex_groups or name != default)
+
+
+def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
     """Read the weights in the group that a setting names.
 
     Parameters
@@ -27,7 +32,9 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1):
     setting : str
         What the panel calls the setting, for the texts of errors.
     least : int
-        How many points the group must hold.
+        How many points must have a weight above zero.
+    outside : float
+        What the points outside the group get.
 
     Returns
     -------
@@ -45,8 +52,8 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1):
             else f'"{obj.name}" has no {setting} chosen. Choose a vertex group; Assign to Group makes one from the'
             " points selected in Edit Mode."
         )
-    weights = group_weights(obj, name)
-    count = np.count_nonzero(weights)
+    weights = group_weights(obj, name, outside)
+    count = np.count_nonzero(weights > 0.0)
     if count < least:
         raise PointCloudError(
             f'The vertex group "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting} takes'

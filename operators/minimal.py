@@ -6,7 +6,7 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 from ..core import PointCloudError, minimal_surface
 from . import cache
 from .application import ApplicationOperator
-from .groups import FIXED, chosen_members
+from .groups import FIXED, chosen_members, is_chosen
 from .options import laplacian_options
 from .positions import check_movable, target_property, write_positions
 from .reading import read_points
@@ -43,7 +43,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
         reading = read_points(context, obj)
         options = laplacian_options(obj.meshfree)
         fixed = reading.rim
-        if self.group and (self.group in obj.vertex_groups or self.group != FIXED):
+        if is_chosen(obj, self.group, FIXED):
             fixed = chosen_members(obj, self.group, "Fixed")
         tolerance, steps, name = self.tolerance, self.steps, obj.name
 

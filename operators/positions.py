@@ -4,7 +4,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..core import PointCloudError
-from .reading import is_display, mesh_positions
+from .reading import is_display, key_positions, mesh_positions
 
 TARGETS = (
     ("SHAPE_KEY", "Shape Key", "Add a shape key, whose value mixes the result with the points as they were"),
@@ -63,7 +63,7 @@ def write_positions(obj, reading, points, target: str, name: str):
     mesh = obj.data
     key = None
     if target == "IN_PLACE":
-        positions = mesh_positions(mesh) + _local(points - reading.points, reading)
+        positions = mesh_positions(mesh) + reading.local(points - reading.points)
         mesh.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
         mesh.update()
     else:
@@ -77,11 +77,6 @@ def write_positions(obj, reading, points, target: str, name: str):
 
 def fill_key(obj, key, moved, reading):
     """Let a shape key move the points by so much, (n, 3), beside what the other keys do."""
-    basis = np.empty((len(moved), 3), np.float32)
-    obj.data.shape_keys.reference_key.points.foreach_get("co", basis.reshape(-1))
-    key.points.foreach_set("co", (basis + _local(moved, reading)).astype(np.float32).reshape(-1))
+    positions = key_positions(obj.data.shape_keys.reference_key) + reading.local(moved)
+    key.points.foreach_set("co", positions.astype(np.float32).reshape(-1))
     obj.data.update()
-
-
-def _local(moved, reading):
-    return moved @ np.linalg.inv(reading.matrix).T

@@ -56,6 +56,14 @@ class Reading:
     rim: np.ndarray | None = None
     notices: list = field(default_factory=list)
 
+    def local(self, vectors):
+        """Turn points or shifts as they were read into local ones."""
+        return vectors @ np.linalg.inv(self.matrix).T
+
+    def placed(self, vectors):
+        """Turn local points or shifts into such as were read."""
+        return vectors @ self.matrix.T
+
     def local_normals(self, normals):
         """Turn normals of the points into unit normals of the local positions: covectors, so by M^T, not M^-1."""
         local = normals @ self.matrix
@@ -92,6 +100,13 @@ def mesh_positions(mesh):
     """Read the vertices' own positions, (n, 3) float32."""
     positions = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.attributes["position"].data.foreach_get("vector", positions.reshape(-1))
+    return positions
+
+
+def key_positions(key):
+    """Read the positions that a shape key holds, (n, 3) float32."""
+    positions = np.empty((len(key.points), 3), np.float32)
+    key.points.foreach_get("co", positions.reshape(-1))
     return positions
 
 
@@ -146,9 +161,7 @@ def fingerprint(obj, glance=False) -> str:
         state = [keys.use_relative, keys.eval_time, obj.show_only_shape_key and obj.active_shape_key_index]
         for block in keys.key_blocks:
             state += [block.name, block.value, block.mute, block.vertex_group, block.relative_key.name]
-            positions = np.empty(3 * len(mesh.vertices), np.float32)
-            block.points.foreach_get("co", positions)
-            checksum = zlib.crc32(positions, checksum)
+            checksum = zlib.crc32(key_positions(block), checksum)
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.use_modifiers:
         state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_display(item)]

@@ -7,10 +7,11 @@ class ReadyOperator:
     """An operator for the active object; where that is unfit, the button is gray and its tooltip says why."""
 
     bl_options = {"REGISTER", "UNDO"}
+    works_in = ("OBJECT",)  # modes of the object
 
     @classmethod
     def poll(cls, context):
-        reason = obstacle(context.object)
+        reason = obstacle(context.object, cls.works_in)
         if reason:
             cls.poll_message_set(reason)
         return not reason

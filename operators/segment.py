@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
-from ..core import PointCloudError, heat_kernel_signature, nodal_domains, segment, wave_kernel_signature
+from ..core import PointCloudError, heat_kernel_signature, modes_needed, nodal_domains, segment, wave_kernel_signature
 from . import cache
 from .application import ApplicationOperator, ShownOperator, operator_reader
 from .attributes import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE, read_attribute, remove_numbered, write_attribute
@@ -44,7 +44,7 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
             laplacian = operator(progress)
             if by_mode:
                 return nodal_domains(cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1], laplacian)
-            return segment(laplacian, parts, progress=progress)
+            return segment(laplacian, parts, cache.known_modes(laplacian, modes_needed(laplacian, parts)), progress)
 
         return compute
 

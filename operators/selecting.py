@@ -8,21 +8,14 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 
 from ..core import PointCloudError, grow
 from .application import operator_reader
-from .reading import obstacle
+from .ready import ReadyOperator
 from .stages import Stages
 
 
-class SelectionOperator:
+class SelectionOperator(ReadyOperator):
     """An operator on the selected vertices of the active mesh, in Edit Mode or Object Mode."""
 
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        reason = obstacle(context.object, modes=("OBJECT", "EDIT"))
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    works_in = ("OBJECT", "EDIT")
 
     def execute(self, context):
         obj = context.object

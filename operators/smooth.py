@@ -95,7 +95,8 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
                 time = (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None
                 return reading, fair_points(laplacian, time, **settings)
             if method == "MODES":
-                return reading, smooth_points(laplacian, modes, **settings)
+                known = None if fixed_rim else cache.known_modes(laplacian, modes)
+                return reading, smooth_points(laplacian, modes, known, **settings)
             if method == "HEAT":
                 squared = ((wavelength or _HEAT * length) / (2.0 * np.pi)) ** 2
                 return reading, smooth_points(laplacian, exponential(np.log(2.0) * squared), **settings)
