@@ -8,6 +8,7 @@ from bpy.props import BoolProperty, IntProperty
 
 from ..core import LaplaceBeltrami, PointCloudError, Spectrum, UnresolvedModesError
 from . import cache
+from .attributes import point_count
 from .options import laplacian_options
 from .reading import read_points
 from .ready import ReadyOperator
@@ -97,7 +98,7 @@ class AnalysisOperator(ReadyOperator):
         write_result(obj, analysis, self.write_limit)
         for notice in analysis.notices:
             self.report({"WARNING"}, notice)
-        message = f"{area_text(analysis.total_area)} from {len(obj.data.vertices):,} points"
+        message = f"{area_text(analysis.total_area)} from {point_count(obj.data):,} points"
         if analysis.spectrum is not None:
             message += f", {len(analysis.spectrum.eigenvalues)} modes"
         self.report({"INFO"}, f"{message}, {sum(analysis.seconds.values()):.1f} s")

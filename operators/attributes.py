@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import bpy
 import numpy as np
 
 from ..core import PointCloudError
@@ -63,14 +64,26 @@ def check_names(obj, names):
         )
 
 
+def point_count(data) -> int:
+    """How many points a mesh or a point cloud has."""
+    return len(data.vertices if isinstance(data, bpy.types.Mesh) else data.points)
+
+
+def own_positions(data):
+    """Read the positions of the points of a mesh or a point cloud, (n, 3) float32."""
+    positions = np.empty((point_count(data), 3), np.float32)
+    data.attributes["position"].data.foreach_get("vector", positions.reshape(-1))
+    return positions
+
+
 def write_attribute(mesh, name: str, values):
     """Write one value per vertex, replacing an attribute of that name."""
     data_type = _TYPES.get(name, "FLOAT")
     storage = _STORAGE[data_type]
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
-    if len(values) != storage.components * len(mesh.vertices):
+    if len(values) != storage.components * point_count(mesh):
         raise PointCloudError(
-            f"Attribute {name} got {len(values)} numbers for {len(mesh.vertices)} vertices with"
+            f"Attribute {name} got {len(values)} numbers for {point_count(mesh)} vertices with"
             f" {storage.components} each. Analyze the object again."
         )
     attribute = mesh.attributes.get(name)

@@ -11,6 +11,7 @@ from ..core import PointCloudError
 from . import files, options
 from .analyze import WRITE_LIMIT, analyze_object
 from .application import done
+from .attributes import point_count
 from .reading import obstacle
 from .result import analysis_names, check_writable, write_result
 
@@ -214,7 +215,7 @@ def _apply(obj, arguments, output):
     if output is not None:
         files.save(output, obj, files.attribute_arrays(obj))
     return {
-        "points": len(obj.data.vertices),
+        "points": point_count(obj.data),
         "done": done.messages[-1],
         "seconds": {name: round(seconds, 3) for name, seconds in done.seconds.items()},
         "notices": done.notices,

@@ -10,10 +10,10 @@ from mathutils import Vector
 
 from ..core import Deformer, PointCloudError
 from .application import ApplicationOperator, operator_reader
-from .attributes import DISPLACEMENT, write_attribute
+from .attributes import DISPLACEMENT, own_positions, point_count, write_attribute
 from .groups import ANCHOR, HANDLE, chosen_weights, is_chosen
 from .positions import check_movable, fill_key, target_property, write_positions
-from .reading import Reading, key_positions, mesh_positions
+from .reading import Reading, key_positions
 from .result import length_text
 
 
@@ -50,7 +50,7 @@ _bindings = {}  # by the object's session_uid, which undo does not change
 def binding(obj):
     """Return the binding of an object, or None."""
     bound = _bindings.get(obj.session_uid)
-    return bound if bound is not None and len(bound.reading.points) == len(obj.data.vertices) else None
+    return bound if bound is not None and len(bound.reading.points) == point_count(obj.data) else None
 
 
 def attach():
@@ -212,7 +212,7 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
         if bound.key:
             fill_key(obj, obj.data.shape_keys.key_blocks[bound.key], points - bound.reading.points, bound.reading)
         else:
-            now = replace(bound.reading, points=bound.reading.placed(mesh_positions(obj.data)))
+            now = replace(bound.reading, points=bound.reading.placed(own_positions(obj.data)))
             write_positions(obj, now, points, bound.target, "")
         distance = np.linalg.norm(points - bound.reading.points, axis=1)
         write_attribute(obj.data, DISPLACEMENT, distance)
@@ -232,7 +232,7 @@ def _handle_goal(obj, bound):
         local = reading.local(reading.points[handles])
         return reading.placed(local @ change[:3, :3].T + change[:3, 3])
     if not bound.key:
-        return reading.placed(mesh_positions(obj.data)[handles])
+        return reading.placed(own_positions(obj.data)[handles])
     # By what the key does, not by what is seen, which other keys and the key's value change too.
     keys = obj.data.shape_keys
     moved = key_positions(keys.key_blocks[bound.key]) - key_positions(keys.reference_key)

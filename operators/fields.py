@@ -6,7 +6,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
 from .application import ShownOperator, operator_reader
-from .attributes import DISTANCE, FIELD, read_attribute, write_attribute
+from .attributes import DISTANCE, FIELD, point_count, read_attribute, write_attribute
 from .groups import SOURCE, VALUE, chosen_members, chosen_weights, is_chosen
 from .result import length_text
 from .selecting import selected
@@ -59,7 +59,7 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
                 )
             values = self.low + (self.high - self.low) * weights
         else:
-            fixed = values = np.zeros(len(obj.data.vertices), dtype=bool)
+            fixed = values = np.zeros(point_count(obj.data), dtype=bool)
         source = None
         if self.source:
             source = read_attribute(obj.data, self.source).astype(np.float64)

@@ -4,8 +4,7 @@ import bpy
 import numpy as np
 
 from ..core import PointCloudError, check_points
-from .attributes import APPLICATIONS, MEAN_CURVATURE, PREFIX, read_attribute
-from .reading import mesh_positions
+from .attributes import APPLICATIONS, MEAN_CURVATURE, PREFIX, own_positions, read_attribute
 
 _TEXT = (".xyz", ".csv", ".txt")
 INPUTS = (".ply", ".obj", *_TEXT, ".blend")
@@ -141,7 +140,7 @@ def analysis_arrays(obj, analysis):
 def attribute_arrays(obj):
     """Return the points in the world, and what this extension wrote by its names without the lb_."""
     matrix = np.array(obj.matrix_world, dtype=np.float64)
-    arrays = {"points": mesh_positions(obj.data).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]}
+    arrays = {"points": own_positions(obj.data).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]}
     for attribute in obj.data.attributes:
         if attribute.name.startswith(PREFIX):
             arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)

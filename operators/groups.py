@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..core import PointCloudError
+from .attributes import point_count
 
 HANDLE, ANCHOR, FIXED, SOURCE, VALUE = "Handle", "Anchor", "Fixed", "Source", "Value"
 
@@ -13,7 +14,7 @@ def group_weights(obj, name: str, outside=0.0):
     held = (
         next((item.weight for item in vertex.groups if item.group == index), outside) for vertex in obj.data.vertices
     )
-    return np.fromiter(held, np.float64, count=len(obj.data.vertices))
+    return np.fromiter(held, np.float64, count=point_count(obj.data))
 
 
 def is_chosen(obj, name: str, default: str) -> bool:

@@ -4,7 +4,8 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..core import PointCloudError
-from .reading import is_display, key_positions, mesh_positions
+from .attributes import own_positions
+from .reading import is_display, key_positions
 
 TARGETS = (
     ("SHAPE_KEY", "Shape Key", "Add a shape key, whose value mixes the result with the points as they were"),
@@ -63,7 +64,7 @@ def write_positions(obj, reading, points, target: str, name: str):
     mesh = obj.data
     key = None
     if target == "IN_PLACE":
-        positions = mesh_positions(mesh) + reading.local(points - reading.points)
+        positions = own_positions(mesh) + reading.local(points - reading.points)
         mesh.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
         mesh.update()
     else:

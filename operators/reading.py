@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core import PointCloudError, check_points
+from .attributes import own_positions, point_count
 from .rim import rim_checksum, rim_points
 
 DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
@@ -83,7 +84,7 @@ def read_points(context, obj) -> Reading:
     if obj.meshfree.use_modifiers or mesh.shape_keys is not None:
         positions = _evaluated_positions(context, obj)
     else:
-        positions = mesh_positions(mesh)
+        positions = own_positions(mesh)
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     if not np.linalg.cond(matrix) < 1e6:
         raise PointCloudError(
@@ -92,15 +93,8 @@ def read_points(context, obj) -> Reading:
         )
     notices = []
     if mesh.polygons:
-        notices.append(f"The mesh has {len(mesh.polygons)} faces: it is taken as its {len(mesh.vertices)} vertices.")
+        notices.append(f"The mesh has {len(mesh.polygons)} faces: it is taken as its {point_count(mesh)} vertices.")
     return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
-
-
-def mesh_positions(mesh):
-    """Read the vertices' own positions, (n, 3) float32."""
-    positions = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", positions.reshape(-1))
-    return positions
 
 
 def key_positions(key):
@@ -119,11 +113,11 @@ def _evaluated_positions(context, obj):
                 f'"{obj.name}" is disabled in viewports, so its shape keys and modifiers are not computed. Enable it'
                 " in the Outliner (monitor icon)."
             )
-        positions = mesh_positions(evaluated.to_mesh())
+        positions = own_positions(evaluated.to_mesh())
         evaluated.to_mesh_clear()
-    if len(positions) != len(obj.data.vertices):
+    if len(positions) != point_count(obj.data):
         raise PointCloudError(
-            f'The modifiers of "{obj.name}" turn its {len(obj.data.vertices)} points into {len(positions)}, so results'
+            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)}, so results'
             " have no place. Apply these modifiers, or turn off Use Modifiers."
         )
     return positions
@@ -155,7 +149,7 @@ def fingerprint(obj, glance=False) -> str:
     group some seconds late. Of modifiers, if they are used, both see which ones there are, not their settings.
     """
     mesh = obj.data
-    checksum = zlib.crc32(mesh_positions(mesh))
+    checksum = zlib.crc32(own_positions(mesh))
     keys = mesh.shape_keys
     if keys is not None:
         state = [keys.use_relative, keys.eval_time, obj.show_only_shape_key and obj.active_shape_key_index]
@@ -183,7 +177,7 @@ def spacing(mesh) -> float:
 
     The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8.
     """
-    positions = mesh_positions(mesh)
+    positions = own_positions(mesh)
     positions = positions[np.isfinite(positions).all(axis=1)]
     if len(positions) < 9:
         return 0.0

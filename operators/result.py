@@ -15,6 +15,7 @@ from .attributes import (
     RESULTS,
     check_names,
     eigenvector_name,
+    point_count,
     remove_numbered,
     write_attribute,
 )
@@ -80,7 +81,7 @@ def write_result(obj, analysis, write_limit: int):
 
     kept = obj.meshfree
     kept.total_area = analysis.total_area
-    kept.point_count = len(mesh.vertices)
+    kept.point_count = point_count(mesh)
     for name, count in analysis.counts.items():
         setattr(kept, name, count)
     kept.stages.clear()

@@ -4,6 +4,7 @@ import zlib
 from time import perf_counter
 
 from ..core.rims import FEWEST
+from .attributes import point_count
 from .groups import chosen_members, group_weights
 
 _PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
@@ -36,7 +37,7 @@ def rim_checksum(obj, glance=False) -> int:
     name = obj.meshfree.rim_group
     if name not in obj.vertex_groups:
         return 0
-    key = (obj.session_uid, name, len(obj.data.vertices))
+    key = (obj.session_uid, name, point_count(obj.data))
     if not glance or _glance["key"] != key or perf_counter() > _glance["until"]:
         began = perf_counter()
         checksum = zlib.crc32(group_weights(obj, name) > 0.0)

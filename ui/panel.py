@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number
+from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.reading import is_display, obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
 from .display import find_display, input_property, label, range_node, shown_attribute, step_colors
@@ -77,7 +77,7 @@ def _draw_result(layout, result):
 def _draw_summary(layout, obj):
     mesh = obj.data
     column = layout.column(align=True)
-    column.label(text=f"{obj.name}: {len(mesh.vertices):,} points", icon="OUTLINER_OB_MESH")
+    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon="OUTLINER_OB_MESH")
     if mesh.polygons:
         column.label(text=f"Faces not used: {len(mesh.polygons):,}", icon="INFO")
     scale = obj.matrix_world.to_scale()
