@@ -9,8 +9,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core import PointCloudError, check_points
+from ..core.rims import FEWEST
 from .attributes import own_positions, point_count
-from .rim import rim_checksum, rim_points
+from .groups import chosen_members, members
 
 DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
 
@@ -107,6 +108,12 @@ def read_points(context, obj) -> Reading:
     return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
 
 
+def rim_points(obj):
+    """Read which points the rim group of an object holds, (n,) bool; None if the settings name no group."""
+    name = obj.meshfree.rim_group
+    return chosen_members(obj, name, "Rim Group", FEWEST) if name else None
+
+
 def key_positions(key):
     """Read the positions that a shape key holds, (n, 3) float32."""
     positions = np.empty((len(key.points), 3), np.float32)
@@ -174,7 +181,7 @@ def fingerprint(obj, glance=False) -> str:
         state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_display(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.rim_group:
-        checksum = zlib.crc32(repr(rim_checksum(obj, glance)).encode(), checksum)
+        checksum = zlib.crc32(repr(members(obj, obj.meshfree.rim_group, glance).checksum).encode(), checksum)
     return f"{checksum:08x}"
 
 

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from ..core import PointCloudError, grow
 from .application import operator_reader
 from .attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
-from .groups import group_weights, has_group
+from .groups import HANDLE, chosen_members, group_weights, has_group, members
 from .ready import ReadyOperator
 from .stages import Stages
 
@@ -171,6 +171,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             ("FIXED", "Fixed", "The rim that a minimal surface keeps"),
             ("SOURCE", "Source", "Points from which distances are measured"),
             ("VALUE", "Value", "Points with given values of a field, as weights"),
+            ("RIM", "Rim", "Points at which the surface ends; it becomes the Rim Group of the settings"),
         ],
         default="HANDLE",
     )
@@ -206,6 +207,9 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             self.assign_vertices(obj, name, chosen)
         else:
             self.assign_points(obj, name, chosen)
+        if self.role == "RIM" and self.action != "REMOVE":
+            obj.meshfree.rim_group = name
+        members(obj, name)  # for the panel's count
         verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
         return f'{np.count_nonzero(chosen):,} points {verb} the group "{name}"'
 
@@ -229,11 +233,11 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             group = obj.vertex_groups.new(name=name)
         if self.action == "REPLACE":
             group.remove(range(len(chosen)))
-        members = np.flatnonzero(chosen).tolist()
+        indices = np.flatnonzero(chosen).tolist()
         if self.action == "REMOVE":
-            group.remove(members)
+            group.remove(indices)
         else:
-            group.add(members, self.weight, "REPLACE")
+            group.add(indices, self.weight, "REPLACE")
         obj.vertex_groups.active = group
 
     def assign_points(self, obj, name, chosen):
@@ -255,9 +259,36 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         tag_changed(obj.data)
 
 
+class MESHFREE_OT_select_rim(SelectionOperator, bpy.types.Operator):
+    """Select the points at the rims of the surface, as they are found or named by the Rim Group"""
+
+    bl_idname = "meshfree.select_rim"
+    bl_label = "Select Rim"
+
+    def change(self, context, obj):
+        rim = analyzed(context, obj)[1].boundary
+        if not rim.any():
+            raise PointCloudError(f'"{obj.name}" has no rim: its surface is closed, or Rims is off in the settings.')
+        return select(context, obj, rim)
+
+
+class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
+    """Select the points of a group that the tools take"""
+
+    bl_idname = "meshfree.select_group"
+    bl_label = "Select Group"
+
+    name: StringProperty(name="Name", description="Name of the group", default=HANDLE, maxlen=63)
+
+    def change(self, context, obj):
+        return select(context, obj, chosen_members(obj, self.name, "Name"))
+
+
 CLASSES = (
     MESHFREE_OT_select_grow,
     MESHFREE_OT_select_component,
     MESHFREE_OT_select_front,
+    MESHFREE_OT_select_rim,
+    MESHFREE_OT_select_group,
     MESHFREE_OT_group_from_selection,
 )
