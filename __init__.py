@@ -3,7 +3,7 @@
 
 def _classes():
     from .operators import analyze, deform, fields, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, panel, settings
+    from .ui import applications, colormap, legend, panel, presets, range_selection, settings
 
     modules = (
         settings,
@@ -16,6 +16,9 @@ def _classes():
         minimal,
         selecting,
         colormap,
+        legend,
+        range_selection,
+        presets,
         panel,
         applications,
     )
@@ -27,13 +30,14 @@ def register():
     import bpy
 
     from .operators import command, deform
-    from .ui import settings
+    from .ui import overlay, settings
 
     for cls in _classes():
         bpy.utils.register_class(cls)
     settings.attach()
     command.attach()
     deform.attach()
+    overlay.attach()
 
 
 def unregister():
@@ -41,8 +45,9 @@ def unregister():
     import bpy
 
     from .operators import cache, command, deform
-    from .ui import settings
+    from .ui import overlay, settings
 
+    overlay.detach()
     deform.detach()
     command.detach()
     settings.detach()

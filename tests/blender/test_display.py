@@ -242,8 +242,8 @@ def test_outliers_do_not_wash_the_colors_out(colormaps):
     ("values", "name"),
     [
         (np.zeros(5, bool), "TRUTH"),
-        (np.zeros(5, np.int32), "CLASSES"),
-        (np.arange(-1, 7), "CLASSES"),
+        (np.zeros(5, np.int32), "CATEGORICAL"),
+        (np.arange(-1, 7), "CATEGORICAL"),
         (np.arange(-1, 8), "VIRIDIS"),
         (np.arange(-2, 3), "COOL_WARM"),
         (np.arange(3.0), "VIRIDIS"),
@@ -269,7 +269,7 @@ def test_automatic_maps(colormaps, values, name):
 )
 def test_range_of_special_values(colormaps, values, low, high):
     coverage = 100.0 if np.isnan(values.astype(float)).any() else 98.0
-    assert colormaps.fit(values, coverage)[1:] == pytest.approx((low, high))
+    assert colormaps.fit(values, coverage=coverage)[1:] == pytest.approx((low, high))
 
 
 @pytest.mark.parametrize(
