@@ -173,7 +173,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         _draw_mode_steps(layout, attributes, shown)
         if find_display(obj) is None:
             return
-        column.operator("meshfree.colormap", text="Update Colors")
+        layout.operator("meshfree.colormap", text="Update Colors")
         layout.use_property_split = True
         layout.use_property_decorate = False
         if shown == NORMAL:

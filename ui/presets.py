@@ -28,11 +28,12 @@ class MESHFREE_OT_apply_preset(ReadyOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class MESHFREE_OT_add_preset(AddPresetBase, bpy.types.Operator):
+class MESHFREE_OT_add_preset(ReadyOperator, AddPresetBase, bpy.types.Operator):
     """Keep the settings that change results as a preset of your own, or remove that preset"""
 
     bl_idname = "meshfree.add_preset"
     bl_label = "Add Settings Preset"
+    bl_options = {"REGISTER", "INTERNAL"}  # it changes nothing that could be undone
     preset_menu = "MESHFREE_MT_presets"
     preset_subdir = "meshfree_laplacian"
     preset_defines = ["settings = bpy.context.object.meshfree"]
@@ -51,10 +52,6 @@ class MESHFREE_OT_add_preset(AddPresetBase, bpy.types.Operator):
         default=False,
         options={"HIDDEN", "SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context):
-        return ReadyOperator.poll.__func__(cls, context)
 
 
 class MESHFREE_MT_presets(bpy.types.Menu):

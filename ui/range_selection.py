@@ -54,7 +54,7 @@ class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
             chosen |= before
         if not chosen.any():
             raise PointCloudError(
-                f"No point has a {label(shown_attribute(obj))} {'outside' if self.invert else 'from'}"
+                f"No value of {label(shown_attribute(obj))} lies {'outside' if self.invert else 'from'}"
                 f" {self.low:g} to {self.high:g}. Widen the range."
             )
         return select(context, obj, chosen)

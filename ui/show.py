@@ -63,8 +63,6 @@ def recolor(obj):
     name = shown_attribute(obj)
     if not name or name not in obj.data.attributes:
         return
-    if obj.mode == "EDIT":  # where attributes are empty
-        obj.update_from_editmode()
     _color(obj, name, read_attribute(obj.data, name))
 
 

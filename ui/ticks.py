@@ -7,7 +7,7 @@ def round_ticks(low: float, high: float, most: int = 6) -> list:
     """Choose at most so many numbers from low to high that are multiples of 1, 2 or 5 times a power of ten."""
     if not low < high:
         return [low]
-    step = _round_step((high - low) / max(most - 1, 1))
+    step = _round_step((high - low) / (most + 1))
     while True:
         first, last = math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
         if last - first < most:
