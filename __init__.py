@@ -3,7 +3,7 @@
 
 def _classes():
     from .operators import analyze, deform, fields, job, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, panel, points, settings
+    from .ui import applications, colormap, legend, panel, points, presets, range_selection, settings
 
     modules = (
         settings,
@@ -17,6 +17,9 @@ def _classes():
         minimal,
         selecting,
         colormap,
+        legend,
+        range_selection,
+        presets,
         panel,
         points,
         applications,
@@ -24,33 +27,29 @@ def _classes():
     return [cls for module in modules for cls in module.CLASSES]
 
 
-def register():
-    """Add the extension's classes, the settings of objects and the command line to Blender."""
-    import bpy
-
+def _attached():
+    """Return the modules that add more than classes to Blender."""
     from .operators import cache, command, deform, job
-    from .ui import settings
+    from .ui import overlay, settings
+
+    return settings, command, deform, cache, job, overlay
+
+
+def register():
+    """Add the extension's classes, the settings of objects, handlers and the command line to Blender."""
+    import bpy
 
     for cls in _classes():
         bpy.utils.register_class(cls)
-    settings.attach()
-    command.attach()
-    deform.attach()
-    cache.attach()
-    job.attach()
+    for module in _attached():
+        module.attach()
 
 
 def unregister():
     """Take everything out again, in reverse order."""
     import bpy
 
-    from .operators import cache, command, deform, job
-    from .ui import settings
-
-    job.detach()
-    cache.detach()
-    deform.detach()
-    command.detach()
-    settings.detach()
+    for module in reversed(_attached()):
+        module.detach()
     for cls in reversed(_classes()):
         bpy.utils.unregister_class(cls)

@@ -11,16 +11,20 @@ import pytest
 from tests.blender.clouds import add_object, grid_points, sphere_points
 
 OPERATORS = (
+    "add_preset",
     "analyze",
+    "apply_preset",
     "colormap",
     "deform_bind",
     "deform_update",
     "geodesic_distance",
     "group_from_selection",
     "harmonic_field",
+    "legend",
     "minimal_surface",
     "mode_shape",
     "segment",
+    "select_by_range",
     "select_component",
     "select_front",
     "select_group",
@@ -49,7 +53,10 @@ class Layout:
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         self.texts.append(text)
 
-    def prop(self, data, path, text=None):
+    def menu(self, idname, text=""):
+        self.texts.append(text or getattr(bpy.types, idname).bl_label)
+
+    def prop(self, data, path, text=None, toggle=False):
         data.path_resolve(path)
         self.texts.append(text or path)
 
@@ -179,8 +186,9 @@ def test_panel_for_each_kind_of_display(name):
     bpy.ops.meshfree.spectrum(count=3)
     bpy.ops.meshfree.colormap(attribute=name)
     texts = draw()
-    assert "Point Radius" in texts
-    assert ("Range From" in texts) == (name not in {"lb_normal", "lb_boundary", "lb_component"})
+    assert "point_size" in texts
+    assert ("color_map" in texts) == (name != "lb_normal")
+    assert ("range_low" in texts) == (name not in {"lb_normal", "lb_boundary", "lb_component"})
 
 
 def described():
@@ -227,7 +235,7 @@ def test_dialogs_show_every_setting(name):
 
 
 def test_names_and_tooltips():
-    small = {"of", "to", "as", "the", "and", "a", "by"}
+    small = {"of", "to", "as", "the", "and", "a", "by", "in"}
     items = list(described())
     assert len(items) > 120
     for path, name, description in items:
@@ -253,7 +261,7 @@ def test_every_option_of_core_is_a_setting_with_its_default(extension, core):
 def test_operators_can_be_undone_and_found():
     for name in OPERATORS:
         operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
-        assert operator.bl_options == {"REGISTER", "UNDO"}
+        assert operator.bl_options == ({"REGISTER", "INTERNAL"} if name == "add_preset" else {"REGISTER", "UNDO"})
         assert operator.bl_idname == f"meshfree.{name}"
 
 
