@@ -2,8 +2,8 @@
 
 
 def _classes():
-    from .operators import analyze, deform, fields, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, panel, settings
+    from .operators import analyze, deform, exporting, fields, importing, minimal, segment, selecting, smooth, spectrum
+    from .ui import applications, colormap, menus, panel, settings
 
     modules = (
         settings,
@@ -15,9 +15,12 @@ def _classes():
         deform,
         minimal,
         selecting,
+        importing,
+        exporting,
         colormap,
         panel,
         applications,
+        menus,
     )
     return [cls for module in modules for cls in module.CLASSES]
 
@@ -27,13 +30,14 @@ def register():
     import bpy
 
     from .operators import command, deform
-    from .ui import settings
+    from .ui import menus, settings
 
     for cls in _classes():
         bpy.utils.register_class(cls)
     settings.attach()
     command.attach()
     deform.attach()
+    menus.attach()
 
 
 def unregister():
@@ -41,8 +45,9 @@ def unregister():
     import bpy
 
     from .operators import cache, command, deform
-    from .ui import settings
+    from .ui import menus, settings
 
+    menus.detach()
     deform.detach()
     command.detach()
     settings.detach()

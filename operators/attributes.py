@@ -37,6 +37,12 @@ HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # f
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT  # of every analysis, as in the panel
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {NORMAL: "FLOAT_VECTOR", BOUNDARY: "BOOLEAN", COMPONENT: "INT", SEGMENT: "INT"}  # all others are FLOAT
+STORABLE = tuple(_STORAGE)
+
+
+def type_of(name: str) -> str:
+    """Type of one of this extension's attributes."""
+    return _TYPES.get(name, "FLOAT")
 
 
 def eigenvector_name(mode: int) -> str:
@@ -76,9 +82,9 @@ def own_positions(data):
     return positions
 
 
-def write_attribute(mesh, name: str, values):
-    """Write one value per vertex, replacing an attribute of that name."""
-    data_type = _TYPES.get(name, "FLOAT")
+def write_attribute(mesh, name: str, values, data_type: str = ""):
+    """Write one value per vertex, replacing an attribute of that name; its type goes by the name if none is given."""
+    data_type = data_type or type_of(name)
     storage = _STORAGE[data_type]
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
     if len(values) != storage.components * point_count(mesh):

@@ -14,7 +14,12 @@ def _step(points):
 
 def is_coarse(points) -> bool:
     """Whether single precision would hurt the points where they are."""
-    return _step(points) > min(_FINE * np.ptp(points, axis=0).max(), _FINEST)
+    return _step(points) > min(_FINE * _extent(points), _FINEST)
+
+
+def _extent(points):
+    """Longest side of the box around the points; that of points at one place counts as one."""
+    return float(np.ptp(points, axis=0).max()) or 1.0
 
 
 def choose_origin(points, known=None):
@@ -32,11 +37,11 @@ def choose_origin(points, known=None):
         Zero if the points do well without. Otherwise the middle of the points, rounded to a power of ten below their
         extent, so that it is easily told.
     """
-    extent = np.ptp(points, axis=0).max()
+    extent = _extent(points)
     if known is not None and _step(points - known) <= _SHARED * extent:
         return np.array(known, dtype=np.float64)
     if not is_coarse(points):
         return np.zeros(3)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    grid = 10.0 ** np.floor(np.log10(extent)) if extent > 0.0 else 1.0
+    grid = 10.0 ** np.floor(np.log10(extent))
     return np.round(middle / grid) * grid
