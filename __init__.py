@@ -3,7 +3,7 @@
 
 def _classes():
     from .operators import analyze, deform, exporting, fields, importing, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, menus, panel, settings
+    from .ui import applications, colormap, menus, panel, points, settings
 
     modules = (
         settings,
@@ -19,6 +19,7 @@ def _classes():
         exporting,
         colormap,
         panel,
+        points,
         applications,
         menus,
     )

@@ -17,7 +17,7 @@ from .attributes import (
     type_of,
     write_attribute,
 )
-from .reading import read_points as read_object
+from .reading import TYPES, face_notice, seen_positions
 
 OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
 INPUTS = (*READABLE, ".blend")
@@ -105,9 +105,10 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     PointTable
         With normals of the world. `single` tells that single precision does for the coordinates.
     """
-    reading = read_object(context, obj)
-    place = np.array(obj.matrix_world.translation, dtype=np.float64) + offset_of(obj)
-    table = PointTable(reading.points + place, notices=reading.notices)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    place = matrix[:3, 3] + offset_of(obj)
+    table = PointTable(seen_positions(context, obj).astype(np.float64) @ matrix[:3, :3].T + place)
+    table.notices = face_notice(obj)
     table.single = not (OFFSET in obj or is_coarse(table.points))
     data = obj.data
     names = [layer.name for layer in data.attributes if _is_column(layer)] if attributes != "NONE" else []
@@ -117,7 +118,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
         table.attributes[name] = read_attribute(data, name)
     normals = table.attributes.pop(NORMAL, table.attributes.pop(FILE_NORMAL, None))
     if normals is not None:
-        table.attributes = {FILE_NORMAL: _world_normals(normals, reading.matrix), **table.attributes}
+        table.attributes = {FILE_NORMAL: _world_normals(normals, matrix[:3, :3]), **table.attributes}
     if with_colors:
         table.colors = _read_colors(data)
     return table
@@ -129,8 +130,9 @@ def _is_column(layer):
 
 
 def _world_normals(normals, matrix):
-    """Turn local normals into unit normals of the world; none stay none."""
-    world = normals.astype(np.float64) @ np.linalg.inv(matrix)
+    """Turn local normals into unit normals of the world, by cofactors, which objects scaled to nothing have too."""
+    cofactors = np.stack([np.cross(matrix[i - 2], matrix[i - 1]) for i in range(3)])
+    world = normals.astype(np.float64) @ cofactors.T * (-1.0 if np.linalg.det(matrix) < 0.0 else 1.0)
     length = np.linalg.norm(world, axis=1, keepdims=True)
     return (world / np.where(length > 0.0, length, 1.0)).astype(np.float32)
 
@@ -184,7 +186,7 @@ def load(path, name: str = ""):
 
 def _choose_object(path, name):
     bpy.context.view_layer.update()
-    meshes = [obj for obj in bpy.context.view_layer.objects if obj.type == "MESH"]
+    meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
     active = bpy.context.view_layer.objects.active
     if not meshes:
         raise PointCloudError(f"{path} has no mesh object. Give a file with points.")

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from ..core import PointCloudError, boost, displace_by_mode, exponential, fair_points, smooth_points
 from . import cache
 from .application import ApplicationOperator, operator_reader
-from .groups import chosen_weights
+from .groups import chosen_weights, search_group
 from .positions import check_movable, target_property, write_positions
 from .result import length_text
 
@@ -41,7 +41,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         subtype="DISTANCE",
     )
     modes: IntProperty(
-        name="Modes", description="How many modes are kept, the constant one included", default=100, min=4
+        name="Modes", description="How many modes are kept, the constant one included", default=100, min=4, soft_max=500
     )
     gain: FloatProperty(name="Gain", description="How much stronger details become", default=1.5, min=0.0, soft_max=3.0)
     strength: FloatProperty(
@@ -118,7 +118,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
         for name in [*names, "strength"]:
             layout.prop(self, name)
-        layout.prop_search(self, "group", context.object, "vertex_groups")
+        search_group(layout, self, "group", context.object)
         for name in ("keep", "keep_rim", "target"):
             layout.prop(self, name)
 
@@ -129,11 +129,14 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     bl_idname = "meshfree.mode_shape"
     bl_label = "Deform by Mode"
 
-    mode: IntProperty(name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1)
+    mode: IntProperty(
+        name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
+    )
     amplitude: FloatProperty(
         name="Amplitude",
         description="Largest displacement; 0 for a tenth of the object's radius",
         default=0.0,
+        min=0.0,
         subtype="DISTANCE",
     )
     phase: FloatProperty(
@@ -145,11 +148,16 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     animate: BoolProperty(
         name="Animate", description="Keyframe the shape key as a vibration over the frames of the scene", default=False
     )
-    period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4)
+    period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4, soft_max=250)
     target: target_property()
 
     def plan(self, context, obj):
         target = "SHAPE_KEY" if self.animate else self.target
+        if self.animate and obj.type != "MESH":
+            raise PointCloudError(
+                f'"{obj.name}" is a Point Cloud, which has no shape keys to animate. Turn off Animate, or convert it'
+                " with Object > Convert > Mesh."
+            )
         check_movable(obj, target)
         reading, operator = operator_reader(context, obj)
         mode, amplitude, phase = self.mode, self.amplitude or None, self.phase

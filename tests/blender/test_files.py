@@ -267,13 +267,17 @@ class TestExport:
         with pytest.raises(RuntimeError, match="Give it one of .ply, .xyz, .csv"):
             bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.stl"))
 
-    def test_a_failure_leaves_the_old_file(self, tmp_path):
+    @pytest.mark.parametrize("scale", [(0.0, 1.0, 1.0), (-1.0, 1.0, 1.0)])
+    def test_any_scale(self, tmp_path, scale):
         obj = add_object(sphere_points())
-        (tmp_path / "a.ply").write_text("before")
-        obj.scale.x = 0.0
-        with pytest.raises(RuntimeError, match="scaled to nothing"):
-            bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.ply"))
-        assert (tmp_path / "a.ply").read_text() == "before"
+        bpy.ops.meshfree.analyze(show=False)
+        obj.scale = scale
+        bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.ply"))
+        table = read_file(tmp_path / "a.ply")
+        assert_allclose(table.points, local_points(obj) * scale, atol=1e-6)
+        outward = sphere_points() * scale if scale[0] else np.sign(sphere_points()) * (1.0, 0.0, 0.0)
+        clear = np.abs(sphere_points()[:, 0]) > 0.1  # elsewhere the normal of a flat object is anybody's guess
+        assert np.einsum("ij,ij->i", table.attributes["normal"], outward)[clear].min() > 0.9
 
     def test_a_folder_that_is_a_file(self, tmp_path):
         add_object(sphere_points())

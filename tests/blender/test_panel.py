@@ -26,7 +26,9 @@ OPERATORS = (
     "segment",
     "select_component",
     "select_front",
+    "select_group",
     "select_grow",
+    "select_rim",
     "separate_by_segment",
     "signature",
     "smooth",
@@ -117,6 +119,18 @@ def test_panel_follows_the_order_of_work():
     assert not any("analyze again" in text for text in texts)
 
 
+def test_panel_counts_the_points_of_each_group():
+    obj = add_object(sphere_points())
+    assert draw().count("0") == 6
+    obj.data.vertices.foreach_set("select", np.arange(1000) < 12)
+    bpy.ops.meshfree.group_from_selection(role="ANCHOR")
+    texts = draw()
+    assert texts[texts.index("Assign to Anchors") + 1] == "12"
+    bpy.ops.meshfree.group_from_selection(role="ANCHOR", action="REMOVE")
+    texts = draw()
+    assert texts[texts.index("Assign to Anchors") + 1] == "0"
+
+
 def test_panel_marks_stale_results():
     obj = add_object(sphere_points())
     bpy.ops.meshfree.analyze()
@@ -185,7 +199,7 @@ def test_dialogs_show_every_setting(name):
     if not hasattr(operator, "draw"):
         return
     properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if not item.is_hidden]
-    properties = [item for item in properties if item.type != "POINTER"]
+    properties = [item for item in properties if item.type != "POINTER" and item.identifier != "filepath"]
     values = {item.identifier: item.default for item in properties}
     choices = [item for item in properties if item.type == "ENUM"]
     variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]

