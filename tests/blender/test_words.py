@@ -171,7 +171,3 @@ def test_the_info_log_and_scripts_have_the_same_words():
         bpy.ops.meshfree.analyze(modes=2, show=False)
     logged = [item for item in bpy.context.window_manager.operators if item.bl_idname == "MESHFREE_OT_analyze"]
     assert [item.name for item in logged] in ([], ["Analyze Points"])  # none in background mode
-
-
-def test_reports_are_translated_before_values_are_put_in():
-    """Texts of buttons and reports go through Blender's translation as they stand in the code: see ui/texts."""
