@@ -1,11 +1,26 @@
 """Mesh-Free Laplacian: areas, normals, curvature and vibration modes of point clouds, inside Blender."""
 
 
-def _classes():
-    from .operators import analyze, deform, exporting, fields, importing, minimal, segment, selecting, smooth, spectrum
+def _modules():
+    """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
+    from .operators import (
+        analyze,
+        cache,
+        command,
+        deform,
+        exporting,
+        fields,
+        importing,
+        job,
+        minimal,
+        segment,
+        selecting,
+        smooth,
+        spectrum,
+    )
     from .ui import applications, colormap, menus, panel, points, settings
 
-    modules = (
+    return (
         settings,
         analyze,
         spectrum,
@@ -22,36 +37,29 @@ def _classes():
         points,
         applications,
         menus,
+        command,
+        cache,
+        job,
     )
-    return [cls for module in modules for cls in module.CLASSES]
 
 
 def register():
-    """Add the extension's classes, the settings of objects and the command line to Blender."""
+    """Add the extension's classes, the settings of objects, menus, handlers and the command line to Blender."""
     import bpy
 
-    from .operators import command, deform
-    from .ui import menus, settings
-
-    for cls in _classes():
-        bpy.utils.register_class(cls)
-    settings.attach()
-    command.attach()
-    deform.attach()
-    menus.attach()
+    for module in _modules():
+        for cls in getattr(module, "CLASSES", ()):
+            bpy.utils.register_class(cls)
+        if hasattr(module, "attach"):
+            module.attach()
 
 
 def unregister():
-    """Take everything out again, in reverse order, and give back the memory of the cached operators."""
+    """Take everything out again, in reverse order."""
     import bpy
 
-    from .operators import cache, command, deform
-    from .ui import menus, settings
-
-    menus.detach()
-    deform.detach()
-    command.detach()
-    settings.detach()
-    for cls in reversed(_classes()):
-        bpy.utils.unregister_class(cls)
-    cache.clear()
+    for module in reversed(_modules()):
+        if hasattr(module, "detach"):
+            module.detach()
+        for cls in reversed(getattr(module, "CLASSES", ())):
+            bpy.utils.unregister_class(cls)

@@ -10,16 +10,20 @@ from bpy_extras.io_utils import ExportHelper
 from ..core import PointCloudError
 from ..core.files import replacing, write_points
 from . import cache
-from .files import analysis_arrays, point_table, save_arrays
+from .files import analysis_arrays, place_of, point_table, save_arrays
+from .job import JobOperator
 from .options import laplacian_options
 from .reading import read_points
-from .ready import ReadyOperator
 from .result import EIGENVALUES
 from .stages import Stages
 
 
-class ExportOperator(ReadyOperator, ExportHelper):
-    """An operator that writes one file about the active object; an older file stays if that fails."""
+class ExportOperator(JobOperator, ExportHelper):
+    """An operator that writes one file about the active object; an older file stays if that fails.
+
+    A subclass has a method `plan`, which reads all that is needed and returns a function of a path and a progress
+    callback that writes the file, without touching Blender, and returns a few words about it.
+    """
 
     bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
     suffix = ""  # of the name in the file browser
@@ -30,6 +34,7 @@ class ExportOperator(ReadyOperator, ExportHelper):
         return self.suffix
 
     def invoke(self, context, event):
+        self._attended = True
         if not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.filepath = str(folder / f"{bpy.path.clean_name(context.object.name)}{self.filename_ext}")
@@ -37,13 +42,23 @@ class ExportOperator(ReadyOperator, ExportHelper):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
-        path = Path(bpy.path.abspath(self.filepath))
+        attended = self.takes_window()
+        self._name, self._path = context.object.name, Path(bpy.path.abspath(self.filepath))
+        path = self._path
         try:
-            message = self.export(context, context.object, path)
-        except (PointCloudError, OSError) as error:
+            write = self.plan(context, context.object)
+            if attended:
+                return self.start(context, [], lambda progress: write(path, progress))
+            with Stages(context.window_manager, self.bl_label) as stages:
+                result = write(path, stages)
+        except PointCloudError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{context.object.name}: {message} written to {path.name}")
+        return self.finish(context, [], result, stages.seconds)
+
+    def finish(self, context, objects, results, seconds):
+        """Tell what was written."""
+        self.report({"INFO"}, f"{self._name}: {results} written to {self._path.name}")
         return {"FINISHED"}
 
 
@@ -93,12 +108,15 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
         for name in ("format", "attributes", "colors"):
             layout.prop(self, name)
 
-    def export(self, context, obj, path):
+    def plan(self, context, obj):
         table = point_table(context, obj, self.attributes, self.colors)
-        write_points(path, table, double=not table.single)
-        for notice in table.notices:
-            self.report({"WARNING"}, notice)
-        return f"{len(table.points):,} points"
+
+        def write(path, progress):
+            progress("Write", 0.0)
+            write_points(path, table, double=not table.single)
+            return f"{len(table.points):,} points"
+
+        return write
 
 
 class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
@@ -112,14 +130,18 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
         name="File Filter", description="Names of files that are listed", default="*.npz", options={"HIDDEN"}
     )
 
-    def export(self, context, obj, path):
-        reading = read_points(context, obj)
-        count = len(obj.get(EIGENVALUES, ()))
-        with Stages(context.window_manager) as stages:
-            built = cache.build(reading.points, laplacian_options(obj.meshfree), reading.rim, stages)
-            spectrum = cache.lowest_modes(built.laplacian, count, stages) if count else None
-        save_arrays(path, analysis_arrays(obj, built.laplacian, built.mean_curvature, spectrum))
-        return f"{built.laplacian.stiffness.nnz:,} weights and {count} modes"
+    def plan(self, context, obj):
+        reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
+        place, count = place_of(obj), len(obj.get(EIGENVALUES, ()))
+
+        def write(path, progress):
+            built = cache.build(reading.points, options, reading.rim, progress)
+            spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
+            progress("Write", 1.0)
+            save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))
+            return f"{built.laplacian.stiffness.nnz:,} weights and {count} modes"
+
+        return write
 
 
 class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
@@ -142,12 +164,16 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
             return False
         return True
 
-    def export(self, context, obj, path):
+    def plan(self, context, obj):
         values = np.array(obj[EIGENVALUES])
-        rows = np.stack([np.arange(1, len(values) + 1), values], axis=1)
-        with replacing(path) as part:
-            np.savetxt(part, rows, ["%d", "%.17g"], ",", header="mode,eigenvalue", comments="")
-        return f"{len(values)} eigenvalues"
+
+        def write(path, progress):
+            rows = np.stack([np.arange(1, len(values) + 1), values], axis=1)
+            with replacing(path) as part:
+                np.savetxt(part, rows, ["%d", "%.17g"], ",", header="mode,eigenvalue", comments="")
+            return f"{len(values)} eigenvalues"
+
+        return write
 
 
 CLASSES = (MESHFREE_OT_export_points, MESHFREE_OT_export_operator, MESHFREE_OT_export_eigenvalues)

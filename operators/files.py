@@ -17,7 +17,7 @@ from .attributes import (
     type_of,
     write_attribute,
 )
-from .reading import TYPES, face_notice, seen_positions
+from .reading import TYPES, seen_positions
 
 OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
 INPUTS = (*READABLE, ".blend")
@@ -29,6 +29,11 @@ _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
 def offset_of(obj):
     """Return what is added to an object's coordinates in the world to get those of its file, (3,) float64."""
     return np.array(obj.get(OFFSET, (0.0, 0.0, 0.0)), dtype=np.float64)
+
+
+def place_of(obj):
+    """Return what is added to points with the object's scale and rotation to get those of its file, (3,) float64."""
+    return np.array(obj.matrix_world.translation, dtype=np.float64) + offset_of(obj)
 
 
 def known_offset(scene):
@@ -105,10 +110,8 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     PointTable
         With normals of the world. `single` tells that single precision does for the coordinates.
     """
-    matrix = np.array(obj.matrix_world, dtype=np.float64)
-    place = matrix[:3, 3] + offset_of(obj)
-    table = PointTable(seen_positions(context, obj).astype(np.float64) @ matrix[:3, :3].T + place)
-    table.notices = face_notice(obj)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    table = PointTable(seen_positions(context, obj).astype(np.float64) @ matrix.T + place_of(obj))
     table.single = not (OFFSET in obj or is_coarse(table.points))
     data = obj.data
     names = [layer.name for layer in data.attributes if _is_column(layer)] if attributes != "NONE" else []
@@ -118,7 +121,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
         table.attributes[name] = read_attribute(data, name)
     normals = table.attributes.pop(NORMAL, table.attributes.pop(FILE_NORMAL, None))
     if normals is not None:
-        table.attributes = {FILE_NORMAL: _world_normals(normals, matrix[:3, :3]), **table.attributes}
+        table.attributes = {FILE_NORMAL: _world_normals(normals, matrix), **table.attributes}
     if with_colors:
         table.colors = _read_colors(data)
     return table
@@ -228,14 +231,15 @@ def save_arrays(path, arrays):
         np.savez(part, **arrays)
 
 
-def analysis_arrays(obj, laplacian, curvature, spectrum) -> dict:
+def analysis_arrays(place, laplacian, curvature, spectrum) -> dict:
     """Return all arrays of an analysis, numbers in double precision, lengths and axes of the world.
 
     Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it.
 
     Parameters
     ----------
-    obj : bpy.types.Object
+    place : ndarray, (3,)
+        Of the object, by `place_of`.
     laplacian : LaplaceBeltrami
     curvature : ndarray, (n,)
         Mean curvature.
@@ -243,7 +247,7 @@ def analysis_arrays(obj, laplacian, curvature, spectrum) -> dict:
     """
     stiffness = laplacian.stiffness
     return {
-        "points": laplacian.points + np.array(obj.matrix_world.translation, dtype=np.float64) + offset_of(obj),
+        "points": laplacian.points + place,
         "areas": laplacian.areas,
         "normals": laplacian.normals,
         "mean_curvature": curvature,
@@ -263,9 +267,8 @@ def analysis_arrays(obj, laplacian, curvature, spectrum) -> dict:
 
 def attribute_arrays(obj):
     """Return the points in the world, and what this extension wrote by its names without the lb_."""
-    matrix = np.array(obj.matrix_world, dtype=np.float64)
-    place = matrix[:3, 3] + offset_of(obj)
-    arrays = {"points": own_positions(obj.data).astype(np.float64) @ matrix[:3, :3].T + place}
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    arrays = {"points": own_positions(obj.data).astype(np.float64) @ matrix.T + place_of(obj)}
     for attribute in obj.data.attributes:
         if attribute.name.startswith(PREFIX):
             arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)

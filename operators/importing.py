@@ -1,5 +1,6 @@
 """File > Import: points of files as objects, coordinates of any size with all their digits."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -9,7 +10,10 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..core import PointCloudError
 from ..core.files import READABLE, read_points
+from . import cache
 from .files import OFFSET, add_object, known_offset, offset_of
+from .job import JobOperator
+from .stages import Stages
 
 LASER = (".las", ".laz")  # listed, so that the error can say what to do with them
 OWN = (".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", *LASER)  # Blender reads the others by itself, too
@@ -19,7 +23,7 @@ if bpy.app.version >= (4, 5, 0):
     _KINDS.append(("POINTCLOUD", "Point Cloud", "A point cloud object, which shows its points by itself"))
 
 
-class MESHFREE_OT_import_points(bpy.types.Operator, ImportHelper):
+class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     """Import the points of PLY, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as objects of loose vertices"""
 
     bl_idname = "meshfree.import_points"
@@ -61,13 +65,11 @@ class MESHFREE_OT_import_points(bpy.types.Operator, ImportHelper):
     )
 
     @classmethod
-    def poll(cls, context):
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Points are imported in Object Mode. Switch to Object Mode first")
-            return False
-        return True
+    def obstacle(cls, context):
+        return "" if context.mode == "OBJECT" else "Points are imported in Object Mode. Switch to Object Mode first"
 
     def invoke(self, context, event):
+        self._attended = True
         return self.invoke_popup(context)
 
     def draw(self, context):
@@ -77,19 +79,31 @@ class MESHFREE_OT_import_points(bpy.types.Operator, ImportHelper):
             layout.prop(self, name)
 
     def execute(self, context):
-        paths = [Path(self.directory, item.name) for item in self.files if item.name] or [Path(self.filepath)]
+        attended = self.takes_window()
+        names = [item.name for item in self.files if item.name]
+        self._paths = paths = [Path(self.directory, name) for name in names] or [Path(self.filepath)]
         try:
-            tables = [read_points(path) for path in paths]
-        except (PointCloudError, OSError) as error:
+            if attended:
+                return self.start(context, [], lambda progress: _read_all(paths, progress))
+            with Stages(context.window_manager, self.bl_label) as stages:
+                tables = _read_all(paths, stages)
+        except PointCloudError as error:
             self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return self.finish(context, [], tables, stages.seconds)
+
+    def finish(self, context, objects, results, seconds):
+        """Add an object for each table."""
+        reason = self.obstacle(context)
+        if reason:  # while the files were read
+            self.report({"ERROR"}, reason)
             return {"CANCELLED"}
         for other in context.selected_objects:
             other.select_set(False)
         shared = known_offset(context.scene)
-        for path, table in zip(paths, tables, strict=True):
-            if self.up == "Y":
-                _turn_up(table)
-            obj = add_object(path.stem, table, context.collection, shared, self.attributes)
+        for path, table in zip(self._paths, results, strict=True):
+            turned = _turned_up(table) if self.up == "Y" else table
+            obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
             obj.select_set(True)
             context.view_layer.objects.active = obj
             self._tell(obj, table, shared)
@@ -112,12 +126,21 @@ class MESHFREE_OT_import_points(bpy.types.Operator, ImportHelper):
             self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
 
 
-def _turn_up(table):
-    """Turn what points along Y towards Z."""
-    table.points = _turned(table.points)
-    table.attributes = {
-        name: _turned(values) if values.ndim == 2 else values for name, values in table.attributes.items()
-    }
+def _read_all(paths, progress):
+    """Read some files, those that were just read from memory: Adjust Last Operation imports them again."""
+    tables = []
+    for number, path in enumerate(paths):
+        progress("Read", number / len(paths))
+        state = path.stat() if path.is_file() else None
+        key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
+        tables.append(cache.fetch(key, lambda path=path: read_points(path)))
+    return tables
+
+
+def _turned_up(table):
+    """Return a table with what points along Y turned towards Z."""
+    vectors = {name: _turned(values) for name, values in table.attributes.items() if values.ndim == 2}
+    return replace(table, points=_turned(table.points), attributes={**table.attributes, **vectors})
 
 
 def _turned(vectors):

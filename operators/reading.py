@@ -97,7 +97,11 @@ def read_points(context, obj) -> Reading:
             f'"{obj.name}" is scaled to nothing along an axis, so its {len(positions)} points have no area. Give it a'
             " scale above zero along each axis."
         )
-    return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), face_notice(obj))
+    notices = []
+    if obj.type == "MESH" and obj.data.polygons:
+        faces = len(obj.data.polygons)
+        notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
+    return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
 
 
 def seen_positions(context, obj):
@@ -106,13 +110,6 @@ def seen_positions(context, obj):
     if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
         return _evaluated_positions(context, obj)
     return own_positions(obj.data)
-
-
-def face_notice(obj) -> list:
-    """Return a notice that the faces of a mesh do not count; none if it has no faces."""
-    if obj.type != "MESH" or not obj.data.polygons:
-        return []
-    return [f"The mesh has {len(obj.data.polygons)} faces: it is taken as its {point_count(obj.data)} vertices."]
 
 
 def rim_points(obj):
@@ -197,6 +194,11 @@ def sharing_objects(obj) -> list:
     if obj.data.users == 1:  # as most of the time, for the panel's sake
         return []
     return [other for other in bpy.data.objects if other.data == obj.data and other != obj]
+
+
+def find_object(uid):
+    """Find an object by its session_uid, which neither undo nor another name changes; None if it is gone."""
+    return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
 
 
 def spacing(data) -> float:

@@ -69,7 +69,10 @@ def read_points(path) -> PointTable:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
     if not path.is_file():
         raise PointCloudError(f"There is no file {path}. Check its name and folder.")
-    table = check_table(_READERS[suffix](path), path)
+    try:
+        table = check_table(_READERS[suffix](path), path)
+    except OSError as error:
+        raise PointCloudError(f"{path} cannot be read: {error.strerror or error}. Check the file.") from error
     step = float(np.spacing(np.float32(np.abs(table.points).max())))
     if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
         table.notices.append(

@@ -3,6 +3,8 @@
 import os
 from contextlib import contextmanager
 
+from ..errors import PointCloudError
+
 
 @contextmanager
 def replacing(path):
@@ -18,11 +20,19 @@ def replacing(path):
     ------
     pathlib.Path
         With the same suffix, which numpy goes by.
+
+    Raises
+    ------
+    PointCloudError
+        The file or its folder cannot be written to.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
-        yield part
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            yield part
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise PointCloudError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error

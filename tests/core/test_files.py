@@ -298,7 +298,19 @@ def test_a_failed_writer_leaves_the_file(tmp_path):
             part.write_text("half")
             raise OSError("disk full")
 
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(PointCloudError, match="a.csv cannot be written: disk full"):
         fail()
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [Path(path)]
+
+
+def test_places_that_cannot_be_written_or_read(tmp_path):
+    (tmp_path / "a").write_text("")
+    with pytest.raises(PointCloudError, match="cannot be written"):
+        write_points(tmp_path / "a" / "b.ply", PointTable(POINTS))
+    (tmp_path / "c.ply").mkdir()
+    with pytest.raises(PointCloudError, match="cannot be written"):
+        write_points(tmp_path / "c.ply", PointTable(POINTS))
+    with pytest.raises(PointCloudError, match="no file"):
+        read_points(tmp_path / "c.ply")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "c.ply"]
