@@ -1,12 +1,39 @@
 """Mesh-Free Laplacian: areas, normals, curvature and vibration modes of point clouds, inside Blender."""
 
 
-def _classes():
-    from .operators import analyze, deform, fields, job, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, legend, panel, points, presets, range_selection, settings
-
-    modules = (
+def _modules():
+    """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
+    from .operators import (
+        analyze,
+        cache,
+        command,
+        deform,
+        exporting,
+        fields,
+        importing,
+        job,
+        minimal,
+        segment,
+        selecting,
+        smooth,
+        spectrum,
+    )
+    from .ui import (
+        applications,
+        colormap,
+        legend,
+        menus,
+        overlay,
+        panel,
+        points,
+        presets,
+        range_selection,
         settings,
+    )
+
+    return (
+        settings,
+        cache,
         job,
         analyze,
         spectrum,
@@ -16,6 +43,9 @@ def _classes():
         deform,
         minimal,
         selecting,
+        importing,
+        exporting,
+        command,
         colormap,
         legend,
         range_selection,
@@ -23,33 +53,28 @@ def _classes():
         panel,
         points,
         applications,
+        menus,
+        overlay,
     )
-    return [cls for module in modules for cls in module.CLASSES]
-
-
-def _attached():
-    """Return the modules that add more than classes to Blender."""
-    from .operators import cache, command, deform, job
-    from .ui import overlay, settings
-
-    return settings, command, deform, cache, job, overlay
 
 
 def register():
-    """Add the extension's classes, the settings of objects, handlers and the command line to Blender."""
+    """Add the extension's classes, the settings of objects, menus, handlers and the command line to Blender."""
     import bpy
 
-    for cls in _classes():
-        bpy.utils.register_class(cls)
-    for module in _attached():
-        module.attach()
+    for module in _modules():
+        for cls in getattr(module, "CLASSES", ()):
+            bpy.utils.register_class(cls)
+        if hasattr(module, "attach"):
+            module.attach()
 
 
 def unregister():
     """Take everything out again, in reverse order."""
     import bpy
 
-    for module in reversed(_attached()):
-        module.detach()
-    for cls in reversed(_classes()):
-        bpy.utils.unregister_class(cls)
+    for module in reversed(_modules()):
+        if hasattr(module, "detach"):
+            module.detach()
+        for cls in reversed(getattr(module, "CLASSES", ())):
+            bpy.utils.unregister_class(cls)

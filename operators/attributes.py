@@ -40,6 +40,12 @@ HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # f
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT  # of every analysis, as in the panel
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {NORMAL: "FLOAT_VECTOR", BOUNDARY: "BOOLEAN", COMPONENT: "INT", SEGMENT: "INT"}  # all others are FLOAT
+STORABLE = tuple(_STORAGE)
+
+
+def type_of(name: str) -> str:
+    """Type of one of this extension's attributes."""
+    return _TYPES.get(name, "FLOAT")
 
 
 def eigenvector_name(mode: int) -> str:
@@ -98,7 +104,7 @@ def write_attribute(data, name: str, values, data_type: str = ""):
     data_type : str
         As Blender names it; empty for that of our own results.
     """
-    data_type = data_type or _TYPES.get(name, "FLOAT")
+    data_type = data_type or type_of(name)
     storage = _STORAGE[data_type]
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
     if len(values) != storage.components * point_count(data):
