@@ -29,8 +29,8 @@ def dissection_order(matrix, points, report=lambda: None):
 
     Notes
     -----
-    Next to a minimum degree order, factors of 20,000 points take about the same room and two thirds of the time. And SuperLU
-    finds that order in one go that lets no other thread run, for a second and more with 100,000 points.
+    Next to a minimum degree order, factors of 20,000 points take about the same room and two thirds of the time. And
+    SuperLU finds that order in one go that lets no other thread run, for a second with 100,000 points.
     """
     count = len(points)
     pairs = sparse.triu(matrix, k=1).tocoo()
