@@ -160,6 +160,10 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
     bl_label = "Display"
     bl_order = 1  # below the tools
 
+    @classmethod
+    def poll(cls, context):
+        return not obstacle(context.object, ("OBJECT", "EDIT"))  # colors help to choose points there
+
     def draw(self, context):
         layout = self.layout
         obj = context.object

@@ -360,6 +360,7 @@ def test_pictures_are_arranged_from_the_right_without_overlap(overlay):
     sizes = [(100, 50), (200, 60), (300, 50)]
     assert overlay.arrange(sizes, 0, 0, 1000, 500) == [(900, 0), (700, 0), (400, 0)]
     assert overlay.arrange(sizes, 0, 10, 550, 500) == [(450, 10), (250, 10), (250, 70)]
+    assert overlay.arrange(sizes, 0, 10, 550, 500, indent=30) == [(450, 10), (250, 10), (220, 70)]
     assert overlay.arrange(sizes, 0, 0, 250, 500) == [(150, 0), (50, 50), None]
     assert overlay.arrange(sizes, 0, 0, 80, 500) == [None, None, None]
 
