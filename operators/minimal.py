@@ -6,7 +6,7 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 from ..core import PointCloudError, minimal_surface
 from . import cache
 from .application import ApplicationOperator
-from .groups import FIXED, chosen_members, is_chosen
+from .groups import FIXED, chosen_members, group_kind, is_chosen, search_group
 from .options import laplacian_options
 from .positions import check_movable, target_property, write_positions
 from .reading import read_points
@@ -20,6 +20,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.minimal_surface"
     bl_label = "Minimal Surface"
+    adjustable = ("target",)
 
     group: StringProperty(
         name="Fixed",
@@ -46,6 +47,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
         if is_chosen(obj, self.group, FIXED):
             fixed = chosen_members(obj, self.group, "Fixed")
         tolerance, steps, name = self.tolerance, self.steps, obj.name
+        kind = group_kind(obj)
 
         def compute(progress):
             rim = fixed
@@ -54,20 +56,10 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
                 if not rim.any():
                     raise PointCloudError(
                         f'"{name}" has no rim, so that its surface would shrink to nothing. Assign the points that stay'
-                        f' to the vertex group "{FIXED}".'
+                        f' to the {kind} "{FIXED}".'
                     )
-            count = 0
-
-            def stepped(step, points, area):
-                nonlocal count
-                count = step
-
-            def report(stage, fraction):
-                progress("Steps", min(1.0, (count + fraction) / steps))
-
-            return reading, minimal_surface(
-                reading.points, rim, tolerance, steps, options, callback=stepped, progress=report
-            )
+            settings = (reading.points, rim, tolerance, steps, options)
+            return reading, cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
 
         return compute
 
@@ -83,12 +75,24 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
             f" ({film.reason})"
         )
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop_search(self, "group", context.object, "vertex_groups")
+    def draw_settings(self, context, layout):
+        search_group(layout, self, "group", context.object)
         for name in ("tolerance", "steps", "target"):
             layout.prop(self, name)
+
+
+def _shrink(points, rim, tolerance, steps, options, progress):
+    """Compute the film that a rim spans, with the share of the steps as progress."""
+    count = 0
+
+    def stepped(step, points, area):
+        nonlocal count
+        count = step
+
+    def report(stage, fraction):
+        progress("Steps", min(1.0, (count + fraction) / steps))
+
+    return minimal_surface(points, rim, tolerance, steps, options, callback=stepped, progress=report)
 
 
 CLASSES = (MESHFREE_OT_minimal_surface,)

@@ -3,6 +3,8 @@
 import bpy
 
 from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number, point_count
+from ..operators.groups import search_group
+from ..operators.job import running
 from ..operators.reading import is_display, obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
 from .display import find_display, label, range_node, shown_attribute, step_colors
@@ -44,11 +46,15 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         obj = context.object
+        job = running()
+        if job is not None:
+            _draw_job(layout, job)
         reason = obstacle(obj)
         if reason:
             column = layout.column(align=True)
             for sentence in reason.split(". "):
                 column.label(text=sentence)
+            layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
         _draw_summary(layout, obj)
         row = layout.row(align=True)
@@ -58,6 +64,15 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             _draw_result(layout, obj.meshfree)
             if is_stale(obj, glance=True):
                 layout.label(text="Points or settings changed: analyze again", icon="ERROR")
+
+
+def _draw_job(layout, job):
+    """Draw what is computed, how far it is, and how to stop it."""
+    column = layout.column(align=True)
+    column.label(text=f"{job.label} (Esc to Stop)")
+    row = column.row(align=True)
+    row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
+    row.operator("meshfree.stop", text="", icon="X")
 
 
 def _draw_result(layout, result):
@@ -79,8 +94,8 @@ def _draw_result(layout, result):
 def _draw_summary(layout, obj):
     mesh = obj.data
     column = layout.column(align=True)
-    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon="OUTLINER_OB_MESH")
-    if mesh.polygons:
+    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon=f"OUTLINER_OB_{obj.type}")
+    if obj.type == "MESH" and mesh.polygons:
         column.label(text=f"Faces not used: {len(mesh.polygons):,}", icon="INFO")
     scale = obj.matrix_world.to_scale()
     if max(abs(factor - 1.0) for factor in scale) > 1e-5:
@@ -117,7 +132,7 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
             for name in group:
                 row = column.row(align=True)
                 if name == "rim_group":
-                    row.prop_search(obj.meshfree, name, obj, "vertex_groups")
+                    search_group(row, obj.meshfree, name, obj)
                 else:
                     row.active = name != "rims" or not obj.meshfree.rim_group  # a named rim is not looked for
                     row.prop(obj.meshfree, name)

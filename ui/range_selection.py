@@ -1,11 +1,10 @@
 """Selects points by the values that are shown as colors."""
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ..core import PointCloudError
-from ..operators.selecting import SelectionOperator, select
+from ..operators.selecting import SelectionOperator, select, selection
 from .display import label, shown_attribute, shown_range, shown_values
 
 
@@ -34,7 +33,10 @@ class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
         name="Extend", description="Keep what is selected already", default=False, options={"SKIP_SAVE"}
     )
 
-    def change(self, context, obj):
+    surface = False
+    needs_selection = False
+
+    def prepare(self, context, obj):
         bounds = shown_range(obj)
         if bounds is None:
             raise PointCloudError(
@@ -49,15 +51,13 @@ class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
         if self.invert:
             chosen = ~chosen
         if self.extend:
-            before = np.empty(len(chosen), dtype=bool)
-            obj.data.vertices.foreach_get("select", before)
-            chosen |= before
+            chosen |= selection(obj)
         if not chosen.any():
             raise PointCloudError(
                 f"No value of {label(shown_attribute(obj))} lies {'outside' if self.invert else 'from'}"
                 f" {self.low:g} to {self.high:g}. Widen the range."
             )
-        return select(context, obj, chosen)
+        return lambda: select(context, obj, chosen)
 
 
 CLASSES = (MESHFREE_OT_select_by_range,)
