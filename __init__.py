@@ -3,7 +3,7 @@
 
 def _classes():
     from .operators import analyze, deform, fields, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, panel, settings
+    from .ui import applications, colormap, menus, panel, settings
 
     modules = (
         settings,
@@ -18,6 +18,7 @@ def _classes():
         colormap,
         panel,
         applications,
+        menus,
     )
     return [cls for module in modules for cls in module.CLASSES]
 
@@ -27,11 +28,12 @@ def register():
     import bpy
 
     from .operators import command, deform
-    from .ui import settings
+    from .ui import menus, settings
 
     for cls in _classes():
         bpy.utils.register_class(cls)
     settings.attach()
+    menus.attach()
     command.attach()
     deform.attach()
 
@@ -41,10 +43,11 @@ def unregister():
     import bpy
 
     from .operators import cache, command, deform
-    from .ui import settings
+    from .ui import menus, settings
 
     deform.detach()
     command.detach()
+    menus.detach()
     settings.detach()
     for cls in reversed(_classes()):
         bpy.utils.unregister_class(cls)
