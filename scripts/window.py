@@ -60,6 +60,7 @@ class Window:
         self._screen = self._blender = None
         self._variables = {
             "HOME": str(place.inside(self.folder)),
+            "TMPDIR": str(place.inside(self.folder)),
             "BLENDER_USER_RESOURCES": str(place.inside(self.folder / "resources")),
             "LIBGL_ALWAYS_SOFTWARE": "1",
             "MESA_SHADER_CACHE_DIR": str(place.cache),  # what is compiled once need not be compiled in every session
@@ -226,7 +227,7 @@ class Window:
         self.move(x, y)
         self._xdotool("click", str(_BUTTONS[button]))
 
-    def drag(self, start, end, button="left", steps=8):
+    def drag(self, start, end, button="left", steps=4):
         """Drag from one place to another."""
         self.move(*start)
         self._xdotool("mousedown", str(_BUTTONS[button]))
@@ -303,9 +304,23 @@ class Window:
         self.settle()
         self.pictures.mkdir(parents=True, exist_ok=True)
         path = self.pictures / f"{name}.png"
-        options = ["-crop", "{2}x{3}+{0}+{1}".format(*map(round, crop)), "+repage"] if crop else []
-        path.write_bytes(self.run("import", "-window", "root", *options, "png:-"))
+        path.write_bytes(self._grab("png", crop))
         return path
+
+    def pixels(self, crop=None):
+        """Read the colors on the screen, (height, width, 3) from 0 to 255; crop is x, y, width, height."""
+        import numpy as np
+
+        self.settle()
+        kind, size, depth, data = self._grab("ppm", crop).split(b"\n", 3)
+        width, height = map(int, size.split())
+        if (kind, depth) != (b"P6", b"255"):
+            raise WindowError("The picture is none of 8 bits")
+        return np.frombuffer(data, np.uint8).reshape(height, width, 3)
+
+    def _grab(self, kind, crop):
+        options = ["-crop", "{2}x{3}+{0}+{1}".format(*map(round, crop)), "+repage"] if crop else []
+        return self.run("import", "-window", "root", *options, "-depth", "8", f"{kind}:-")
 
 
 def _end(process):

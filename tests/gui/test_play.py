@@ -1,14 +1,16 @@
 """What an artist does, with real keys and a real mouse."""
 
+import numpy as np
 import pytest
 
-RESULTS = "result_names(bpy.context.object)"
 ANALYZED = "'lb_area' in bpy.context.object.data.attributes"
 WORKING = "[operator.bl_idname for operator in main_window().modal_operators]"
+UNCHANGED = "everything(bpy.data.objects['Cloud']) == before"
+MODES = [f"lb_eigenvector_{mode:03}" for mode in range(1, 11)]
 
 
 def add_sphere(gui, count=3000, noise=0.0):
-    """Add a selected cloud on a sphere, as a step that can be undone to."""
+    """Add a selected cloud on a sphere, as a step that one can undo to."""
     gui.python(
         f"""
 points = sphere_points({count})
@@ -20,20 +22,31 @@ before = everything(bpy.context.object)
     )
 
 
-def run(gui, name):
-    """Start an operator by the search, and confirm its dialog."""
+def start(gui, name):
+    """Start an operator by the search, confirm its dialog, and see it work."""
     gui.search(name)
     gui.key("Return")
+    gui.wait_until(WORKING)
+
+
+def finish(gui, seconds=90):
+    """Wait until no operator works."""
+    gui.wait_until(f"not {WORKING}", seconds)
 
 
 def shading(gui, kind):
     gui.python(f"view3d()[0].spaces.active.shading.type = {kind!r}")
 
 
+def colored(pixels):
+    """Count the pixels that are not gray."""
+    return np.count_nonzero(np.ptp(pixels.astype(int), axis=2) > 40)
+
+
 class TestAnalysis:
     """From a cloud to colors and back."""
 
-    def test_analyze_by_the_button(self, gui):
+    def test_analyze(self, gui):
         add_sphere(gui)
         shading(gui, "WIREFRAME")  # without shaders to compile
         gui.open_tab()
@@ -44,22 +57,96 @@ class TestAnalysis:
         gui.point_at_view()
         gui.key("ctrl+z")
         gui.wait_until(f"not {ANALYZED}")
-        assert gui.python("everything(bpy.context.object) == before")
+        assert gui.python(UNCHANGED)
         gui.key("ctrl+shift+z")
         gui.wait_until(ANALYZED)
-        assert gui.python(RESULTS) == gui.python("RESULTS") + gui.python(
-            "[f'lb_eigenvector_{index:03}' for index in range(1, 11)]"
-        )
+        assert gui.python("result_names(bpy.context.object)") == sorted([*gui.python("RESULTS"), *MODES])
+
+    def test_colors_after_four_clicks(self, gui):
+        add_sphere(gui)
+        x, y, width, height = gui.region()
+        middle = (x + 0.2 * width, y + 0.2 * height, 0.5 * width, 0.7 * height)
+        gui.key("Home")
+        gray = colored(gui.pixels(middle))
+        gui.open_tab()  # a key and a click
+        gui.press("meshfree.analyze")  # a click
+        gui.wait_until(ANALYZED, 60)
+        gui.settle()
+        assert gui.python("view3d()[0].spaces.active.shading.type") == "MATERIAL"
+        assert colored(gui.pixels(middle)) > gray + 20000
 
 
 class TestJobs:
     """Work that goes on while the window stays alive."""
 
-    def test_escape_leaves_the_object_as_it_was(self, gui):
+    @pytest.fixture
+    def job(self, gui):
         add_sphere(gui, 20000, 0.005)
-        run(gui, "Smooth Points")
-        gui.wait_until(WORKING)
-        gui.shot("working")
-        gui.key("Escape")
-        gui.wait_until(f"not {WORKING}", 10)
-        assert gui.python("everything(bpy.context.object) == before")
+        gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'job.blend')")
+        start(gui, "Smooth Points")
+        return gui
+
+    def test_escape(self, job):
+        job.shot("working")
+        job.key("Escape")
+        finish(job, 10)
+        assert job.python(UNCHANGED)
+
+    def test_orbit_while_it_works(self, job):
+        view = "[list(row) for row in view3d()[0].spaces.active.region_3d.view_matrix]"
+        before = job.python(view)
+        x, y = job.view_center()
+        job.drag((x, y), (x + 100, y + 30), "middle")
+        assert job.python(WORKING)
+        assert job.python(view) != before
+        finish(job)
+        assert job.python("bpy.context.object.data.shape_keys.key_blocks.keys()") == ["Basis", "Smooth"]
+
+
+class TestDeformation:
+    """From points to a bent cloud in a picture."""
+
+    def box(self, gui, low, high):
+        """Select the points between two heights by Box Select."""
+        corners = [gui.python(f"on_screen(({x}, 0.0, {z}))") for x, z in ((-1.2, low), (1.2, high))]
+        gui.point_at_view()
+        gui.key("alt+a", "b")
+        gui.drag(*corners)
+
+    def test_bind_move_update_save_and_render(self, gui):
+        add_sphere(gui)
+        gui.key("KP_1", "Home", "Tab")
+        gui.wait_until("bpy.context.object.mode == 'EDIT'")
+        self.box(gui, 0.8, 1.1)
+        gui.shot("selected")
+        gui.search("Mesh-Free Handle")
+        self.box(gui, -1.1, -0.8)
+        gui.search("Mesh-Free Anchor")
+        gui.key("Tab")
+        gui.wait_until("bpy.context.object.mode == 'OBJECT'")
+        count = "sum(any(item.group == {} for item in vertex.groups) for vertex in bpy.context.object.data.vertices)"
+        height = "local_points(bpy.context.object)[:, 2]"
+        assert gui.python(count.format(0)) == pytest.approx(gui.python(f"({height} > 0.8).sum()"), abs=10)
+        assert gui.python(count.format(1)) == pytest.approx(gui.python(f"({height} < -0.8).sum()"), abs=10)
+
+        start(gui, "Bind")
+        finish(gui)
+        gui.click(*gui.python("on_screen(bpy.data.objects['Cloud Handle'].location)"))
+        assert gui.python("bpy.context.object.name") == "Cloud Handle"
+        gui.key("g", "x", "1", "Return")
+        assert gui.python("bpy.data.objects['Cloud Handle'].location.x") == pytest.approx(1.0, abs=0.1)
+        gui.shot("handle_moved")
+
+        gui.python("bpy.context.view_layer.objects.active = bpy.data.objects['Cloud']")
+        start(gui, "Mesh-Free Update")
+        finish(gui)
+        moved = "round(float(attribute(bpy.data.objects['Cloud'], 'lb_displacement').max()), 3)"
+        assert gui.python(moved) == pytest.approx(1.0, abs=0.02)
+        gui.shot("updated")
+        gui.point_at_view()
+        gui.key("ctrl+z")
+        gui.wait_until(f"{moved} == 0.0")
+        gui.key("ctrl+shift+z")
+        gui.wait_until(f"{moved} > 0.9")
+
+        gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'bent.blend')")
