@@ -3,7 +3,7 @@
 
 def _classes():
     from .operators import analyze, deform, fields, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, menus, panel, settings
+    from .ui import applications, colormap, menus, panel, points, settings
 
     modules = (
         settings,
@@ -17,6 +17,7 @@ def _classes():
         selecting,
         colormap,
         panel,
+        points,
         applications,
         menus,
     )

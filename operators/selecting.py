@@ -8,12 +8,14 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 
 from ..core import PointCloudError, grow
 from .application import operator_reader
+from .attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
+from .groups import HANDLE, chosen_members, group_weights, has_group, members
 from .ready import ReadyOperator
 from .stages import Stages
 
 
 class SelectionOperator(ReadyOperator):
-    """An operator on the selected vertices of the active mesh, in Edit Mode or Object Mode."""
+    """An operator on the selected points of the active object, in Edit Mode or Object Mode."""
 
     works_in = ("OBJECT", "EDIT")
 
@@ -50,22 +52,29 @@ def object_mode(context, obj):
 
 
 def selected(obj):
-    """Read which vertices are selected, (n,) bool."""
-    chosen = np.empty(len(obj.data.vertices), dtype=bool)
-    obj.data.vertices.foreach_get("select", chosen)
+    """Read which points are selected, (n,) bool."""
+    chosen = np.ones(point_count(obj.data), dtype=bool)
+    if obj.type == "MESH":
+        obj.data.vertices.foreach_get("select", chosen)
+    elif SELECTION in obj.data.attributes:  # without it Blender takes all points of a point cloud as selected
+        chosen = read_attribute(obj.data, SELECTION).astype(bool)
     if not chosen.any():
         raise PointCloudError(f'No points of "{obj.name}" are selected. Select some in Edit Mode.')
     return chosen
 
 
 def select(context, obj, chosen) -> str:
-    """Select these vertices, (n,) bool, and no others, in the mode that selects vertices; hidden ones never."""
-    hidden = np.empty(len(chosen), dtype=bool)
-    obj.data.vertices.foreach_get("hide", hidden)
-    shown = chosen & ~hidden
-    context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
-    obj.data.vertices.foreach_set("select", shown)
-    obj.data.update()
+    """Select these points, (n,) bool, and no others, in the mode that selects vertices; hidden ones never."""
+    shown = chosen
+    if obj.type == "MESH":
+        hidden = np.empty(len(chosen), dtype=bool)
+        obj.data.vertices.foreach_get("hide", hidden)
+        shown = chosen & ~hidden
+        context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
+        obj.data.vertices.foreach_set("select", shown)
+    else:
+        write_attribute(obj.data, SELECTION, shown, "BOOLEAN")
+    tag_changed(obj.data)
     return f"{np.count_nonzero(shown):,} of {len(shown):,} points are selected"
 
 
@@ -162,6 +171,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             ("FIXED", "Fixed", "The rim that a minimal surface keeps"),
             ("SOURCE", "Source", "Points from which distances are measured"),
             ("VALUE", "Value", "Points with given values of a field, as weights"),
+            ("RIM", "Rim", "Points at which the surface ends; it becomes the Rim Group of the settings"),
         ],
         default="HANDLE",
     )
@@ -193,6 +203,18 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     " the other side."
                 )
         name = self.name or self.role.title()
+        if obj.type == "MESH":
+            self.assign_vertices(obj, name, chosen)
+        else:
+            self.assign_points(obj, name, chosen)
+        if self.role == "RIM" and self.action != "REMOVE":
+            obj.meshfree.rim_group = name
+        members(obj, name)  # for the panel's count
+        verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
+        return f'{np.count_nonzero(chosen):,} points {verb} the group "{name}"'
+
+    def assign_vertices(self, obj, name, chosen):
+        """Change a vertex group."""
         if name in obj.data.attributes:
             raise PointCloudError(
                 f'"{obj.name}" has an attribute named "{name}", and vertex groups share their names. Choose another'
@@ -211,19 +233,62 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             group = obj.vertex_groups.new(name=name)
         if self.action == "REPLACE":
             group.remove(range(len(chosen)))
-        members = np.flatnonzero(chosen).tolist()
+        indices = np.flatnonzero(chosen).tolist()
         if self.action == "REMOVE":
-            group.remove(members)
+            group.remove(indices)
         else:
-            group.add(members, self.weight, "REPLACE")
+            group.add(indices, self.weight, "REPLACE")
         obj.vertex_groups.active = group
-        verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
-        return f'{len(members):,} points {verb} the group "{name}"'
+
+    def assign_points(self, obj, name, chosen):
+        """Change the attribute of a point cloud that stands for a group."""
+        exists = has_group(obj, name)
+        if name in obj.data.attributes and not exists:
+            raise PointCloudError(
+                f'"{obj.name}" has an attribute named "{name}", which holds neither truth values nor numbers on points.'
+                " Choose another name, or rename the attribute."
+            )
+        if not exists and self.action == "REMOVE":
+            raise PointCloudError(f'"{obj.name}" has no group named "{name}" to remove points from. Choose another.')
+        weights = group_weights(obj, name) if exists else np.zeros(len(chosen))
+        if self.action == "REPLACE":
+            weights[:] = 0.0
+        weights[chosen] = 0.0 if self.action == "REMOVE" else self.weight
+        weighted = (exists and obj.data.attributes[name].data_type == "FLOAT") or not np.isin(weights, (0.0, 1.0)).all()
+        write_attribute(obj.data, name, weights, "FLOAT" if weighted else "BOOLEAN")
+        tag_changed(obj.data)
+
+
+class MESHFREE_OT_select_rim(SelectionOperator, bpy.types.Operator):
+    """Select the points at the rims of the surface, as they are found or named by the Rim Group"""
+
+    bl_idname = "meshfree.select_rim"
+    bl_label = "Select Rim"
+
+    def change(self, context, obj):
+        rim = analyzed(context, obj)[1].boundary
+        if not rim.any():
+            raise PointCloudError(f'"{obj.name}" has no rim: its surface is closed, or Rims is off in the settings.')
+        return select(context, obj, rim)
+
+
+class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
+    """Select the points of a group that the tools take"""
+
+    bl_idname = "meshfree.select_group"
+    bl_label = "Select Group"
+
+    name: StringProperty(name="Name", description="Name of the group", default=HANDLE, maxlen=63)
+
+    def change(self, context, obj):
+        return select(context, obj, chosen_members(obj, self.name, "Name"))
 
 
 CLASSES = (
     MESHFREE_OT_select_grow,
     MESHFREE_OT_select_component,
     MESHFREE_OT_select_front,
+    MESHFREE_OT_select_rim,
+    MESHFREE_OT_select_group,
     MESHFREE_OT_group_from_selection,
 )

@@ -23,7 +23,9 @@ OPERATORS = (
     "segment",
     "select_component",
     "select_front",
+    "select_group",
     "select_grow",
+    "select_rim",
     "separate_by_segment",
     "signature",
     "smooth",
@@ -112,6 +114,18 @@ def test_panel_follows_the_order_of_work():
     assert "1:  0" in texts
     assert any(text.startswith("and 5 more, up to") for text in texts)
     assert not any("analyze again" in text for text in texts)
+
+
+def test_panel_counts_the_points_of_each_group():
+    obj = add_object(sphere_points())
+    assert draw().count("0") == 6
+    obj.data.vertices.foreach_set("select", np.arange(1000) < 12)
+    bpy.ops.meshfree.group_from_selection(role="ANCHOR")
+    texts = draw()
+    assert texts[texts.index("Assign to Anchors") + 1] == "12"
+    bpy.ops.meshfree.group_from_selection(role="ANCHOR", action="REMOVE")
+    texts = draw()
+    assert texts[texts.index("Assign to Anchors") + 1] == "0"
 
 
 def test_panel_marks_stale_results():

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, everything, local_points, sphere_points
+from tests.blender.clouds import add_object, everything, grid_points, local_points, sphere_points
 
 
 @pytest.fixture
@@ -183,3 +183,27 @@ def test_a_mesh_that_another_object_edits(obj):
         bpy.ops.meshfree.select_component()
     bpy.context.view_layer.objects.active = obj
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_the_rim_becomes_the_rim_group():
+    points, outermost = grid_points()
+    obj = add_object(points)
+    bpy.ops.meshfree.select_rim()
+    assert (selected(obj) == outermost).all()
+    bpy.ops.meshfree.group_from_selection(role="RIM")
+    assert obj.meshfree.rim_group == "Rim"
+    assert (in_group(obj, "Rim") == outermost).all()
+    choose(obj, lambda points: points[:, 0] < 1.0)
+    bpy.ops.meshfree.select_group(name="Rim")
+    assert (selected(obj) == outermost).all()
+
+
+def test_a_closed_surface_has_no_rim_to_select():
+    add_object(sphere_points(900))
+    with pytest.raises(RuntimeError, match="has no rim"):
+        bpy.ops.meshfree.select_rim()
+
+
+def test_a_group_that_is_missing_is_not_selected(obj, mode):
+    with pytest.raises(RuntimeError, match='no vertex group named "Handle"'):
+        bpy.ops.meshfree.select_group()
