@@ -8,6 +8,14 @@ WORKING = "[operator.bl_idname for operator in main_window().modal_operators]"
 UNCHANGED = "everything(bpy.data.objects['Cloud']) == before"
 MODES = [f"lb_eigenvector_{mode:03}" for mode in range(1, 11)]
 
+HEIGHTS = """
+members = {group.name: [] for group in bpy.context.object.vertex_groups}
+for vertex in bpy.context.object.data.vertices:
+    for item in vertex.groups:
+        members[bpy.context.object.vertex_groups[item.group].name].append(vertex.co.z)
+[(min(members[name]), max(members[name])) for name in ("Handle", "Anchor")]
+"""
+
 
 def add_sphere(gui, count=3000, noise=0.0):
     """Add a selected cloud on a sphere, as a step that one can undo to."""
@@ -77,30 +85,50 @@ class TestAnalysis:
 
 
 class TestJobs:
-    """Work that goes on while the window stays alive."""
+    """Work that goes on while the window stays alive, and what ends it."""
 
-    @pytest.fixture
-    def job(self, gui):
+    @pytest.fixture(params=["Analyze Points", "Smooth Points"])
+    def job(self, gui, request):
         add_sphere(gui, 20000, 0.005)
         gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'job.blend')")
-        start(gui, "Smooth Points")
+        start(gui, request.param)
         return gui
 
     def test_escape(self, job):
         job.shot("working")
         job.key("Escape")
-        finish(job, 10)
+        finish(job, 5)
         assert job.python(UNCHANGED)
 
-    def test_orbit_while_it_works(self, job):
+    def test_undo_takes_back_what_was_before(self, job):
+        job.key("ctrl+z")
+        finish(job, 5)
+        assert job.python("bpy.data.objects.keys()") == []
+        job.key("ctrl+shift+z")
+        job.wait_until("bpy.data.objects.keys() == ['Cloud']")
+        assert job.python(UNCHANGED)
+
+    def test_delete(self, job):
+        job.key("Delete")
+        finish(job, 5)
+        assert job.python("bpy.data.objects.keys()") == []
+
+    def test_new_file(self, job):
+        job.key("ctrl+n", "Return")
+        job.wait_until("not bpy.data.filepath")
+        finish(job, 5)
+        assert job.python("bpy.data.objects.keys()") == ["Camera", "Cube", "Light"]
+
+    def test_orbit_while_it_works(self, gui):
+        add_sphere(gui, 8000)
+        start(gui, "Smooth Points")
         view = "[list(row) for row in view3d()[0].spaces.active.region_3d.view_matrix]"
-        before = job.python(view)
-        x, y = job.view_center()
-        job.drag((x, y), (x + 100, y + 30), "middle")
-        assert job.python(WORKING)
-        assert job.python(view) != before
-        finish(job)
-        assert job.python("bpy.context.object.data.shape_keys.key_blocks.keys()") == ["Basis", "Smooth"]
+        before = gui.python(view)
+        x, y = gui.view_center()
+        gui.drag((x, y), (x + 100, y + 30), "middle")
+        assert gui.python(view) != before
+        finish(gui)
+        assert gui.python("bpy.context.object.data.shape_keys.key_blocks.keys()") == ["Basis", "Smooth"]
 
 
 class TestDeformation:
@@ -124,10 +152,9 @@ class TestDeformation:
         gui.search("Mesh-Free Anchor")
         gui.key("Tab")
         gui.wait_until("bpy.context.object.mode == 'OBJECT'")
-        count = "sum(any(item.group == {} for item in vertex.groups) for vertex in bpy.context.object.data.vertices)"
-        height = "local_points(bpy.context.object)[:, 2]"
-        assert gui.python(count.format(0)) == pytest.approx(gui.python(f"({height} > 0.8).sum()"), abs=10)
-        assert gui.python(count.format(1)) == pytest.approx(gui.python(f"({height} < -0.8).sum()"), abs=10)
+        [(low, high), (lowest, highest)] = gui.python(HEIGHTS)
+        assert (low, high) == pytest.approx((0.8, 1.0), abs=0.02)
+        assert (lowest, highest) == pytest.approx((-1.0, -0.8), abs=0.02)
 
         start(gui, "Bind")
         finish(gui)
