@@ -2,11 +2,12 @@
 
 
 def _classes():
-    from .operators import analyze, deform, fields, minimal, segment, selecting, smooth, spectrum
+    from .operators import analyze, deform, fields, job, minimal, segment, selecting, smooth, spectrum
     from .ui import applications, colormap, menus, panel, points, settings
 
     modules = (
         settings,
+        job,
         analyze,
         spectrum,
         smooth,
@@ -28,7 +29,7 @@ def register():
     """Add the extension's classes, the settings of objects and the command line to Blender."""
     import bpy
 
-    from .operators import command, deform
+    from .operators import cache, command, deform, job
     from .ui import menus, settings
 
     for cls in _classes():
@@ -37,19 +38,22 @@ def register():
     menus.attach()
     command.attach()
     deform.attach()
+    cache.attach()
+    job.attach()
 
 
 def unregister():
-    """Take everything out again, in reverse order, and give back the memory of the cached operators."""
+    """Take everything out again, in reverse order."""
     import bpy
 
-    from .operators import cache, command, deform
+    from .operators import cache, command, deform, job
     from .ui import menus, settings
 
+    job.detach()
+    cache.detach()
     deform.detach()
     command.detach()
     menus.detach()
     settings.detach()
     for cls in reversed(_classes()):
         bpy.utils.unregister_class(cls)
-    cache.clear()

@@ -12,7 +12,7 @@ from . import files, options
 from .analyze import WRITE_LIMIT, analyze_object
 from .application import done
 from .attributes import point_count
-from .reading import obstacle
+from .reading import obstacle, sharing_objects
 from .result import analysis_names, check_writable, write_result
 
 # Operators that need nothing picked, beside the analysis.
@@ -188,6 +188,8 @@ def _process(path, arguments) -> dict:
 def _analyze(obj, arguments, output):
     check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
     analysis = analyze_object(bpy.context, obj, arguments.modes)
+    if sharing_objects(obj):  # by choice, or it would not be writable
+        obj.data = obj.data.copy()
     write_result(obj, analysis, arguments.write_limit)
     if output is not None:
         files.save(output, obj, files.analysis_arrays(obj, analysis))

@@ -141,9 +141,7 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
         counts = f"{len(deformer.handles):,} handles and {len(deformer.anchors):,} anchors"
         return f"{obj.name}: {counts} are bound. {way}, then update"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
+    def draw_settings(self, context, layout):
         for name in ("handles", "anchors"):
             search_group(layout, self, name, context.object)
         for name in ("rotation_aware", "soft"):
@@ -176,6 +174,7 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
     bl_idname = "meshfree.deform_update"
     bl_label = "Update"
     only_active = True
+    asks = False
     writes = (DISPLACEMENT,)
 
     steps: IntProperty(

@@ -192,6 +192,11 @@ def sharing_objects(obj) -> list:
     return [other for other in bpy.data.objects if other.data == obj.data and other != obj]
 
 
+def find_object(uid):
+    """Find an object by its session_uid, which neither undo nor another name changes; None if it is gone."""
+    return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
+
+
 def spacing(data) -> float:
     """Typical distance between neighbouring points in local lengths, from 10,000 of them at most; 0 if unknown.
 

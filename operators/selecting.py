@@ -7,17 +7,39 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
 from ..core import PointCloudError, grow
-from .application import operator_reader
+from .application import naming, operator_reader
 from .attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from .groups import HANDLE, chosen_members, group_weights, has_group, members
-from .ready import ReadyOperator
+from .job import JobOperator
 from .stages import Stages
 
 
-class SelectionOperator(ReadyOperator):
-    """An operator on the selected points of the active object, in Edit Mode or Object Mode."""
+class SelectionOperator(JobOperator):
+    """An operator on the selected points of the active object, in Edit Mode or Object Mode.
+
+    What takes long, the operator on the points, is computed beside the window, where somebody waits there; the rest is
+    done when it is kept.
+    """
 
     works_in = ("OBJECT", "EDIT")
+    surface = True  # whether it needs the operator on the points
+
+    def invoke(self, context, event):
+        obj = context.object
+        if bpy.app.background or not self.surface:
+            return self.execute(context)
+        try:
+            with object_mode(context, obj), naming(obj.name):
+                _, operator = operator_reader(context, obj)
+                return self.start(context, [obj], operator)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    def finish(self, context, objects, results, seconds):
+        """Do it with the selection of now: the operator is kept."""
+        with context.temp_override(object=objects[0]):
+            return self.execute(context)
 
     def execute(self, context):
         obj = context.object
@@ -81,7 +103,7 @@ def select(context, obj, chosen) -> str:
 def analyzed(context, obj):
     """Read the points and return them with their operator, which is kept from the last analysis if nothing changed."""
     reading, operator = operator_reader(context, obj)
-    with Stages(context.window_manager) as stages:
+    with Stages(context.window_manager, "Points") as stages:
         return reading, operator(stages)
 
 
@@ -192,6 +214,11 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
     front_only: BoolProperty(
         name="Front Only", description="Leave out points whose normals point away from the viewer", default=False
     )
+
+    @property
+    def surface(self):
+        """Whether it needs the operator on the points, for their normals."""
+        return self.front_only
 
     def change(self, context, obj):
         chosen = selected(obj)

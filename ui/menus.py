@@ -10,7 +10,7 @@ _TOOLS = (
     ("deform_bind", "deform_update"),
     ("minimal_surface",),
 )
-_SELECTING = ("select_grow", "select_component", "select_front")
+_SELECTING = ("select_grow", "select_component", "select_front", "select_rim")
 
 
 class MESHFREE_MT_object(bpy.types.Menu):

@@ -4,6 +4,7 @@ import bpy
 
 from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.groups import search_group
+from ..operators.job import running
 from ..operators.reading import is_display, obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
 from .display import find_display, input_property, label, range_node, shown_attribute, step_colors
@@ -43,6 +44,9 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         obj = context.object
+        job = running()
+        if job is not None:
+            _draw_job(layout, job)
         reason = obstacle(obj)
         if reason:
             column = layout.column(align=True)
@@ -57,6 +61,15 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             _draw_result(layout, obj.meshfree)
             if is_stale(obj, glance=True):
                 layout.label(text="Points or settings changed: analyze again", icon="ERROR")
+
+
+def _draw_job(layout, job):
+    """Draw what is computed, how far it is, and how to stop it."""
+    column = layout.column(align=True)
+    column.label(text=f"{job.label} (Esc to Stop)")
+    row = column.row(align=True)
+    row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
+    row.operator("meshfree.stop", text="", icon="X")
 
 
 def _draw_result(layout, result):

@@ -1,0 +1,101 @@
+"""Whether a worker thread is enough: ``python -m benchmarks.responsiveness [points ...]``.
+
+While a computation runs in a thread, another thread that wants Python's lock every few milliseconds measures how long
+it is kept waiting: so long would Blender's window stand still. The time between two reports of progress is how long a
+thread goes on computing, unseen, after Esc has ended the operator.
+"""
+
+import sys
+import time
+from threading import Event, Thread
+
+import numpy as np
+
+import core
+
+from .samplings import random_sphere
+from .tables import Table
+
+SIZES = (20_000, 100_000)
+_NAP = 0.002  # seconds between two looks at the clock
+
+
+class Gaps:
+    """The longest time between two calls, and what went on in it."""
+
+    def __init__(self):
+        self.longest, self.stage = 0.0, ""
+        self._last, self._now = time.perf_counter(), ""
+
+    def __call__(self, stage="", _fraction=0.0):
+        """Note the time since the last report."""
+        now = time.perf_counter()
+        if now - self._last > self.longest:
+            self.longest, self.stage = now - self._last, self._now
+        self._last, self._now = now, stage
+
+
+def watch(compute):
+    """Run a function of a progress callback in a thread and return seconds, both kinds of gaps, and its result."""
+    reports, held, over, result = Gaps(), Gaps(), Event(), []
+
+    def run():
+        result.append(compute(reports))
+        reports()
+        over.set()
+
+    began = time.perf_counter()
+    Thread(target=run, daemon=True).start()
+    while not over.is_set():
+        held(reports._now)
+        time.sleep(_NAP)
+    return time.perf_counter() - began, held, reports, result[0]
+
+
+def works(points):
+    """Name and function of every computation; those after the first share its operator."""
+    kept = []
+
+    def analysis(progress):
+        laplacian = core.build_laplacian(points, options=core.LaplacianOptions(orient=True), progress=progress)
+        progress("Curvature", 1.0)
+        core.mean_curvature(laplacian)
+        kept.append(laplacian)
+
+    x = points[:, 0]
+    ends = (x > np.quantile(x, 0.98)) | (x < np.quantile(x, 0.02))
+    yield "analysis", analysis
+    yield "50 modes", lambda progress: kept[0].eigenpairs(50, progress=progress)
+    yield "remove noise", lambda progress: core.fair_points(kept[0], progress=progress)
+    yield (
+        "bind",
+        lambda progress: core.Deformer(
+            kept[0], np.flatnonzero(ends & (x > 0.0)), np.flatnonzero(ends & (x < 0.0)), progress=progress
+        ),
+    )
+    yield "harmonic field", lambda progress: core.harmonic_field(kept[0], ends, np.sign(x[ends]), progress=progress)
+    yield "geodesic distance", lambda progress: core.geodesic_distance(kept[0], ends, progress=progress)
+    yield "6 parts", lambda progress: core.segment(kept[0], 6, progress=progress)
+
+
+def responsiveness(sizes=SIZES):
+    """Seconds for which each computation keeps the window waiting, and between its reports of progress."""
+    rows = []
+    for count in sizes:
+        for name, compute in works(random_sphere(count)):
+            seconds, held, reports, _ = watch(compute)
+            rows.append(
+                [f"{name}, {count:,} points", f"{seconds:.1f}", f"{held.longest:.2f}", held.stage]
+                + [f"{reports.longest:.2f}", reports.stage]
+            )
+            print(rows[-1], flush=True)
+    return Table(
+        "Responsiveness",
+        ["computation", "seconds", "window waits at most", "in", "no report for at most", "in"],
+        rows,
+        "Random points on a sphere; every computation runs in a thread beside one that wants Python's lock.",
+    )
+
+
+if __name__ == "__main__":
+    print(responsiveness([int(size) for size in sys.argv[1:]] or SIZES).markdown())
