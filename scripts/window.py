@@ -10,7 +10,7 @@ Use it like this, in a script for `python scripts/play.py SCRIPT`, where `gui` i
     gui.open_tab("Mesh-Free")
     gui.press("meshfree.analyze")               # a click on the button of this operator in the sidebar
     gui.wait_until("'lb_area' in bpy.context.object.data.attributes", 60)
-    gui.python("attribute('lb_area').sum()")    # the value of the last line comes back
+    gui.python("attribute(bpy.context.object, 'lb_area').sum()")  # the value of the last line comes back
     gui.shot("analyzed")                        # a picture of the screen in build/gui/
 
 Places on the screen are counted in pixels from its upper left corner. Code runs on Blender's main thread between two

@@ -67,9 +67,9 @@ def button_under_mouse(region_type="UI"):
     return bpy.context.window_manager.clipboard
 
 
-def attribute(name, obj=None):
+def attribute(obj, name):
     """Values of an attribute of the points, as the object has it now."""
-    data = (obj or bpy.context.view_layer.objects.active).data
+    data = obj.data
     layer = data.attributes[name]
     key, size, dtype = {
         "FLOAT_VECTOR": ("vector", 3, np.float32),

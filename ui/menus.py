@@ -9,6 +9,7 @@ _TOOLS = (
     ("geodesic_distance", "harmonic_field"),
     ("deform_bind", "deform_update"),
     ("minimal_surface",),
+    ("stop",),
 )
 _SELECTING = ("select_grow", "select_component", "select_front", "select_rim")
 
