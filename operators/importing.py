@@ -63,6 +63,11 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Import the other columns too: colors, normals, intensity and so on",
         default=True,
     )
+    frame: BoolProperty(
+        name="Frame in View",
+        description="Let the 3D views look at the imported points, unless a script imports them",
+        default=True,
+    )
 
     @classmethod
     def obstacle(cls, context):
@@ -75,15 +80,17 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        for name in ("up", "kind", "attributes"):
+        for name in ("up", "kind", "attributes", "frame"):
             layout.prop(self, name)
 
     def execute(self, context):
         attended = self.takes_window()
+        self._framed = False
         names = [item.name for item in self.files if item.name]
         self._paths = paths = [Path(self.directory, name) for name in names] or [Path(self.filepath)]
         try:
             if attended:
+                self._framed = self.frame
                 return self.start(context, [], lambda progress: _read_all(paths, progress))
             with Stages(context.window_manager, self.bl_label) as stages:
                 tables = _read_all(paths, stages)
@@ -113,6 +120,8 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             meshes = [obj.data for obj in context.selected_objects]
             bpy.ops.object.convert(target="POINTCLOUD")
             bpy.data.batch_remove(meshes)
+        if self._framed:
+            _frame_selected(context)
         return {"FINISHED"}
 
     def _tell(self, obj, table, shared):
@@ -124,6 +133,15 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
         if shared is not None and (offset != shared).any():
             self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
+
+
+def _frame_selected(context):
+    """Let all 3D views of the window look at what is selected."""
+    for area in context.window.screen.areas:
+        if area.type == "VIEW_3D":
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            with context.temp_override(area=area, region=region):
+                bpy.ops.view3d.view_selected()
 
 
 def _read_all(paths, progress):
