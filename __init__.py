@@ -18,10 +18,23 @@ def _modules():
         smooth,
         spectrum,
     )
-    from .ui import applications, colormap, menus, panel, points, settings
+    from .ui import (
+        applications,
+        colormap,
+        legend,
+        menus,
+        overlay,
+        panel,
+        points,
+        presets,
+        range_selection,
+        settings,
+    )
 
     return (
         settings,
+        cache,
+        job,
         analyze,
         spectrum,
         smooth,
@@ -32,14 +45,16 @@ def _modules():
         selecting,
         importing,
         exporting,
+        command,
         colormap,
+        legend,
+        range_selection,
+        presets,
         panel,
         points,
         applications,
         menus,
-        command,
-        cache,
-        job,
+        overlay,
     )
 
 

@@ -10,7 +10,9 @@ import pytest
 from tests.blender.clouds import add_object, grid_points, sphere_points
 
 OPERATORS = (
+    "add_preset",
     "analyze",
+    "apply_preset",
     "colormap",
     "deform_bind",
     "deform_update",
@@ -21,9 +23,11 @@ OPERATORS = (
     "group_from_selection",
     "harmonic_field",
     "import_points",
+    "legend",
     "minimal_surface",
     "mode_shape",
     "segment",
+    "select_by_range",
     "select_component",
     "select_front",
     "select_group",
@@ -52,7 +56,10 @@ class Layout:
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         self.texts.append(text)
 
-    def prop(self, data, path, text=None):
+    def menu(self, idname, text=""):
+        self.texts.append(text or getattr(bpy.types, idname).bl_label)
+
+    def prop(self, data, path, text=None, toggle=False):
         data.path_resolve(path)
         self.texts.append(text or path)
 
@@ -182,8 +189,9 @@ def test_panel_for_each_kind_of_display(name):
     bpy.ops.meshfree.spectrum(count=3)
     bpy.ops.meshfree.colormap(attribute=name)
     texts = draw()
-    assert "Point Radius" in texts
-    assert ("Range From" in texts) == (name not in {"lb_normal", "lb_boundary", "lb_component"})
+    assert "point_size" in texts
+    assert ("color_map" in texts) == (name != "lb_normal")
+    assert ("range_low" in texts) == (name not in {"lb_normal", "lb_boundary", "lb_component"})
 
 
 def test_all_operators_and_panels_are_known_to_these_tests():
