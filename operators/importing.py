@@ -5,6 +5,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
@@ -129,10 +130,15 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         for notice in table.notices:
             self.report({"WARNING"}, notice)
         offset = offset_of(obj)
-        shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
-        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
+        if offset.any():
+            shift = ", ".join(f"{-value:.10g}" for value in offset)
+            text = rpt_("{}: {:,} points, shifted by ({})").format(obj.name, len(table.points), shift)
+        else:
+            text = rpt_("{}: {:,} points").format(obj.name, len(table.points))
+        self.report({"INFO"}, text)
         if shared is not None and (offset != shared).any():
-            self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
+            text = rpt_("{} is too far from the points imported before to share their shift").format(obj.name)
+            self.report({"WARNING"}, text)
 
 
 def _frame_selected(context):
