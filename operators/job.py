@@ -83,7 +83,7 @@ class Job(StageTimes):
         super().__init__()
         self.label, self.snapshots = label, snapshots
         self.stage, self.reason, self._stop = "Start", "", Event()
-        self._timer = None
+        self._timer, self._shown = None, ""
         self._future = Future()
         # Not of a pool: Blender must not wait for it at its end.
         self._thread = Thread(target=self._run, args=(compute,), name=label, daemon=True)
@@ -126,8 +126,10 @@ class Job(StageTimes):
     def show(self, context):
         """Tell in the status bar how far it is, and let the panel do so too."""
         text = iface_("{}: {}, {:.0%}    Esc to stop").format(iface_(self.label), iface_(self.stage), self.fraction)
-        context.workspace.status_text_set(text)
-        _redraw_panels(context)
+        if text != self._shown:
+            self._shown = text
+            context.workspace.status_text_set(text)
+            _redraw_panels(context)
 
     def open(self, context):
         """Begin to show it in the window and to look at it there again and again."""
@@ -141,7 +143,7 @@ class Job(StageTimes):
             return
         _jobs.remove(self)
         context.window_manager.event_timer_remove(self._timer)
-        for workspace in bpy.data.workspaces:  # another one may be open than when it was shown
+        for workspace in bpy.data.workspaces:  # another one may be open now than when it was shown
             workspace.status_text_set(None)
         _redraw_panels(context)
 
@@ -150,7 +152,7 @@ def _redraw_panels(context):
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
-                area.tag_redraw()
+                next(region for region in area.regions if region.type == "UI").tag_redraw()
 
 
 class JobOperator(ReadyOperator):

@@ -18,8 +18,8 @@ ALL_NAMES = (*NAMES, "rim_group", "use_modifiers")
 PRESETS = {
     "DEFAULT": DEFAULTS,
     "PAPER": LaplacianOptions.paper(),
-    "CLEAN": LaplacianOptions(projection="off", neighbors=60),
-    "NOISY": LaplacianOptions(projection="quadric", neighbors=150),
+    "CLEAN": LaplacianOptions(projection="off"),
+    "NOISY": LaplacianOptions(bandwidth_factor=1.5),  # halves the scatter of curvature, at 1 % of the area
 }
 
 

@@ -1,6 +1,8 @@
 """What an object shows: its display modifier, with the size of the points, and its material."""
 
-from ..operators.attributes import BOUNDARY, COMPONENT, DISTANCE, read_attribute
+import numpy as np
+
+from ..operators.attributes import BOUNDARY, COMPONENT, DISPLACEMENT, DISTANCE, read_attribute
 from ..operators.reading import DISPLAY_TAG, is_display
 from . import colormaps
 from .nodes import ATTRIBUTE, COLORS, RANGE
@@ -75,14 +77,23 @@ def shown_values(obj):
         The attribute on show is gone, or holds neither numbers nor vectors on points.
     """
     name = shown_attribute(obj)
-    return numbers(read_attribute(obj.data, name), obj.meshfree.component) if name else None
+    return numbers(read_attribute(obj.data, name), component(name, obj.meshfree)) if name else None
 
 
-def numbers(values, component: str):
+def component(name: str, settings) -> str:
+    """What is shown of an attribute if it holds vectors: "DIRECTION", "LENGTH", "X", "Y" or "Z"."""
+    if settings.component != "AUTO":
+        return settings.component
+    return "LENGTH" if name == DISPLACEMENT else "DIRECTION"
+
+
+def numbers(values, part: str):
     """Return what of an attribute's values are the numbers to show; None for directions."""
     if values.ndim == 1:
         return values
-    return None if component == "DIRECTION" else values[:, "XYZ".index(component)]
+    if part == "LENGTH":
+        return np.linalg.norm(values, axis=1)
+    return None if part == "DIRECTION" else values[:, "XYZ".index(part)]
 
 
 def without_unreached(name: str, values):

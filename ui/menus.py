@@ -1,8 +1,54 @@
-"""Entries in File > Import and File > Export, and dropping files onto a 3D view."""
+"""Menus of the 3D view, where the search (F3) finds operators; File > Import and Export; dropped files."""
 
 import bpy
 
 from ..operators.importing import OWN
+
+_TOOLS = (
+    ("analyze", "spectrum", "colormap"),
+    ("smooth", "mode_shape"),
+    ("segment", "separate_by_segment", "signature"),
+    ("geodesic_distance", "harmonic_field"),
+    ("deform_bind", "deform_update"),
+    ("minimal_surface",),
+    ("stop",),
+)
+_SELECTING = ("select_grow", "select_component", "select_front", "select_rim")
+
+
+class MESHFREE_MT_object(bpy.types.Menu):
+    """All tools for point clouds"""
+
+    bl_label = "Mesh-Free"
+
+    def draw(self, context):
+        for index, names in enumerate(_TOOLS):
+            if index:
+                self.layout.separator()
+            for name in names:
+                self.layout.operator(f"meshfree.{name}")
+
+
+class MESHFREE_MT_points(bpy.types.Menu):
+    """Selecting points, and the groups that the tools take"""
+
+    bl_label = "Mesh-Free"
+
+    def draw(self, context):
+        for name in _SELECTING:
+            self.layout.operator(f"meshfree.{name}")
+        self.layout.separator()
+        self.layout.operator_menu_enum("meshfree.group_from_selection", "role")
+
+
+def _draw_object(menu, context):
+    menu.layout.separator()
+    menu.layout.menu(MESHFREE_MT_object.__name__)
+
+
+def _draw_points(menu, context):
+    menu.layout.separator()
+    menu.layout.menu(MESHFREE_MT_points.__name__)
 
 
 def _draw_import(self, _context):
@@ -29,16 +75,26 @@ class MESHFREE_FH_points(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-CLASSES = (MESHFREE_FH_points,)
+def _entries():
+    """Menus and what is added to them; point clouds have an Edit Mode from Blender 4.5 on."""
+    yield bpy.types.VIEW3D_MT_object, _draw_object
+    yield bpy.types.VIEW3D_MT_edit_mesh, _draw_points
+    if hasattr(bpy.types, "VIEW3D_MT_edit_pointcloud"):
+        yield bpy.types.VIEW3D_MT_edit_pointcloud, _draw_points
+    yield bpy.types.TOPBAR_MT_file_import, _draw_import
+    yield bpy.types.TOPBAR_MT_file_export, _draw_export
 
 
 def attach():
-    """Add the entries to the menus."""
-    bpy.types.TOPBAR_MT_file_import.append(_draw_import)
-    bpy.types.TOPBAR_MT_file_export.append(_draw_export)
+    """Add the entries to Blender's menus."""
+    for menu, draw in _entries():
+        menu.append(draw)
 
 
 def detach():
     """Take the entries away again."""
-    bpy.types.TOPBAR_MT_file_import.remove(_draw_import)
-    bpy.types.TOPBAR_MT_file_export.remove(_draw_export)
+    for menu, draw in _entries():
+        menu.remove(draw)
+
+
+CLASSES = (MESHFREE_MT_object, MESHFREE_MT_points, MESHFREE_FH_points)

@@ -77,7 +77,7 @@ def color_by_number(material, name, component, color_map, low, high, settings):
     material : bpy.types.Material
     name : str
         The attribute.
-    component : {"", "X", "Y", "Z"}
+    component : {"", "LENGTH", "X", "Y", "Z"}
         What of a vector is the number.
     color_map : str
         One of the names of `colormaps.colors`.
@@ -120,7 +120,11 @@ def _begin(material, name, kind):
 def _build_number_tree(tree, component, repeated, hiding):
     """Add the nodes from a number to its colour: range, map, iso lines, and what lies beyond the range."""
     number = tree.nodes[ATTRIBUTE].outputs["Fac"]
-    if component:
+    if component == "LENGTH":
+        length = add_node(tree, "ShaderNodeVectorMath", 1, 0, operation="LENGTH")
+        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], length.inputs[0])
+        number = length.outputs["Value"]
+    elif component:
         separate = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0)
         tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], separate.inputs[0])
         number = separate.outputs[component]

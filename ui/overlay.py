@@ -14,6 +14,7 @@ from .scale import shown_scale
 from .units import EIGENVALUE_POWER, unit
 
 _GAP = 10.0  # between pictures, and to the border
+_GIZMOS = 80.0  # width of the view's own controls, at the right edge above the lowest row
 _handlers = []
 _counted = {}  # the last histogram, by what it is of
 
@@ -63,7 +64,7 @@ def _histogram(obj, scale):
     return _counted[key]
 
 
-def arrange(sizes, left, bottom, right, top) -> list:
+def arrange(sizes, left, bottom, right, top, indent=0.0) -> list:
     """Place pictures from the lower right corner to the left, in rows upwards.
 
     Parameters
@@ -72,6 +73,8 @@ def arrange(sizes, left, bottom, right, top) -> list:
         Widths and heights.
     left, bottom, right, top : float
         The room there is.
+    indent : float
+        What upper rows leave free at the right.
 
     Returns
     -------
@@ -80,8 +83,8 @@ def arrange(sizes, left, bottom, right, top) -> list:
     """
     places, x, y, row = [], right, bottom, 0.0
     for width, height in sizes:
-        if x < right and x - width < left:
-            x, y, row = right, y + row, 0.0
+        if row and x - width < left:
+            x, y, row = right - indent, y + row, 0.0
         if x - width < left or y + height > top:
             places.append(None)
             continue
@@ -121,6 +124,7 @@ def _draw():
     gap = scale * _GAP
     left, bottom, right, top = _free_room(context.area, context.region)
     sizes = [(scale * picture.width + gap, scale * picture.height + gap) for picture in found]
-    for picture, place in zip(found, arrange(sizes, left + gap, bottom + gap, right, top), strict=True):
+    places = arrange(sizes, left + gap, bottom + gap, right, top, indent=scale * _GIZMOS)
+    for picture, place in zip(found, places, strict=True):
         if place is not None:
             canvas.draw(picture, *place, scale)

@@ -3,7 +3,7 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number, point_count
+from ..operators.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.groups import search_group
 from ..operators.job import running
 from ..operators.reading import is_display, obstacle, sharing_objects
@@ -178,6 +178,10 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
     bl_label = "Display"
     bl_order = 1  # below the tools
 
+    @classmethod
+    def poll(cls, context):
+        return not obstacle(context.object, ("OBJECT", "EDIT"))  # colors help to choose points there
+
     def draw(self, context):
         layout = self.layout
         obj = context.object
@@ -194,7 +198,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         layout.operator("meshfree.colormap", text="Update Colors")
         layout.use_property_split = True
         layout.use_property_decorate = False
-        if shown == NORMAL:
+        if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
             layout.prop(obj.meshfree, "component")
         if range_node(obj) is not None:
             _draw_colors(layout, obj)

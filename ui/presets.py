@@ -10,8 +10,8 @@ from ..operators.ready import ReadyOperator
 _BUILT_IN = (
     ("DEFAULT", "Default", "What serves most scans"),
     ("PAPER", "Paper", "As in the paper: one bandwidth for all points, areas with constraints, no corrections"),
-    ("CLEAN", "Clean CAD", "For exact points with sharp edges: each point is taken where it is, and reach is short"),
-    ("NOISY", "Noisy Scan", "For rough scans: noise is always smoothed, and the reach is wide"),
+    ("CLEAN", "Clean CAD", "For exact points with sharp edges: each point is taken where it is"),
+    ("NOISY", "Noisy Scan", "For rough scans: a wider reach gives calmer curvature and less detail"),
 )
 
 

@@ -241,12 +241,14 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         name="Vector",
         description="What of a vector is shown",
         items=(
+            ("AUTO", "Automatic", "The length of displacements, the direction of normals"),
             ("DIRECTION", "Direction", "Red, green and blue for the directions x, y and z"),
+            ("LENGTH", "Length", "The length as a number"),
             ("X", "X", "The x component as a number"),
             ("Y", "Y", "The y component as a number"),
             ("Z", "Z", "The z component as a number"),
         ),
-        default="DIRECTION",
+        default="AUTO",
         update=_recolor,
     )
     point_size: FloatProperty(

@@ -9,6 +9,7 @@ from ..operators.reading import DISPLAY_TAG, fingerprint, spacing
 from . import colormaps, legend
 from .display import (
     NAME,
+    component,
     find_display,
     find_material,
     get_input,
@@ -104,7 +105,8 @@ def _color(obj, name, values):
         material = bpy.data.materials.new(f"{NAME} {obj.name}")
         material[DISPLAY_TAG] = True
         set_input(find_display(obj), "Material", material)
-    shown = numbers(values, settings.component)
+    part = component(name, settings)
+    shown = numbers(values, part)
     if shown is None:
         color_by_direction(material, name)
     else:
@@ -114,8 +116,7 @@ def _color(obj, name, values):
         )
         if settings.range_mode != "LOCKED":
             settings.range_low, settings.range_high = low, high
-        component = settings.component if values.ndim > 1 else ""
-        color_by_number(material, name, component, color_map, low, high, settings)
+        color_by_number(material, name, part if values.ndim > 1 else "", color_map, low, high, settings)
     obj.update_tag()
     legend.renew(obj)
     redraw()

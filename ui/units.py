@@ -19,6 +19,7 @@ _ADAPTIVE = {
     "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
 }
+_LEFT_OPEN = ("ADAPTIVE", "METERS", "FEET")  # the latter two stand in new scenes, without anybody's choice
 _RAISED = {1: "", 2: "²"}
 
 
@@ -36,7 +37,7 @@ def unit(power: int, greatest: float, settings):
         As of `attribute_power`.
     greatest : float
         The greatest number to be written, in lengths of the world: the first unit in which it reaches 1 is taken where
-        the scene leaves it open, of lengths and areas.
+        the scene leaves it open, of lengths and areas, as Blender writes them too.
     settings : bpy.types.UnitSettings
         Of the scene.
 
@@ -49,7 +50,7 @@ def unit(power: int, greatest: float, settings):
     """
     if power == 0 or settings.system == "NONE":
         return "", 1.0
-    if settings.length_unit in _METERS:
+    if settings.length_unit not in _LEFT_OPEN:
         names = (settings.length_unit,)
     elif power > 0:
         names = _ADAPTIVE[settings.system]

@@ -188,6 +188,8 @@ def scene_units(system="METRIC", length_unit="ADAPTIVE", scale_length=1.0):
         ("lb_area", 2.5, {}, "m²", 1.0),
         ("lb_area", 2.5e-4, {}, "cm²", 1e4),
         ("lb_distance", 0.02, {}, "cm", 100.0),
+        ("lb_distance", 0.02, {"length_unit": "METERS"}, "cm", 100.0),
+        ("lb_distance", 0.02, {"length_unit": "KILOMETERS"}, "km", 0.001),
         ("lb_distance", 5000.0, {}, "km", 0.001),
         ("lb_distance", 1e-9, {}, "µm", 1e6),
         ("lb_area", 2.5, {"length_unit": "MILLIMETERS"}, "mm²", 1e6),

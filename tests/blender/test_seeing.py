@@ -229,6 +229,34 @@ def test_colormap_takes_settings_and_keeps_them(display, obj):
     assert (kept.color_map, kept.reverse, kept.range_mode) == ("MAGMA", True, "DATA")
 
 
+@pytest.mark.parametrize(("part", "index"), [("X", 0), ("Y", 1), ("Z", 2), ("LENGTH", None)])
+def test_numbers_of_vectors(display, obj, tmp_path, part, index):
+    vectors = np.tile(np.float32([3.0, 0.0, -4.0]), (1000, 1))
+    obj.data.attributes.new("way", "FLOAT_VECTOR", "POINT").data.foreach_set("vector", vectors.reshape(-1))
+    bpy.ops.meshfree.colormap(attribute="way", color_map="COOL_WARM", radius=0.1)
+    assert display.range_node(obj) is None  # directions
+    assert display.shown_values(obj) is None
+    obj.meshfree.range_low, obj.meshfree.range_high = -5.0, 5.0
+    obj.meshfree.range_mode = "LOCKED"
+    obj.meshfree.component = part
+    number = 5.0 if index is None else vectors[0, index]
+    assert (display.shown_values(obj) == number).all()
+    (
+        red,
+        _,
+        blue,
+    ) = median_color(tmp_path / "way.png")
+    assert np.sign(red - blue) == np.sign(number) or (number == 0.0 and abs(red - blue) < 0.1)
+
+
+def test_displacements_are_shown_by_their_length(display, obj):
+    obj.data.attributes.new("lb_displacement", "FLOAT_VECTOR", "POINT")
+    bpy.ops.meshfree.colormap(attribute="lb_displacement")
+    assert display.range_node(obj) is not None
+    obj.meshfree.component = "DIRECTION"
+    assert display.range_node(obj) is None
+
+
 def test_setting_of_a_duplicate_changes_only_its_own_colors(display, obj):
     other = obj.copy()
     other.data = obj.data.copy()
@@ -360,6 +388,7 @@ def test_pictures_are_arranged_from_the_right_without_overlap(overlay):
     sizes = [(100, 50), (200, 60), (300, 50)]
     assert overlay.arrange(sizes, 0, 0, 1000, 500) == [(900, 0), (700, 0), (400, 0)]
     assert overlay.arrange(sizes, 0, 10, 550, 500) == [(450, 10), (250, 10), (250, 70)]
+    assert overlay.arrange(sizes, 0, 10, 550, 500, indent=30) == [(450, 10), (250, 10), (220, 70)]
     assert overlay.arrange(sizes, 0, 0, 250, 500) == [(150, 0), (50, 50), None]
     assert overlay.arrange(sizes, 0, 0, 80, 500) == [None, None, None]
 
