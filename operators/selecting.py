@@ -34,10 +34,16 @@ class SelectionOperator(JobOperator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
 
+    def complete(self, context, job):
+        obj = job.snapshots[0].find()
+        if obj is None:
+            return super().complete(context, job)
+        with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):
+            return super().complete(context, job)
+
     def finish(self, context, objects, results, seconds):
         """Do it with the selection of now: the operator is kept."""
-        with context.temp_override(object=objects[0]):
-            return self.execute(context)
+        return self.execute(context)
 
     def execute(self, context):
         obj = context.object

@@ -28,6 +28,7 @@ OPERATORS = (
     "signature",
     "smooth",
     "spectrum",
+    "stop",
 )
 PANELS = ("main", "settings", "spectrum", "display", "points", "shape", "segment", "fields", "deform", "minimal")
 
@@ -59,6 +60,10 @@ class Layout:
         kind = getattr(bpy.ops.meshfree, idname.removeprefix("meshfree.")).get_rna_type()
         self.texts.append(text if text is not None else kind.name)
         return SimpleNamespace(**dict.fromkeys(item.identifier for item in kind.properties))
+
+    def progress(self, text, factor):
+        assert 0.0 <= factor <= 1.0
+        self.texts.append(text)
 
     def operator_menu_enum(self, idname, path):
         assert path in self.operator(idname).__dict__
@@ -200,7 +205,7 @@ def test_all_operators_and_panels_are_known_to_these_tests():
 def test_dialogs_show_every_setting(name):
     add_object(sphere_points())
     operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
-    if not hasattr(operator, "draw"):
+    if not getattr(operator, "asks", False):
         return
     properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if item.type != "POINTER"]
     values = {item.identifier: item.default for item in properties}
@@ -208,8 +213,35 @@ def test_dialogs_show_every_setting(name):
     variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]
     texts = []
     for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
-        operator.draw(Settings(layout=Layout(texts), **values | variant), bpy.context)
+        operator.draw_settings(Settings(**values | variant), bpy.context, Layout(texts))
     assert set(texts) == set(values)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_adjust_last_operation_offers_what_is_quick(name):
+    operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
+    if not hasattr(operator, "adjustable"):
+        return
+    properties = getattr(bpy.ops.meshfree, name).get_rna_type().properties
+    values = {item.identifier: item.default for item in properties if item.type != "POINTER"}
+    for variant in ({}, {"keep": "AREA"}, {"source": "x"}):
+        settings = Settings(**values | {key: value for key, value in variant.items() if key in values})
+        quick = operator.adjustable
+        quick = quick.fget(settings) if isinstance(quick, property) else quick
+        texts = []
+        settings.layout, settings.adjustable, settings.is_repeated = Layout(texts), quick, lambda context: True
+        operator.draw(settings, bpy.context)
+        assert texts == list(quick)
+        assert not {"method", "modes", "parts", "wavelength", "handles", "tolerance"} & set(quick)
+
+
+def test_panel_while_something_runs(extension, monkeypatch):
+    add_object(sphere_points())
+    panel = importlib.import_module(f"{extension.__name__}.ui.panel")
+    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(label="Smooth Points", stage="Filter", fraction=0.25))
+    texts = draw()
+    assert "Smooth Points (Esc to Stop)" in texts
+    assert "Filter: 25%" in texts
 
 
 def test_names_and_tooltips():
@@ -237,7 +269,7 @@ def test_every_option_of_core_is_a_setting_with_its_default(extension, core):
 
 
 def test_operators_can_be_undone_and_found():
-    for name in OPERATORS:
+    for name in set(OPERATORS) - {"stop"}:
         operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
         assert operator.bl_options == {"REGISTER", "UNDO"}
         assert operator.bl_idname == f"meshfree.{name}"
