@@ -175,6 +175,7 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
     bl_label = "Update"
     only_active = True
     asks = False
+    adjustable = ("steps",)
     writes = (DISPLACEMENT,)
 
     steps: IntProperty(
