@@ -172,8 +172,8 @@ class Deformer:
         result = self.points.copy()
         loose = self._row < 0
         result[self._held[loose]] = target[loose]
-        self.steps, self.converged = 0, True
         if not len(self._moving):
+            self.steps, self.converged = 0, True
             return result
         turn, shift = self._fit_parts(target)
         frame = np.einsum("nab,nb->na", turn, self._rest) + shift
@@ -193,17 +193,19 @@ class Deformer:
             now = place(0.0)
         else:
             now = _check_positions(start, len(self.points), "starting points", "point")[self._moving]
+        step, converged = 0, True
         if self.rotation_aware and steps > 0:
             at_rest = np.einsum("nab,nb->na", turn, self._differential)
-            self.converged, mixing, begin = False, _Mixing(), now
-            for self.steps in range(1, int(steps) + 1):
-                report("Deform", self.steps / (steps + 1.0))
+            converged, mixing, begin = False, _Mixing(), now
+            for step in range(1, int(steps) + 1):
+                report("Deform", step / (steps + 1.0))
                 turned = np.einsum("abn,nb->na", self._rotations(begin), self._differential)
                 now = place(self._divergence @ (turned - at_rest))
                 if np.abs(now - begin).max() <= rtol * self._size:
-                    self.converged = True
+                    converged = True
                     break
                 begin = mixing.mix(begin, now)
+        self.steps, self.converged = step, converged  # at once, for solves may run in several threads
         result[self._moving] = now
         return result
 

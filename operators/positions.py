@@ -5,7 +5,8 @@ from bpy.props import EnumProperty
 
 from ..core import PointCloudError
 from .attributes import own_positions
-from .reading import is_display, key_positions
+from .modifiers import is_own
+from .reading import key_positions
 
 TARGETS = (
     ("SHAPE_KEY", "Shape Key", "Add a shape key, whose value mixes the result with the points as they were"),
@@ -20,7 +21,7 @@ def target_property():
 
 def check_movable(obj, target: str):
     """Refuse an object whose vertices cannot be moved to given places, before anything is computed."""
-    if obj.meshfree.use_modifiers and any(not is_display(item) for item in obj.modifiers):
+    if obj.meshfree.use_modifiers and any(not is_own(item) for item in obj.modifiers):
         raise PointCloudError(
             f'The points of "{obj.name}" were read after its modifiers, and cannot be written back before them. Turn'
             " off Use Modifiers, or apply the modifiers."

@@ -10,15 +10,8 @@ from scipy.spatial import cKDTree
 
 from ..core import PointCloudError, check_points
 from .attributes import own_positions, point_count
+from .modifiers import is_own
 from .rim import rim_checksum, rim_points
-
-DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
-
-
-def is_display(modifier) -> bool:
-    """Whether a modifier is the extension's own display."""
-    return modifier.type == "NODES" and modifier.node_group is not None and DISPLAY_TAG in modifier.node_group
-
 
 def obstacle(obj, modes=("OBJECT",)) -> str:
     """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
@@ -105,8 +98,8 @@ def key_positions(key):
 
 
 def _evaluated_positions(context, obj):
-    """Positions after shape keys, and after the modifiers if the settings ask for them; never after our own display."""
-    with _left_out([item for item in obj.modifiers if is_display(item) or not obj.meshfree.use_modifiers]):
+    """Positions after shape keys, and after the modifiers if the settings ask for them; never after our own."""
+    with _left_out([item for item in obj.modifiers if is_own(item) or not obj.meshfree.use_modifiers]):
         evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
         if not evaluated.is_evaluated:
             raise PointCloudError(
@@ -142,14 +135,16 @@ def metric(obj):
     return matrix.T @ matrix
 
 
-def fingerprint(obj, glance=False) -> str:
-    """Checksum of the positions, shape keys and rim group.
+def fingerprint(obj, glance=False, left_out=()) -> str:
+    """Checksum of the positions but those of some points, of shape keys and of the rim group.
 
     A glance is quick enough for a panel, a few milliseconds for 1 million points, and may see a change of the rim
     group some seconds late. Of modifiers, if they are used, both see which ones there are, not their settings.
     """
     mesh = obj.data
-    checksum = zlib.crc32(own_positions(mesh))
+    positions = own_positions(mesh)
+    positions[np.asarray(left_out, dtype=int)] = 0.0
+    checksum = zlib.crc32(positions)
     keys = mesh.shape_keys
     if keys is not None:
         state = [keys.use_relative, keys.eval_time, obj.show_only_shape_key and obj.active_shape_key_index]
@@ -158,7 +153,7 @@ def fingerprint(obj, glance=False) -> str:
             checksum = zlib.crc32(key_positions(block), checksum)
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.use_modifiers:
-        state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_display(item)]
+        state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_own(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.rim_group:
         checksum = zlib.crc32(repr(rim_checksum(obj, glance)).encode(), checksum)

@@ -3,7 +3,8 @@
 import bpy
 
 from ..operators.attributes import BOUNDARY, COMPONENT, DISTANCE, MEAN_CURVATURE, read_attribute
-from ..operators.reading import DISPLAY_TAG, is_display, spacing
+from ..operators.modifiers import DISPLAY_TAG, get_input, is_display, set_input
+from ..operators.reading import spacing
 from .nodes import ATTRIBUTE, COLORS, RANGE, color_by, display_group
 
 NAME = "Mesh-Free Display"
@@ -105,27 +106,3 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
         set_input(modifier, "Material", material)
     color_by(material, name, values, obj.meshfree)
     obj.update_tag()
-
-
-def get_input(modifier, name: str):
-    """Value of an input of the display modifier."""
-    data, path = input_property(modifier, name)
-    return getattr(data, path) if path == "value" else modifier[path[2:-2]]
-
-
-def set_input(modifier, name: str, value):
-    """Set an input of the display modifier."""
-    data, path = input_property(modifier, name)
-    if path == "value":
-        data.value = value
-    else:
-        data[path[2:-2]] = value
-
-
-def input_property(modifier, name: str):
-    """Return data and property path of an input of the display modifier, as `layout.prop` takes them."""
-    sockets = modifier.node_group.interface.items_tree
-    identifier = next(item.identifier for item in sockets if item.name == name and item.in_out == "INPUT")
-    if hasattr(modifier, "properties"):  # Blender 5.2 on
-        return getattr(modifier.properties.inputs, identifier), "value"
-    return modifier, f'["{identifier}"]'

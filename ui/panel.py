@@ -3,9 +3,10 @@
 import bpy
 
 from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number, point_count
-from ..operators.reading import is_display, obstacle, sharing_objects
+from ..operators.modifiers import input_property, is_own
+from ..operators.reading import obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
-from .display import find_display, input_property, label, range_node, shown_attribute, step_colors
+from .display import find_display, label, range_node, shown_attribute, step_colors
 
 _LISTED = 20  # eigenvalues in the panel
 _SETTINGS = (  # what belongs together
@@ -85,7 +86,7 @@ def _draw_summary(layout, obj):
         shown = ", ".join(f"{factor:.4g}" for factor in scale)
         column.label(text=f"Object scale ({shown}) is applied", icon="INFO")
         column.label(text="to lengths and areas", icon="BLANK1")
-    modifiers = [modifier for modifier in obj.modifiers if not is_display(modifier)]
+    modifiers = [modifier for modifier in obj.modifiers if not is_own(modifier)]
     if modifiers:
         state = "used" if obj.meshfree.use_modifiers else "left out"
         column.label(text=f"Modifiers {state}: {len(modifiers)}", icon="MODIFIER")
