@@ -9,7 +9,7 @@ from bpy.props import BoolProperty
 from ..core import Cancelled, PointCloudError
 from . import cache
 from .options import laplacian_options
-from .reading import obstacle, read_points, sharing_objects
+from .reading import TYPES, obstacle, read_points, sharing_objects
 from .ready import ReadyOperator
 from .result import check_writable
 from .stages import Stages, Work
@@ -155,16 +155,17 @@ def chosen_objects(context):
     Returns
     -------
     list of bpy.types.Object
-        All meshes that can be read and written. Of those that share a mesh one, but each that is to get its own.
+        All meshes and point clouds that can be read and written. Of those that share a mesh one, but each that is to
+        get its own.
     list of str
-        What the other meshes lack.
+        What the others of these lack.
     """
     chosen, left_out = {}, []
     for obj in [context.object, *context.selected_objects]:
         reason = obstacle(obj)
         if not reason:
             chosen.setdefault(obj if obj.meshfree.make_single_user else obj.data, obj)
-        elif obj.type == "MESH":
+        elif obj.type in TYPES:
             left_out.append(reason)
     return list(chosen.values()), left_out
 

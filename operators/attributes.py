@@ -21,6 +21,7 @@ _STORAGE = {
     "BOOLEAN": _Storage(np.bool_, 1, "value"),
 }
 
+SELECTION = ".selection"  # of point clouds, as Blender names it
 PREFIX = "lb_"
 AREA = "lb_area"
 NORMAL = "lb_normal"
@@ -81,34 +82,49 @@ def own_positions(data):
     return positions
 
 
-def write_attribute(mesh, name: str, values):
-    """Write one value per vertex, replacing an attribute of that name."""
-    data_type = _TYPES.get(name, "FLOAT")
+def tag_changed(data):
+    """Tell Blender that the data of a mesh or a point cloud changed."""
+    if isinstance(data, bpy.types.Mesh):
+        data.update()
+    else:
+        data.update_tag()
+
+
+def write_attribute(data, name: str, values, data_type: str = ""):
+    """Write one value per point of a mesh or a point cloud, replacing an attribute of that name.
+
+    Parameters
+    ----------
+    data : bpy.types.Mesh or bpy.types.PointCloud
+    name : str
+    values : array_like, (n,) or (n, 3)
+    data_type : str
+        As Blender names it; empty for that of our own results.
+    """
+    data_type = data_type or _TYPES.get(name, "FLOAT")
     storage = _STORAGE[data_type]
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
-    if len(values) != storage.components * point_count(mesh):
+    if len(values) != storage.components * point_count(data):
         raise PointCloudError(
-            f"Attribute {name} got {len(values)} numbers for {point_count(mesh)} vertices with"
+            f"Attribute {name} got {len(values)} numbers for {point_count(data)} points with"
             f" {storage.components} each. Analyze the object again."
         )
-    attribute = mesh.attributes.get(name)
+    attribute = data.attributes.get(name)
     if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, "POINT"):
-        mesh.attributes.remove(attribute)
+        data.attributes.remove(attribute)
         attribute = None
     if attribute is None:
-        attribute = mesh.attributes.new(name, data_type, "POINT")
+        attribute = data.attributes.new(name, data_type, "POINT")
     if attribute is None or attribute.name != name:
-        raise RuntimeError(f"Blender made no attribute named {name} on mesh {mesh.name}")
+        raise RuntimeError(f"Blender made no attribute named {name} on {data.name}")
     attribute.data.foreach_set(storage.key, values)
 
 
-def read_attribute(mesh, name: str):
-    """Read an attribute of the vertices as an array of shape (n,) or (n, 3)."""
-    attribute = mesh.attributes.get(name)
+def read_attribute(data, name: str):
+    """Read an attribute of the points as an array of shape (n,) or (n, 3)."""
+    attribute = data.attributes.get(name)
     if attribute is None:
-        raise PointCloudError(
-            f'Mesh "{mesh.name}" has no attribute {name}. Analyze the object, or choose another name.'
-        )
+        raise PointCloudError(f'"{data.name}" has no attribute {name}. Analyze the object, or choose another name.')
     storage = _STORAGE.get(attribute.data_type)
     if storage is None or attribute.domain != "POINT":
         raise PointCloudError(
@@ -120,7 +136,7 @@ def read_attribute(mesh, name: str):
     return values[:, 0] if storage.components == 1 else values
 
 
-def remove_numbered(mesh, prefix: str, beyond: int):
+def remove_numbered(data, prefix: str, beyond: int):
     """Remove the attributes of a kind that are numbered above `beyond`."""
-    for name in [attribute.name for attribute in mesh.attributes if _number(attribute.name, prefix) > beyond]:
-        mesh.attributes.remove(mesh.attributes[name])
+    for name in [attribute.name for attribute in data.attributes if _number(attribute.name, prefix) > beyond]:
+        data.attributes.remove(data.attributes[name])

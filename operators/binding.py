@@ -13,9 +13,17 @@ import bmesh
 import numpy as np
 
 from ..core import PointCloudError
-from .attributes import DISPLACEMENT, REST, own_positions, point_count, read_attribute, write_attribute
+from .attributes import (
+    DISPLACEMENT,
+    REST,
+    own_positions,
+    point_count,
+    read_attribute,
+    tag_changed,
+    write_attribute,
+)
 from .deform_nodes import find_deform, is_baked
-from .groups import ANCHOR, chosen_weights, is_chosen
+from .groups import ANCHOR, chosen_weights, has_group, is_chosen
 from .options import settings_values
 from .reading import fingerprint, sharing_objects
 
@@ -60,7 +68,8 @@ def handle_names(obj) -> list:
     """Names of the groups that are handles: the one that the settings name, and the same with a number."""
     base = obj.meshfree.deform.handles
     pattern = re.compile(re.escape(base) + r"(\.\d+)?")
-    return sorted(group.name for group in obj.vertex_groups if pattern.fullmatch(group.name))
+    groups = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
+    return sorted(group.name for group in groups if pattern.fullmatch(group.name) and has_group(obj, group.name))
 
 
 def read_constraints(obj) -> Constraints:
@@ -285,5 +294,5 @@ def write_displacement(obj, displacement, pose, settled: bool):
         bmesh.update_edit_mesh(data, loop_triangles=False, destructive=False)
     else:
         write_attribute(data, DISPLACEMENT, displacement)
-        data.update()
+        tag_changed(data)
     data[POSE] = [float(settled), *pose.tolist()]

@@ -11,7 +11,7 @@ from mathutils import Vector
 from ..core import Deformer, PointCloudError
 from .application import ApplicationOperator, operator_reader
 from .attributes import DISPLACEMENT, own_positions, point_count, write_attribute
-from .groups import ANCHOR, HANDLE, chosen_weights, is_chosen
+from .groups import ANCHOR, HANDLE, chosen_weights, is_chosen, search_group
 from .positions import check_movable, fill_key, target_property, write_positions
 from .reading import Reading, key_positions
 from .result import length_text
@@ -145,7 +145,7 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
         layout = self.layout
         layout.use_property_split = True
         for name in ("handles", "anchors"):
-            layout.prop_search(self, name, context.object, "vertex_groups")
+            search_group(layout, self, name, context.object)
         for name in ("rotation_aware", "soft"):
             layout.prop(self, name)
         row = layout.row()

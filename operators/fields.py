@@ -6,8 +6,8 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
 from .application import ShownOperator, operator_reader
-from .attributes import DISTANCE, FIELD, point_count, read_attribute, write_attribute
-from .groups import SOURCE, VALUE, chosen_members, chosen_weights, is_chosen
+from .attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
+from .groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind, is_chosen, search_group
 from .result import length_text
 from .selecting import selected
 
@@ -55,7 +55,8 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
             fixed = np.isfinite(weights)  # with weight 0 too
             if not fixed.any():
                 raise PointCloudError(
-                    f'The vertex group "{self.group}" of "{obj.name}" holds no points. Assign some to it in Edit Mode.'
+                    f'The {group_kind(obj)} "{self.group}" of "{obj.name}" holds no points. Assign some to it in'
+                    " Edit Mode."
                 )
             values = self.low + (self.high - self.low) * weights
         else:
@@ -80,7 +81,7 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
 
     def write(self, context, obj, result):
         write_attribute(obj.data, FIELD, result)
-        obj.data.update()
+        tag_changed(obj.data)
         return f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"
 
     def draw(self, context):
@@ -89,7 +90,7 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
         layout.prop(self, "values")
         names = ("group",) if self.values == "WEIGHTS" else ("low_group", "high_group")
         for name in names:
-            layout.prop_search(self, name, context.object, "vertex_groups")
+            search_group(layout, self, name, context.object)
         for name in ("low", "high"):
             layout.prop(self, name)
         layout.prop_search(self, "source", context.object.data, "attributes")
@@ -130,7 +131,7 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
     def write(self, context, obj, result):
         reached = np.isfinite(result)
         write_attribute(obj.data, DISTANCE, np.where(reached, result, UNREACHED))
-        obj.data.update()
+        tag_changed(obj.data)
         missed = np.count_nonzero(~reached)
         if missed:
             self.warn([f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."])
@@ -139,7 +140,7 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        layout.prop_search(self, "group", context.object, "vertex_groups")
+        search_group(layout, self, "group", context.object)
         layout.prop(self, "show")
 
 

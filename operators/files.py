@@ -5,6 +5,7 @@ import numpy as np
 
 from ..core import PointCloudError, check_points
 from .attributes import APPLICATIONS, MEAN_CURVATURE, PREFIX, own_positions, read_attribute
+from .reading import TYPES
 
 _TEXT = (".xyz", ".csv", ".txt")
 INPUTS = (".ply", ".obj", *_TEXT, ".blend")
@@ -77,7 +78,7 @@ def _new_object(name, points):
 
 def _choose_object(path, name):
     bpy.context.view_layer.update()
-    meshes = [obj for obj in bpy.context.view_layer.objects if obj.type == "MESH"]
+    meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
     active = bpy.context.view_layer.objects.active
     if not meshes:
         raise PointCloudError(f"{path} has no mesh object. Give a file with points.")

@@ -1,15 +1,43 @@
-"""Vertex groups: which vertices are in one, and with what weight."""
+"""Groups of points: vertex groups of meshes; on point clouds, which have none, attributes of truth or weight."""
 
 import numpy as np
 
 from ..core import PointCloudError
-from .attributes import point_count
+from .attributes import point_count, read_attribute
 
 HANDLE, ANCHOR, FIXED, SOURCE, VALUE = "Handle", "Anchor", "Fixed", "Source", "Value"
+_WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
+
+
+def group_kind(obj) -> str:
+    """What the groups of an object are called in Blender."""
+    return "vertex group" if obj.type == "MESH" else "attribute"
+
+
+def has_group(obj, name: str) -> bool:
+    """Whether an object has a group of that name."""
+    if obj.type == "MESH":
+        return name in obj.vertex_groups
+    attribute = obj.data.attributes.get(name)
+    return attribute is not None and attribute.data_type in _WEIGHTS and attribute.domain == "POINT"
+
+
+def search_group(layout, settings, name: str, obj):
+    """Draw a setting that names a group of an object."""
+    if obj.type == "MESH":
+        layout.prop_search(settings, name, obj, "vertex_groups")
+    else:
+        layout.prop_search(settings, name, obj.data, "attributes")
 
 
 def group_weights(obj, name: str, outside=0.0):
-    """Read the weight of every vertex in a group, (n,) float64; those outside get a number of their own."""
+    """Read the weight of every point in a group, (n,) float64; those outside get a number of their own.
+
+    On a point cloud the points outside are those of weight 0.
+    """
+    if obj.type != "MESH":
+        weights = read_attribute(obj.data, name).astype(np.float64)
+        return np.where(weights == 0.0, outside, weights)
     index = obj.vertex_groups[name].index
     held = (
         next((item.weight for item in vertex.groups if item.group == index), outside) for vertex in obj.data.vertices
@@ -19,7 +47,7 @@ def group_weights(obj, name: str, outside=0.0):
 
 def is_chosen(obj, name: str, default: str) -> bool:
     """Whether a setting names a group that must be there: any but the default, which may be missing."""
-    return bool(name) and (name in obj.vertex_groups or name != default)
+    return bool(name) and (has_group(obj, name) or name != default)
 
 
 def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
@@ -46,23 +74,25 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
     PointCloudError
         There is no such group, or too little in it.
     """
-    if name not in obj.vertex_groups:
+    kind = group_kind(obj)
+    if not has_group(obj, name):
+        weighty = "" if obj.type == "MESH" else " of truth values or numbers on points"
         raise PointCloudError(
-            f'"{obj.name}" has no vertex group named "{name}". Choose another {setting}, or clear it.'
+            f'"{obj.name}" has no {kind}{weighty} named "{name}". Choose another {setting}, or clear it.'
             if name
-            else f'"{obj.name}" has no {setting} chosen. Choose a vertex group; Assign to Group makes one from the'
+            else f'"{obj.name}" has no {setting} chosen. Choose a group; Assign to Group makes one from the'
             " points selected in Edit Mode."
         )
     weights = group_weights(obj, name, outside)
     count = np.count_nonzero(weights > 0.0)
     if count < least:
         raise PointCloudError(
-            f'The vertex group "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting} takes'
+            f'The {kind} "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting} takes'
             f" at least {least}. Assign points to it in Edit Mode, or clear {setting}."
         )
     return weights
 
 
 def chosen_members(obj, name: str, setting: str, least: int = 1):
-    """Read which vertices the group that a setting names gives a weight above zero, (n,) bool; see `chosen_weights`."""
+    """Read which points the group that a setting names gives a weight above zero, (n,) bool; see `chosen_weights`."""
     return chosen_weights(obj, name, setting, least) > 0.0

@@ -18,12 +18,12 @@ from bpy.app.handlers import persistent
 from ..core import Cancelled, Deformer, PointCloudError
 from . import binding, cache
 from .options import laplacian_options
+from .reading import TYPES
 from .rim import rim_points
 from .stages import Work
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
 _TICK = 0.05  # seconds between two looks at a thread
-_TYPES = {"MESH", "POINTCLOUD"}
 
 
 @dataclass
@@ -97,7 +97,7 @@ def preparing(obj):
 
 def keep(obj, live):
     """Keep the factors of an object, and drop those that no object needs."""
-    used = {live_key(other) for other in bpy.data.objects if other.type in _TYPES and binding.is_bound(other)}
+    used = {live_key(other) for other in bpy.data.objects if other.type in TYPES and binding.is_bound(other)}
     for key in _lives.keys() - used:
         del _lives[key]
     _lives[live_key(obj)] = live
@@ -207,7 +207,7 @@ def update_all(scene, depsgraph, quick):
 
 
 def _bound_objects(scene):
-    return [obj for obj in scene.objects if obj.type in _TYPES and binding.is_bound(obj) and obj.data.is_editable]
+    return [obj for obj in scene.objects if obj.type in TYPES and binding.is_bound(obj) and obj.data.is_editable]
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 from ..core import PointCloudError, minimal_surface
 from . import cache
 from .application import ApplicationOperator
-from .groups import FIXED, chosen_members, is_chosen
+from .groups import FIXED, chosen_members, group_kind, is_chosen, search_group
 from .options import laplacian_options
 from .positions import check_movable, target_property, write_positions
 from .reading import read_points
@@ -46,6 +46,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
         if is_chosen(obj, self.group, FIXED):
             fixed = chosen_members(obj, self.group, "Fixed")
         tolerance, steps, name = self.tolerance, self.steps, obj.name
+        kind = group_kind(obj)
 
         def compute(progress):
             rim = fixed
@@ -54,7 +55,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
                 if not rim.any():
                     raise PointCloudError(
                         f'"{name}" has no rim, so that its surface would shrink to nothing. Assign the points that stay'
-                        f' to the vertex group "{FIXED}".'
+                        f' to the {kind} "{FIXED}".'
                     )
             count = 0
 
@@ -86,7 +87,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        layout.prop_search(self, "group", context.object, "vertex_groups")
+        search_group(layout, self, "group", context.object)
         for name in ("tolerance", "steps", "target"):
             layout.prop(self, name)
 

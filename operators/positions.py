@@ -1,12 +1,12 @@
-"""Move the vertices of an object: in place, or by a shape key."""
+"""Move the points of an object: in place, or by a shape key."""
 
 import numpy as np
 from bpy.props import EnumProperty
 
 from ..core import PointCloudError
-from .attributes import own_positions
+from .attributes import own_positions, tag_changed
 from .modifiers import is_own
-from .reading import key_positions
+from .reading import key_positions, shape_keys
 
 TARGETS = (
     ("SHAPE_KEY", "Shape Key", "Add a shape key, whose value mixes the result with the points as they were"),
@@ -16,17 +16,22 @@ TARGETS = (
 
 def target_property():
     """Return the property of an operator that says where moved points go."""
-    return EnumProperty(name="Result", description="Where the moved points go", items=TARGETS, default="SHAPE_KEY")
+    return EnumProperty(
+        name="Result",
+        description="Where the moved points go; point clouds have no shape keys and are moved in place",
+        items=TARGETS,
+        default="SHAPE_KEY",
+    )
 
 
 def check_movable(obj, target: str):
-    """Refuse an object whose vertices cannot be moved to given places, before anything is computed."""
+    """Refuse an object whose points cannot be moved to given places, before anything is computed."""
     if obj.meshfree.use_modifiers and any(not is_own(item) for item in obj.modifiers):
         raise PointCloudError(
             f'The points of "{obj.name}" were read after its modifiers, and cannot be written back before them. Turn'
             " off Use Modifiers, or apply the modifiers."
         )
-    keys = obj.data.shape_keys
+    keys = shape_keys(obj)
     if keys is not None and target == "IN_PLACE":
         raise PointCloudError(
             f'"{obj.name}" has shape keys, so that moving its points in place would not be seen. Choose Shape Key as'
@@ -44,7 +49,7 @@ def check_movable(obj, target: str):
 
 
 def write_positions(obj, reading, points, target: str, name: str):
-    """Move the vertices to given places.
+    """Move the points to given places.
 
     Parameters
     ----------
@@ -62,14 +67,14 @@ def write_positions(obj, reading, points, target: str, name: str):
     -------
     bpy.types.ShapeKey or None
     """
-    mesh = obj.data
+    data = obj.data
     key = None
-    if target == "IN_PLACE":
-        positions = own_positions(mesh) + reading.local(points - reading.points)
-        mesh.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
-        mesh.update()
+    if target == "IN_PLACE" or obj.type != "MESH":
+        positions = own_positions(data) + reading.local(points - reading.points)
+        data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
+        tag_changed(data)
     else:
-        if mesh.shape_keys is None:
+        if data.shape_keys is None:
             obj.shape_key_add(name="Basis", from_mix=False)
         key = obj.shape_key_add(name=name, from_mix=False)
         key.value = 1.0

@@ -13,19 +13,30 @@ from .attributes import own_positions, point_count
 from .modifiers import is_own
 from .rim import rim_checksum, rim_points
 
+
+TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
+
+
+def shape_keys(obj):
+    """Return the shape keys of an object, or None; point clouds have none."""
+    return obj.data.shape_keys if obj.type == "MESH" else None
+
+
 def obstacle(obj, modes=("OBJECT",)) -> str:
     """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
     if obj is None:
         return "No active object. Select a mesh with the points of a surface"
-    if obj.type != "MESH":
+    if obj.type not in TYPES:
         kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
         return f'"{obj.name}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
     if not obj.is_editable or not obj.data.is_editable:
         return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
-    if obj.mode not in modes or (obj.data.is_editmode and obj.mode != "EDIT"):  # by another object of that mesh
+    edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
+    if obj.mode not in modes or edited:
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
-    if not obj.data.vertices:
-        return f'"{obj.name}" has no vertices. Add points, or select another mesh'
+    if not point_count(obj.data):
+        kind = "vertices" if obj.type == "MESH" else "points"
+        return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
 
 
@@ -74,7 +85,7 @@ def read_points(context, obj) -> Reading:
     """
     context.view_layer.update()  # a script may have moved the object a line ago
     mesh = obj.data
-    if obj.meshfree.use_modifiers or mesh.shape_keys is not None:
+    if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
         positions = _evaluated_positions(context, obj)
     else:
         positions = own_positions(mesh)
@@ -85,7 +96,7 @@ def read_points(context, obj) -> Reading:
             " scale above zero along each axis."
         )
     notices = []
-    if mesh.polygons:
+    if obj.type == "MESH" and mesh.polygons:
         notices.append(f"The mesh has {len(mesh.polygons)} faces: it is taken as its {point_count(mesh)} vertices.")
     return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
 
@@ -106,8 +117,11 @@ def _evaluated_positions(context, obj):
                 f'"{obj.name}" is disabled in viewports, so its shape keys and modifiers are not computed. Enable it'
                 " in the Outliner (monitor icon)."
             )
-        positions = own_positions(evaluated.to_mesh())
-        evaluated.to_mesh_clear()
+        if obj.type == "MESH":
+            positions = own_positions(evaluated.to_mesh())
+            evaluated.to_mesh_clear()
+        else:
+            positions = own_positions(evaluated.data)
     if len(positions) != point_count(obj.data):
         raise PointCloudError(
             f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)}, so results'
@@ -145,7 +159,7 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
     positions = own_positions(mesh)
     positions[np.asarray(left_out, dtype=int)] = 0.0
     checksum = zlib.crc32(positions)
-    keys = mesh.shape_keys
+    keys = shape_keys(obj)
     if keys is not None:
         state = [keys.use_relative, keys.eval_time, obj.show_only_shape_key and obj.active_shape_key_index]
         for block in keys.key_blocks:
@@ -167,12 +181,12 @@ def sharing_objects(obj) -> list:
     return [other for other in bpy.data.objects if other.data == obj.data and other != obj]
 
 
-def spacing(mesh) -> float:
-    """Typical distance between neighbouring vertices in local lengths, from 10,000 vertices at most; 0 if unknown.
+def spacing(data) -> float:
+    """Typical distance between neighbouring points in local lengths, from 10,000 of them at most; 0 if unknown.
 
     The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8.
     """
-    positions = own_positions(mesh)
+    positions = own_positions(data)
     positions = positions[np.isfinite(positions).all(axis=1)]
     if len(positions) < 9:
         return 0.0

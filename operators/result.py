@@ -17,6 +17,7 @@ from .attributes import (
     eigenvector_name,
     point_count,
     remove_numbered,
+    tag_changed,
     write_attribute,
 )
 from .options import settings_values
@@ -91,7 +92,7 @@ def write_result(obj, analysis, write_limit: int):
     kept.fingerprint = fingerprint(obj)
     kept.metric = metric(obj).reshape(-1)
     kept.settings_used = repr(settings_values(kept))
-    mesh.update()
+    tag_changed(mesh)
 
 
 def is_analyzed(obj) -> bool:

@@ -1,18 +1,18 @@
-"""The vertex group that names the rim of a surface: its members, and what tells whether they have changed."""
+"""The group that names the rim of a surface: its members, and what tells whether they have changed."""
 
 import zlib
 from time import perf_counter
 
 from ..core.rims import FEWEST
 from .attributes import point_count
-from .groups import chosen_members, group_weights
+from .groups import chosen_members, group_weights, has_group
 
 _PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
 _glance = {"key": None, "checksum": 0, "until": 0.0}
 
 
 def rim_points(obj):
-    """Read which vertices the rim group of an object holds.
+    """Read which points the rim group of an object holds.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def rim_checksum(obj, glance=False) -> int:
     seconds.
     """
     name = obj.meshfree.rim_group
-    if name not in obj.vertex_groups:
+    if not has_group(obj, name):
         return 0
     key = (obj.session_uid, name, point_count(obj.data))
     if not glance or _glance["key"] != key or perf_counter() > _glance["until"]:

@@ -8,7 +8,16 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty
 from ..core import PointCloudError, heat_kernel_signature, modes_needed, nodal_domains, segment, wave_kernel_signature
 from . import cache
 from .application import ApplicationOperator, ShownOperator, operator_reader
-from .attributes import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE, read_attribute, remove_numbered, write_attribute
+from .attributes import (
+    HEAT_SIGNATURE,
+    SEGMENT,
+    SELECTION,
+    WAVE_SIGNATURE,
+    read_attribute,
+    remove_numbered,
+    tag_changed,
+    write_attribute,
+)
 from .result import EIGENVALUES, check_writable
 
 GROUP = "Segment {}"  # of vertex groups and objects
@@ -32,10 +41,14 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
     )
     parts: IntProperty(name="Parts", description="How many parts", default=6, min=1, soft_max=50)
     mode: IntProperty(name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1)
-    vertex_groups: BoolProperty(name="Vertex Groups", description="Make a vertex group of each part", default=False)
+    vertex_groups: BoolProperty(
+        name="Vertex Groups",
+        description="Make a vertex group of each part; of point clouds an attribute",
+        default=False,
+    )
 
     def plan(self, context, obj):
-        if self.vertex_groups:
+        if self.vertex_groups and obj.type == "MESH":
             _check_groups(obj)
         _, operator = operator_reader(context, obj)
         by_mode, parts, mode = self.method == "NODAL", self.parts, self.mode
@@ -52,12 +65,8 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         write_attribute(obj.data, SEGMENT, result)
         count = int(result.max()) + 1
         if self.vertex_groups:
-            for name in [group.name for group in obj.vertex_groups if _is_numbered(group.name)]:
-                obj.vertex_groups.remove(obj.vertex_groups[name])
-            for label in range(count):
-                group = obj.vertex_groups.new(name=GROUP.format(label))
-                group.add(np.flatnonzero(result == label).tolist(), 1.0, "REPLACE")
-        obj.data.update()
+            _write_groups(obj, [result == label for label in range(count)])
+        tag_changed(obj.data)
         return f"{obj.name}: {count} part{'s' if count > 1 else ''}"
 
     def draw(self, context):
@@ -70,6 +79,18 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
 def _is_numbered(name):
     start = GROUP.format("")
     return name.startswith(start) and name.removeprefix(start).isdecimal()
+
+
+def _write_groups(obj, members):
+    """Make a group of each part, given by its points, (n,) bool, in place of those from before."""
+    kept = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
+    for name in [group.name for group in kept if _is_numbered(group.name)]:
+        kept.remove(kept[name])
+    for label, chosen in enumerate(members):
+        if obj.type == "MESH":
+            kept.new(name=GROUP.format(label)).add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+        else:
+            write_attribute(obj.data, GROUP.format(label), chosen, "BOOLEAN")
 
 
 def _check_groups(obj):
@@ -109,6 +130,8 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
     def plan(self, context, obj):
         leaving = [other for other in context.selected_objects if other.meshfree.make_single_user]
         check_writable(obj, (), obj.meshfree.make_single_user, among=leaving)  # others would lose points
+        if obj.type != "MESH" and not obj.visible_get():
+            raise PointCloudError(f'"{obj.name}" is hidden. Show it, so that its points can be divided in Edit Mode.')
         labels = read_attribute(obj.data, SEGMENT)
         if labels.dtype.kind != "i" or len(np.unique(labels[labels >= 0])) < 2:
             raise PointCloudError(f'All points of "{obj.name}" are in one part. Segment it into more parts first.')
@@ -123,21 +146,40 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
             part.name = f"{obj.name} {GROUP.format(number)}"
             part.data = obj.data.copy()
             part.data.name = part.name
-            _keep(part.data, result == number)
             for collection in obj.users_collection:
                 collection.objects.link(part)
-        _keep(obj.data, ~np.isin(result, numbers))
+            _keep(context, part, result == number)
+        _keep(context, obj, ~np.isin(result, numbers))
         return f"{obj.name}: {len(numbers) + 1} parts are objects of their own"
 
 
-def _keep(mesh, kept):
-    """Delete all vertices of a mesh but some, (n,) bool, with all that belongs to them."""
+def _keep(context, obj, kept):
+    """Delete all points of an object but some, (n,) bool, with all that belongs to them."""
+    if obj.type != "MESH":
+        _keep_points(context, obj, kept)
+        return
     shape = bmesh.new()
-    shape.from_mesh(mesh)
+    shape.from_mesh(obj.data)
     dropped = [vertex for vertex, keep in zip(shape.verts, kept, strict=True) if not keep]
     bmesh.ops.delete(shape, geom=dropped, context="VERTS")
-    shape.to_mesh(mesh)
+    shape.to_mesh(obj.data)
     shape.free()
+
+
+def _keep_points(context, obj, kept):
+    """Delete points of a point cloud by Blender's own operator, which takes the selected ones in Edit Mode."""
+    active, chosen = context.view_layer.objects.active, context.selected_objects
+    for other in chosen:
+        other.select_set(False)
+    context.view_layer.objects.active = obj
+    write_attribute(obj.data, SELECTION, ~kept, "BOOLEAN")
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.pointcloud.delete()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    obj.data.attributes.remove(obj.data.attributes[SELECTION])
+    context.view_layer.objects.active = active
+    for other in chosen:
+        other.select_set(True)
 
 
 class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
@@ -180,7 +222,7 @@ class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
         remove_numbered(obj.data, self._prefix(), beyond=self.count)
         for name, values in zip(self.writes, result.T, strict=True):
             write_attribute(obj.data, name, values)
-        obj.data.update()
+        tag_changed(obj.data)
         return f"{obj.name}: signatures at {self.count} scales"
 
 

@@ -8,12 +8,14 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 
 from ..core import PointCloudError, grow
 from .application import operator_reader
+from .attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
+from .groups import group_weights, has_group
 from .ready import ReadyOperator
 from .stages import Stages
 
 
 class SelectionOperator(ReadyOperator):
-    """An operator on the selected vertices of the active mesh, in Edit Mode or Object Mode."""
+    """An operator on the selected points of the active object, in Edit Mode or Object Mode."""
 
     works_in = ("OBJECT", "EDIT")
 
@@ -50,22 +52,29 @@ def object_mode(context, obj):
 
 
 def selected(obj):
-    """Read which vertices are selected, (n,) bool."""
-    chosen = np.empty(len(obj.data.vertices), dtype=bool)
-    obj.data.vertices.foreach_get("select", chosen)
+    """Read which points are selected, (n,) bool."""
+    chosen = np.ones(point_count(obj.data), dtype=bool)
+    if obj.type == "MESH":
+        obj.data.vertices.foreach_get("select", chosen)
+    elif SELECTION in obj.data.attributes:  # without it Blender takes all points of a point cloud as selected
+        chosen = read_attribute(obj.data, SELECTION).astype(bool)
     if not chosen.any():
         raise PointCloudError(f'No points of "{obj.name}" are selected. Select some in Edit Mode.')
     return chosen
 
 
 def select(context, obj, chosen) -> str:
-    """Select these vertices, (n,) bool, and no others, in the mode that selects vertices; hidden ones never."""
-    hidden = np.empty(len(chosen), dtype=bool)
-    obj.data.vertices.foreach_get("hide", hidden)
-    shown = chosen & ~hidden
-    context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
-    obj.data.vertices.foreach_set("select", shown)
-    obj.data.update()
+    """Select these points, (n,) bool, and no others, in the mode that selects vertices; hidden ones never."""
+    shown = chosen
+    if obj.type == "MESH":
+        hidden = np.empty(len(chosen), dtype=bool)
+        obj.data.vertices.foreach_get("hide", hidden)
+        shown = chosen & ~hidden
+        context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
+        obj.data.vertices.foreach_set("select", shown)
+    else:
+        write_attribute(obj.data, SELECTION, shown, "BOOLEAN")
+    tag_changed(obj.data)
     return f"{np.count_nonzero(shown):,} of {len(shown):,} points are selected"
 
 
@@ -193,6 +202,15 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     " the other side."
                 )
         name = self.name or self.role.title()
+        if obj.type == "MESH":
+            self.assign_vertices(obj, name, chosen)
+        else:
+            self.assign_points(obj, name, chosen)
+        verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
+        return f'{np.count_nonzero(chosen):,} points {verb} the group "{name}"'
+
+    def assign_vertices(self, obj, name, chosen):
+        """Change a vertex group."""
         if name in obj.data.attributes:
             raise PointCloudError(
                 f'"{obj.name}" has an attribute named "{name}", and vertex groups share their names. Choose another'
@@ -217,8 +235,24 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         else:
             group.add(members, self.weight, "REPLACE")
         obj.vertex_groups.active = group
-        verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
-        return f'{len(members):,} points {verb} the group "{name}"'
+
+    def assign_points(self, obj, name, chosen):
+        """Change the attribute of a point cloud that stands for a group."""
+        exists = has_group(obj, name)
+        if name in obj.data.attributes and not exists:
+            raise PointCloudError(
+                f'"{obj.name}" has an attribute named "{name}", which holds neither truth values nor numbers on points.'
+                " Choose another name, or rename the attribute."
+            )
+        if not exists and self.action == "REMOVE":
+            raise PointCloudError(f'"{obj.name}" has no group named "{name}" to remove points from. Choose another.')
+        weights = group_weights(obj, name) if exists else np.zeros(len(chosen))
+        if self.action == "REPLACE":
+            weights[:] = 0.0
+        weights[chosen] = 0.0 if self.action == "REMOVE" else self.weight
+        weighted = (exists and obj.data.attributes[name].data_type == "FLOAT") or not np.isin(weights, (0.0, 1.0)).all()
+        write_attribute(obj.data, name, weights, "FLOAT" if weighted else "BOOLEAN")
+        tag_changed(obj.data)
 
 
 CLASSES = (

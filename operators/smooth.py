@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from ..core import PointCloudError, boost, displace_by_mode, exponential, fair_points, smooth_points
 from . import cache
 from .application import ApplicationOperator, operator_reader
-from .groups import chosen_weights
+from .groups import chosen_weights, search_group
 from .positions import check_movable, target_property, write_positions
 from .result import length_text
 
@@ -118,7 +118,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
         for name in [*names, "strength"]:
             layout.prop(self, name)
-        layout.prop_search(self, "group", context.object, "vertex_groups")
+        search_group(layout, self, "group", context.object)
         for name in ("keep", "keep_rim", "target"):
             layout.prop(self, name)
 
@@ -150,6 +150,11 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
 
     def plan(self, context, obj):
         target = "SHAPE_KEY" if self.animate else self.target
+        if self.animate and obj.type != "MESH":
+            raise PointCloudError(
+                f'"{obj.name}" is a Point Cloud, which has no shape keys to animate. Turn off Animate, or convert it'
+                " with Object > Convert > Mesh."
+            )
         check_movable(obj, target)
         reading, operator = operator_reader(context, obj)
         mode, amplitude, phase = self.mode, self.amplitude or None, self.phase

@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..operators.reading import TYPES
 from .panel import ReadyPanel, SidebarPanel
 
 
@@ -14,7 +15,7 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return context.object is not None and context.object.type == "MESH"
+        return context.object is not None and context.object.type in TYPES
 
     def draw(self, context):
         column = self.layout.column(align=True)

@@ -11,7 +11,7 @@ _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
 
 def display_group():
-    """Return the node group that all displays share: round points for vertices without faces, and the material."""
+    """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
         if DISPLAY_TAG in group and group.library is None:
             return group
@@ -26,7 +26,9 @@ def display_group():
     given = add_node(group, "NodeGroupInput", 0, 0)
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
     loose = add_node(group, "FunctionNodeCompare", 1, -200, data_type="INT", operation="EQUAL")
+    parts = add_node(group, "GeometryNodeSeparateComponents", 1, 0)
     points = add_node(group, "GeometryNodeMeshToPoints", 2, -100)
+    given_points = add_node(group, "GeometryNodeSetPointRadius", 2, -300)
     faces = add_node(group, "GeometryNodeDeleteGeometry", 2, 100)  # loose vertices would be drawn over the points
     joined = add_node(group, "GeometryNodeJoinGeometry", 3, 0)
     colored = add_node(group, "GeometryNodeSetMaterial", 4, 0)
@@ -35,11 +37,15 @@ def display_group():
     for source, target in (
         (neighbors.outputs["Face Count"], compared),
         (loose.outputs["Result"], points.inputs["Selection"]),
-        (given.outputs["Geometry"], points.inputs["Mesh"]),
+        (given.outputs["Geometry"], parts.inputs["Geometry"]),
+        (parts.outputs["Mesh"], points.inputs["Mesh"]),
+        (parts.outputs["Point Cloud"], given_points.inputs["Points"]),
+        (given.outputs["Radius"], given_points.inputs["Radius"]),
+        (given_points.outputs["Points"], joined.inputs["Geometry"]),
         (given.outputs["Radius"], points.inputs["Radius"]),
         (points.outputs["Points"], joined.inputs["Geometry"]),
         (loose.outputs["Result"], faces.inputs["Selection"]),
-        (given.outputs["Geometry"], faces.inputs["Geometry"]),
+        (parts.outputs["Mesh"], faces.inputs["Geometry"]),
         (faces.outputs["Geometry"], joined.inputs["Geometry"]),
         (joined.outputs["Geometry"], colored.inputs["Geometry"]),
         (given.outputs["Material"], colored.inputs["Material"]),

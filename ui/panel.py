@@ -3,6 +3,7 @@
 import bpy
 
 from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number, point_count
+from ..operators.groups import search_group
 from ..operators.modifiers import input_property, is_own
 from ..operators.reading import obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
@@ -78,8 +79,8 @@ def _draw_result(layout, result):
 def _draw_summary(layout, obj):
     mesh = obj.data
     column = layout.column(align=True)
-    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon="OUTLINER_OB_MESH")
-    if mesh.polygons:
+    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon=f"OUTLINER_OB_{obj.type}")
+    if obj.type == "MESH" and mesh.polygons:
         column.label(text=f"Faces not used: {len(mesh.polygons):,}", icon="INFO")
     scale = obj.matrix_world.to_scale()
     if max(abs(factor - 1.0) for factor in scale) > 1e-5:
@@ -112,7 +113,7 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
             for name in group:
                 row = column.row(align=True)
                 if name == "rim_group":
-                    row.prop_search(obj.meshfree, name, obj, "vertex_groups")
+                    search_group(row, obj.meshfree, name, obj)
                 else:
                     row.active = name != "rims" or not obj.meshfree.rim_group  # a named rim is not looked for
                     row.prop(obj.meshfree, name)
