@@ -2,8 +2,9 @@
 
 
 def _classes():
-    from .operators import analyze, deform, fields, minimal, segment, selecting, smooth, spectrum
+    from .operators import analyze, bake, deform, fields, minimal, segment, selecting, smooth, spectrum
     from .ui import applications, colormap, panel, settings
+    from .ui import deform as deform_panel
 
     modules = (
         settings,
@@ -13,11 +14,13 @@ def _classes():
         segment,
         fields,
         deform,
+        bake,
         minimal,
         selecting,
         colormap,
         panel,
         applications,
+        deform_panel,
     )
     return [cls for module in modules for cls in module.CLASSES]
 
@@ -26,24 +29,24 @@ def register():
     """Add the extension's classes, the settings of objects and the command line to Blender."""
     import bpy
 
-    from .operators import command, deform
+    from .operators import command, live
     from .ui import settings
 
     for cls in _classes():
         bpy.utils.register_class(cls)
     settings.attach()
     command.attach()
-    deform.attach()
+    live.attach()
 
 
 def unregister():
     """Take everything out again, in reverse order, and give back the memory of the cached operators."""
     import bpy
 
-    from .operators import cache, command, deform
+    from .operators import cache, command, live
     from .ui import settings
 
-    deform.detach()
+    live.detach()
     command.detach()
     settings.detach()
     for cls in reversed(_classes()):

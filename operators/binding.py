@@ -1,13 +1,14 @@
 """What binds an object to its handles, all of it kept in the file, and whether it still holds.
 
-The points at rest are the attribute `lb_rest`, their displacements `lb_displacement`, both in local space. Which empties
-move which groups is in `Object.meshfree.deform`.
+The points at rest are the attribute `lb_rest`, their displacements `lb_displacement`, both in local space. Which
+empties move which groups is in `Object.meshfree.deform`.
 """
 
 import re
 import zlib
 from dataclasses import dataclass
 from time import perf_counter
+from uuid import uuid4
 
 import bmesh
 import numpy as np
@@ -86,7 +87,8 @@ def read_constraints(obj) -> Constraints:
     several = int(np.count_nonzero(np.count_nonzero(weights > 0.0, axis=0) > 1))
     if several:
         raise PointCloudError(
-            f'{several} points of "{obj.name}" are in more than one of the groups {", ".join(names)}. Leave each in one.'
+            f'{several} points of "{obj.name}" are in more than one of the groups {", ".join(names)}. Leave each'
+            " in one."
         )
     anchors = np.zeros(weights.shape[1])
     if is_chosen(obj, settings.anchors, ANCHOR):
@@ -149,12 +151,12 @@ def stale_reason(obj, glance=False) -> str:
     A glance is quick enough for a panel; see `fingerprint`.
     """
     settings = obj.meshfree.deform
-    count = _edited_count(obj) if obj.mode == "EDIT" else point_count(obj.data)
+    count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
     if is_baked(obj):
         return "Its animation is baked. Delete the bake to let it follow the handles again"
     if count != settings.point_count:
         return f"It had {settings.point_count:,} points and has {count:,} now. Bind again"
-    gone = [item.name for item in settings.handle_items if item.has_empty and not _is_there(item.empty)]
+    gone = [item.name for item in settings.handle_items if item.has_empty and not is_there(item.empty)]
     if gone:
         return f"The empty of {', '.join(gone)} was deleted. Bind again to get a new one"
     if find_deform(obj) is None:
@@ -164,7 +166,7 @@ def stale_reason(obj, glance=False) -> str:
     others = [other.name for other in sharing_objects(obj) if is_bound(other)]
     if others:
         return f'It shares its mesh with "{others[0]}", which is bound, too. Make it a single user'
-    if obj.mode == "EDIT":  # groups and positions are only known to be right when one leaves it
+    if in_edit_mesh(obj):  # groups and positions are only known to be right when one leaves it
         return ""
     if any(obj.data.attributes.get(name) is None for name in WRITES):
         return f"The attributes {' and '.join(WRITES)} were removed. Bind again"
@@ -176,12 +178,14 @@ def stale_reason(obj, glance=False) -> str:
     return ""
 
 
-def _is_there(empty):
+def is_there(empty) -> bool:
+    """Whether an empty is still in some scene."""
     return empty is not None and empty.users_scene
 
 
-def _edited_count(obj):
-    return len(bmesh.from_edit_mesh(obj.data).verts)
+def in_edit_mesh(obj) -> bool:
+    """Whether an object is a mesh in Edit Mode, whose data are out of reach as arrays."""
+    return obj.type == "MESH" and obj.mode == "EDIT"
 
 
 def relative_matrix(obj, empty, depsgraph=None):
@@ -209,7 +213,8 @@ def read_pose(obj, depsgraph=None):
     positions = zlib.crc32(positions_now(obj)) if moves_in_edit_mode(obj) else 0
     numbers = [zlib.crc32(repr((solver_settings(settings), settings.steps)).encode()), positions]
     for item in settings.handle_items:
-        numbers += empty_change(obj, item, depsgraph).ravel().tolist() if item.has_empty else []
+        there = item.has_empty and is_there(item.empty)
+        numbers += empty_change(obj, item, depsgraph).ravel().tolist() if there else []
     return np.array(numbers)
 
 
@@ -226,7 +231,7 @@ def solver_settings(settings) -> tuple:
 
 def positions_now(obj):
     """Read the positions of the points in local space, with changes of Edit Mode that are not yet in the mesh."""
-    if obj.mode != "EDIT":
+    if not in_edit_mesh(obj):
         return own_positions(obj.data)
     obj.update_from_editmode()
     positions = np.empty((len(obj.data.vertices), 3), np.float32)
@@ -236,11 +241,61 @@ def positions_now(obj):
 
 def read_rest(obj):
     """Read the points at rest in local space, (n, 3) float32."""
-    if obj.mode != "EDIT":
+    if not in_edit_mesh(obj):
         return read_attribute(obj.data, REST)
     edited = bmesh.from_edit_mesh(obj.data)
     layer = edited.verts.layers.float_vector[REST]
     return np.array([vertex[layer][:] for vertex in edited.verts], np.float32)
+
+
+def record(obj, rest, matrix, constraints, empties):
+    """Keep in the file what an object is bound with.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    rest : ndarray, (n, 3)
+        Points at rest in local space.
+    matrix : ndarray, (3, 3)
+        From local space to the lengths of the world.
+    constraints : Constraints
+    empties : list
+        For each group of handles the empty that moves it and its matrix at rest in local space, (4, 4), or None.
+    """
+    settings = obj.meshfree.deform
+    settings.handle_items.clear()
+    for name, moved_by in zip(constraints.names, empties, strict=True):
+        item = settings.handle_items.add()
+        item.name, item.has_empty = name, moved_by is not None
+        if moved_by is not None:
+            item.empty, item.rest = moved_by[0], np.reshape(moved_by[1], -1)
+    write_attribute(obj.data, REST, rest)
+    settings.matrix = np.reshape(matrix, -1)
+    settings.groups_used, settings.settings_used = constraints.checksum, settings_text(obj)
+    settings.point_count = len(rest)
+    settings.is_bound = True
+    renew(obj, constraints)
+
+
+def renew(obj, constraints):
+    """Take the points of a bound object as they are now as the ones at rest, which `lb_rest` holds."""
+    settings = obj.meshfree.deform
+    settings.fingerprint = rest_fingerprint(obj, constraints)
+    settings.binding_id = uuid4().hex
+
+
+def forget(obj):
+    """Remove from the file what an object is bound with."""
+    settings = obj.meshfree.deform
+    settings.is_bound = False
+    settings.handle_items.clear()
+    for name in WRITES:
+        if obj.data.attributes.get(name) is not None:
+            obj.data.attributes.remove(obj.data.attributes[name])
+    obj.data.pop(POSE, None)
+    modifier = find_deform(obj)
+    if modifier is not None:
+        obj.modifiers.remove(modifier)
 
 
 def goal(obj, constraints, rest, depsgraph=None):
@@ -260,7 +315,7 @@ def goal(obj, constraints, rest, depsgraph=None):
     if edited.any():
         placed[edited] = positions_now(obj)[constraints.moved[edited]]
     for item in obj.meshfree.deform.handle_items:
-        if item.has_empty and item.empty is not None and item.name in constraints.names:
+        if item.has_empty and is_there(item.empty) and item.name in constraints.names:
             change = empty_change(obj, item, depsgraph)
             rows = constraints.owner == constraints.names.index(item.name)
             placed[rows] = placed[rows] @ change[:3, :3].T + change[:3, 3]
@@ -286,7 +341,7 @@ def same_pose(one, other) -> bool:
 def write_displacement(obj, displacement, pose, settled: bool):
     """Write displacements in local space, (n, 3), in Edit Mode too, and what they were computed for."""
     data = obj.data
-    if obj.mode == "EDIT":
+    if in_edit_mesh(obj):
         edited = bmesh.from_edit_mesh(data)
         layer = edited.verts.layers.float_vector[DISPLACEMENT]
         for vertex, moved in zip(edited.verts, displacement.tolist(), strict=True):

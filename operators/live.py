@@ -95,6 +95,11 @@ def preparing(obj):
     return (job.work.stage, job.work.fraction) if job is not None and job.prepares else None
 
 
+def find(obj):
+    """Return the factors of a bound object, or None."""
+    return _lives.get(live_key(obj))
+
+
 def keep(obj, live):
     """Keep the factors of an object, and drop those that no object needs."""
     used = {live_key(other) for other in bpy.data.objects if other.type in TYPES and binding.is_bound(other)}
@@ -129,6 +134,8 @@ def plan_factors(obj, rest, matrix, constraints):
 
 def displaced(live, goal, steps, start=None, progress=None):
     """Solve for handles in local space, (h, 3); return the points, as `Live.matrix` places them, and displacements."""
+    if np.allclose(goal, live.rest[live.constraints.moved], rtol=0.0, atol=1e-6 * np.ptp(live.rest, axis=0).max()):
+        return live.deformer.points, np.zeros_like(live.deformer.points)
     points = live.deformer.solve(goal @ live.matrix.T, steps, start=start, progress=progress)
     return points, (points - live.deformer.points) @ np.linalg.inv(live.matrix).T
 
@@ -143,7 +150,7 @@ def plan_settled(obj, depsgraph=None):
     ndarray
         The pose.
     """
-    known = _lives.get(live_key(obj))
+    known = find(obj)
     if known is None:
         rest, constraints = binding.read_rest(obj), binding.read_constraints(obj)
         matrix = np.reshape(obj.meshfree.deform.matrix, (3, 3)).astype(np.float64)
@@ -188,7 +195,7 @@ def update(obj, depsgraph=None, quick=False):
         keep(obj, live)
         write(obj, live, points, displacement, pose)
         return
-    live = _lives.get(live_key(obj))
+    live = find(obj)
     if live is not None:
         goal = binding.goal(obj, live.constraints, live.rest, depsgraph)
         points, displacement = displaced(live, goal, steps=1, start=live.last.get(obj.session_uid))
@@ -223,6 +230,13 @@ def _guarded():
             yield True
         finally:
             _owner = None
+
+
+def settings_changed(settings, context):
+    """Let an object follow by its new settings of the deformation, in a window; scripts update when they are done."""
+    obj = settings.id_data
+    if binding.is_bound(obj):
+        settle_later(obj)
 
 
 def settle_later(obj):

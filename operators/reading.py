@@ -13,7 +13,6 @@ from .attributes import own_positions, point_count
 from .modifiers import is_own
 from .rim import rim_checksum, rim_points
 
-
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 
 

@@ -202,57 +202,58 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     " the other side."
                 )
         name = self.name or self.role.title()
-        if obj.type == "MESH":
-            self.assign_vertices(obj, name, chosen)
-        else:
-            self.assign_points(obj, name, chosen)
+        assign(obj, name, chosen, self.action, self.weight)
         verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
         return f'{np.count_nonzero(chosen):,} points {verb} the group "{name}"'
 
-    def assign_vertices(self, obj, name, chosen):
-        """Change a vertex group."""
-        if name in obj.data.attributes:
-            raise PointCloudError(
-                f'"{obj.name}" has an attribute named "{name}", and vertex groups share their names. Choose another'
-                " name, or rename the attribute."
-            )
-        group = obj.vertex_groups.get(name)
-        if group is not None and group.lock_weight:
-            raise PointCloudError(
-                f'The vertex group "{name}" of "{obj.name}" is locked. Unlock it, or choose another name.'
-            )
-        if group is None and self.action == "REMOVE":
-            raise PointCloudError(
-                f'"{obj.name}" has no vertex group named "{name}" to remove points from. Choose another.'
-            )
-        if group is None:
-            group = obj.vertex_groups.new(name=name)
-        if self.action == "REPLACE":
-            group.remove(range(len(chosen)))
-        members = np.flatnonzero(chosen).tolist()
-        if self.action == "REMOVE":
-            group.remove(members)
-        else:
-            group.add(members, self.weight, "REPLACE")
-        obj.vertex_groups.active = group
 
-    def assign_points(self, obj, name, chosen):
-        """Change the attribute of a point cloud that stands for a group."""
-        exists = has_group(obj, name)
-        if name in obj.data.attributes and not exists:
-            raise PointCloudError(
-                f'"{obj.name}" has an attribute named "{name}", which holds neither truth values nor numbers on points.'
-                " Choose another name, or rename the attribute."
-            )
-        if not exists and self.action == "REMOVE":
-            raise PointCloudError(f'"{obj.name}" has no group named "{name}" to remove points from. Choose another.')
-        weights = group_weights(obj, name) if exists else np.zeros(len(chosen))
-        if self.action == "REPLACE":
-            weights[:] = 0.0
-        weights[chosen] = 0.0 if self.action == "REMOVE" else self.weight
-        weighted = (exists and obj.data.attributes[name].data_type == "FLOAT") or not np.isin(weights, (0.0, 1.0)).all()
-        write_attribute(obj.data, name, weights, "FLOAT" if weighted else "BOOLEAN")
-        tag_changed(obj.data)
+def assign(obj, name: str, chosen, action="REPLACE", weight=1.0):
+    """Change a group of points, made if there is none: let it hold some, (n,) bool, add them, or remove them."""
+    (_assign_vertices if obj.type == "MESH" else _assign_points)(obj, name, chosen, action, weight)
+
+
+def _assign_vertices(obj, name, chosen, action, weight):
+    if name in obj.data.attributes:
+        raise PointCloudError(
+            f'"{obj.name}" has an attribute named "{name}", and vertex groups share their names. Choose another'
+            " name, or rename the attribute."
+        )
+    group = obj.vertex_groups.get(name)
+    if group is not None and group.lock_weight:
+        raise PointCloudError(
+            f'The vertex group "{name}" of "{obj.name}" is locked. Unlock it, or choose another name.'
+        )
+    if group is None and action == "REMOVE":
+        raise PointCloudError(f'"{obj.name}" has no vertex group named "{name}" to remove points from. Choose another.')
+    if group is None:
+        group = obj.vertex_groups.new(name=name)
+    if action == "REPLACE":
+        group.remove(range(len(chosen)))
+    members = np.flatnonzero(chosen).tolist()
+    if action == "REMOVE":
+        group.remove(members)
+    else:
+        group.add(members, weight, "REPLACE")
+    obj.vertex_groups.active = group
+
+
+def _assign_points(obj, name, chosen, action, weight):
+    """Change the attribute of a point cloud that stands for a group."""
+    exists = has_group(obj, name)
+    if name in obj.data.attributes and not exists:
+        raise PointCloudError(
+            f'"{obj.name}" has an attribute named "{name}", which holds neither truth values nor numbers on points.'
+            " Choose another name, or rename the attribute."
+        )
+    if not exists and action == "REMOVE":
+        raise PointCloudError(f'"{obj.name}" has no group named "{name}" to remove points from. Choose another.')
+    weights = group_weights(obj, name) if exists else np.zeros(len(chosen))
+    if action == "REPLACE":
+        weights[:] = 0.0
+    weights[chosen] = 0.0 if action == "REMOVE" else weight
+    weighted = (exists and obj.data.attributes[name].data_type == "FLOAT") or not np.isin(weights, (0.0, 1.0)).all()
+    write_attribute(obj.data, name, weights, "FLOAT" if weighted else "BOOLEAN")
+    tag_changed(obj.data)
 
 
 CLASSES = (

@@ -1,7 +1,9 @@
 """The node trees that make values visible: round points for vertices, and colours for values."""
 
 import bpy
+import numpy as np
 
+from ..operators.attributes import DISPLACEMENT
 from ..operators.modifiers import DISPLAY_TAG, add_node, new_group
 from . import colormaps
 
@@ -61,8 +63,12 @@ def color_by(material, name, values, settings):
     attribute = add_node(tree, "ShaderNodeAttribute", 0, 0, name=ATTRIBUTE, attribute_name=name)
     if values.ndim == 1:
         color = _number_color(tree, attribute.outputs["Fac"], values, settings)
-    elif settings.component == "DIRECTION":
+    elif _component(name, settings) == "DIRECTION":
         color = _direction_color(tree, attribute.outputs["Vector"])
+    elif _component(name, settings) == "LENGTH":
+        length = add_node(tree, "ShaderNodeVectorMath", 1, 0, operation="LENGTH")
+        tree.links.new(attribute.outputs["Vector"], length.inputs[0])
+        color = _number_color(tree, length.outputs["Value"], np.linalg.norm(values, axis=1), settings)
     else:
         separate = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0)
         tree.links.new(attribute.outputs["Vector"], separate.inputs[0])
@@ -80,6 +86,13 @@ def color_by(material, name, values, settings):
     tree.links.new(diffuse.outputs[0], mixed.inputs[1])
     tree.links.new(emission.outputs[0], mixed.inputs[2])
     tree.links.new(mixed.outputs[0], output.inputs["Surface"])
+
+
+def _component(name, settings):
+    """What of a vector attribute is shown."""
+    if settings.component != "AUTO":
+        return settings.component
+    return "LENGTH" if name == DISPLACEMENT else "DIRECTION"
 
 
 def _number_color(tree, number, values, settings):

@@ -2,7 +2,15 @@
 
 import bpy
 
-from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number, point_count
+from ..operators.attributes import (
+    APPLICATIONS,
+    DISPLACEMENT,
+    NORMAL,
+    RESULTS,
+    eigenvector_name,
+    mode_number,
+    point_count,
+)
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property, is_own
 from ..operators.reading import obstacle, sharing_objects
@@ -167,7 +175,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column(align=True)
-        if shown == NORMAL:
+        if shown in (NORMAL, DISPLACEMENT):
             column.prop(obj.meshfree, "component")
         column.prop(obj.meshfree, "color_map")
         column.prop(obj.meshfree, "coverage")

@@ -13,6 +13,7 @@ from bpy.props import (
 )
 
 from ..operators.options import DEFAULTS
+from . import deform_settings
 
 
 class MESHFREE_PG_stage(bpy.types.PropertyGroup):
@@ -176,12 +177,18 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         name="Vector",
         description="What of a vector is shown",
         items=(
+            ("AUTO", "Automatic", "The length of displacements, the direction of normals"),
             ("DIRECTION", "Direction", "Red, green and blue for the directions x, y and z"),
+            ("LENGTH", "Length", "The length as a number"),
             ("X", "X", "The x component as a number"),
             ("Y", "Y", "The y component as a number"),
             ("Z", "Z", "The z component as a number"),
         ),
-        default="DIRECTION",
+        default="AUTO",
+    )
+
+    deform: PointerProperty(
+        type=deform_settings.MESHFREE_PG_deform, name="Deform", description="Deformation by handles"
     )
 
     # Results of the last analysis, for the panel and for scripts.
@@ -200,7 +207,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     settings_used: StringProperty(name="Settings Used", description="Settings of the last analysis")
 
 
-CLASSES = (MESHFREE_PG_stage, MESHFREE_PG_settings)
+CLASSES = (MESHFREE_PG_stage, *deform_settings.CLASSES, MESHFREE_PG_settings)
 
 
 def attach():
