@@ -222,20 +222,14 @@ class Deformer:
         part = self._part[row]
         rest = self._rest[row]
         count = np.bincount(part, minlength=self._parts)[:, None]
-
-        def mean(values):
-            total = np.zeros((self._parts, 3))
-            np.add.at(total, part, values)
-            return total / count
-
-        before, after = mean(rest), mean(target)
+        total = sparse.csr_array((np.ones(len(part)), (part, np.arange(len(part)))), shape=(self._parts, len(part)))
+        before, after = total @ rest / count, total @ target / count
         turn = np.tile(np.eye(3), (self._parts, 1, 1))
         if self.rotation_aware:
-            products = np.zeros((self._parts, 3, 3))
-            np.add.at(products, part, np.einsum("ka,kb->kab", target - after[part], rest - before[part]))
+            pairs = np.einsum("ka,kb->kab", target - after[part], rest - before[part])
+            products = (total @ pairs.reshape(-1, 9)).reshape(-1, 3, 3)
             # A trace of the identity keeps a part from turning about an axis that all its constraints lie on.
-            spread = np.zeros(self._parts)
-            np.add.at(spread, part, np.sum((rest - before[part]) ** 2, axis=1))
+            spread = total @ np.sum((rest - before[part]) ** 2, axis=1)
             products += 1e-9 * spread[:, None, None] * np.eye(3)
             turn = np.moveaxis(nearest_rotations(np.moveaxis(products, 0, 2)), 2, 0)
         shift = after - np.einsum("pab,pb->pa", turn, before)

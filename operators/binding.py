@@ -26,7 +26,7 @@ from .attributes import (
 from .deform_nodes import find_deform, is_baked
 from .groups import ANCHOR, chosen_weights, has_group, is_chosen
 from .options import settings_values
-from .reading import fingerprint, sharing_objects
+from .reading import TYPES, fingerprint, sharing_objects
 
 WRITES = DISPLACEMENT, REST
 POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
@@ -122,6 +122,16 @@ def forget_glances():
 def is_bound(obj) -> bool:
     """Whether an object was bound to handles, and follows them unless something has changed."""
     return obj is not None and obj.meshfree.deform.is_bound
+
+
+def handled_object(obj, scene):
+    """Return an object itself, or if it is an empty that moves handles, the one in the scene that it moves."""
+    if obj is None or obj.type in TYPES:
+        return obj
+    for other in scene.objects:
+        if other.type in TYPES and any(item.empty == obj for item in other.meshfree.deform.handle_items):
+            return other
+    return obj
 
 
 def edited_rows(obj, constraints):

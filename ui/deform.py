@@ -3,7 +3,7 @@
 import bpy
 
 from ..operators import live
-from ..operators.binding import handle_names, is_bound, stale_reason
+from ..operators.binding import handle_names, handled_object, is_bound, stale_reason
 from ..operators.deform_nodes import find_deform, is_baked
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property
@@ -22,10 +22,13 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return not obstacle(context.object, modes=("OBJECT", "EDIT"))
+        return not obstacle(handled_object(context.object, context.scene), modes=("OBJECT", "EDIT"))
 
     def draw(self, context):
-        layout, obj = self.layout, context.object
+        layout, obj = self.layout, handled_object(context.object, context.scene)
+        if obj != context.object:
+            layout.label(text=f"Moves handles of {obj.name}", icon="EMPTY_DATA")
+            layout.context_pointer_set("object", obj)  # for which the buttons are
         settings = obj.meshfree.deform
         layout.use_property_split = True
         layout.use_property_decorate = False

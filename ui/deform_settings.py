@@ -23,7 +23,7 @@ class MESHFREE_PG_handle(bpy.types.PropertyGroup):
     )
     empty: PointerProperty(type=bpy.types.Object, name="Empty", description="The object that moves the points")
     rest: FloatVectorProperty(
-        name="Matrix at Rest", description="Matrix of the empty in the object's space when it was bound", size=16
+        name="Rest Matrix", description="Matrix of the empty in the object's space when it was bound", size=16
     )
 
 

@@ -11,6 +11,7 @@ from ..operators.attributes import (
     mode_number,
     point_count,
 )
+from ..operators.binding import handled_object
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property, is_own
 from ..operators.reading import obstacle, sharing_objects
@@ -53,6 +54,8 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         layout = self.layout
         obj = context.object
         reason = obstacle(obj)
+        if reason and handled_object(obj, context.scene) != obj:
+            return  # the panel of the deformation tells
         if reason:
             column = layout.column(align=True)
             for sentence in reason.split(". "):

@@ -13,10 +13,17 @@ from tests.blender.clouds import add_object, grid_points, sphere_points
 OPERATORS = (
     "analyze",
     "colormap",
+    "deform_apply",
+    "deform_bake",
     "deform_bind",
+    "deform_free",
+    "deform_reset",
+    "deform_to_shape_key",
+    "deform_unbind",
     "deform_update",
     "geodesic_distance",
     "group_from_selection",
+    "handle_add",
     "harmonic_field",
     "minimal_surface",
     "mode_shape",
@@ -47,7 +54,10 @@ class Layout:
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         self.texts.append(text)
 
-    def prop(self, data, path, text=None):
+    def context_pointer_set(self, name, data):
+        assert name == "object"
+
+    def prop(self, data, path, text=None, slider=False):
         data.path_resolve(path)
         self.texts.append(text or path)
 
@@ -180,7 +190,8 @@ def described():
             if item.type == "ENUM":
                 for choice in item.enum_items:
                     yield f"{kind.identifier}.{item.identifier}.{choice.identifier}", choice.name, choice.description
-    for group in ("MESHFREE_PG_settings", "MESHFREE_PG_stage"):
+    for group in ("settings", "stage", "deform", "handle"):
+        group = f"MESHFREE_PG_{group}"
         for item in bpy.types.PropertyGroup.bl_rna_get_subclass_py(group).bl_rna.properties:
             if item.identifier in {"rna_type", "name"}:
                 continue
