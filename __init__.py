@@ -1,13 +1,43 @@
 """Mesh-Free Laplacian: areas, normals, curvature and vibration modes of point clouds, inside Blender."""
 
 
-def _classes():
-    from .operators import analyze, bake, deform, fields, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, panel, settings
+def _modules():
+    """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
+    from .operators import (
+        analyze,
+        bake,
+        cache,
+        command,
+        deform,
+        exporting,
+        fields,
+        importing,
+        job,
+        live,
+        minimal,
+        segment,
+        selecting,
+        smooth,
+        spectrum,
+    )
+    from .ui import (
+        applications,
+        colormap,
+        legend,
+        menus,
+        overlay,
+        panel,
+        points,
+        presets,
+        range_selection,
+        settings,
+    )
     from .ui import deform as deform_panel
 
-    modules = (
+    return (
         settings,
+        cache,
+        job,
         analyze,
         spectrum,
         smooth,
@@ -15,40 +45,42 @@ def _classes():
         fields,
         deform,
         bake,
+        live,
         minimal,
         selecting,
+        importing,
+        exporting,
+        command,
         colormap,
+        legend,
+        range_selection,
+        presets,
         panel,
+        points,
         applications,
         deform_panel,
+        menus,
+        overlay,
     )
-    return [cls for module in modules for cls in module.CLASSES]
 
 
 def register():
-    """Add the extension's classes, the settings of objects and the command line to Blender."""
+    """Add the extension's classes, the settings of objects, menus, handlers and the command line to Blender."""
     import bpy
 
-    from .operators import command, live
-    from .ui import settings
-
-    for cls in _classes():
-        bpy.utils.register_class(cls)
-    settings.attach()
-    command.attach()
-    live.attach()
+    for module in _modules():
+        for cls in getattr(module, "CLASSES", ()):
+            bpy.utils.register_class(cls)
+        if hasattr(module, "attach"):
+            module.attach()
 
 
 def unregister():
-    """Take everything out again, in reverse order, and give back the memory of the cached operators."""
+    """Take everything out again, in reverse order."""
     import bpy
 
-    from .operators import cache, command, live
-    from .ui import settings
-
-    live.detach()
-    command.detach()
-    settings.detach()
-    for cls in reversed(_classes()):
-        bpy.utils.unregister_class(cls)
-    cache.clear()
+    for module in reversed(_modules()):
+        if hasattr(module, "detach"):
+            module.detach()
+        for cls in reversed(getattr(module, "CLASSES", ())):
+            bpy.utils.unregister_class(cls)

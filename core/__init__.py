@@ -25,7 +25,7 @@ from .options import LaplacianOptions
 from .points import check_points
 from .segmentation import modes_needed, nodal_domains, segment
 from .selection import grow
-from .smoothing import displace_by_mode, fair_points, smooth_points
+from .smoothing import PointBlend, displace_by_mode, fair_points, smooth_points, smoothing_base
 from .spectrum import Spectrum
 from .stability import Stability, check_stability
 
@@ -39,6 +39,7 @@ __all__ = [
     "LaplacianOptions",
     "MinimalSurface",
     "NotASurfaceError",
+    "PointBlend",
     "PointCloudError",
     "SolverError",
     "Spectrum",
@@ -69,6 +70,7 @@ __all__ = [
     "signature_energies",
     "signature_times",
     "smooth_points",
+    "smoothing_base",
     "solve_poisson",
     "spectral_filter",
     "wave_kernel_signature",

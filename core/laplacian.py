@@ -14,7 +14,7 @@ from .images import mirror, own_images
 from .kernel import SECOND_MOMENT, SUPPORT, pair_kernel
 from .options import LaplacianOptions
 from .points import check_points
-from .spectrum import solve_spectrum
+from .spectrum import Spectrum, correct_eigenvalues, solve_spectrum
 
 _NATURAL, _FIXED = 2.0, 2.0 / 3.0  # growth of the images' weights over that of their areas next to a curved rim
 
@@ -160,7 +160,31 @@ class LaplaceBeltrami:
             The eigenvalue solver did not converge.
         """
         stiffness = self.fixed_rim[0] if fixed_rim else self.stiffness
-        return solve_spectrum(self, stiffness, count, raw or not self.options.symbol_correction, progress)
+        spectrum = solve_spectrum(self, stiffness, count, progress)
+        return spectrum if raw else self.corrected(spectrum)
+
+    def corrected(self, spectrum):
+        """Apply the symbol correction to the eigenvalues of a raw spectrum.
+
+        Parameters
+        ----------
+        spectrum : Spectrum
+            From ``eigenpairs(..., raw=True)``, or the lowest modes of one.
+
+        Returns
+        -------
+        Spectrum
+            As of `eigenpairs`; the same one without ``options.symbol_correction``.
+
+        Raises
+        ------
+        UnresolvedModesError
+            Modes that vary faster than the smoothing length resolves.
+        """
+        if not self.options.symbol_correction:
+            return spectrum
+        values, vectors = spectrum.eigenvalues, spectrum.eigenvectors
+        return Spectrum(correct_eigenvalues(self, values, vectors), vectors)
 
 
 def build_laplacian(

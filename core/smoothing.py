@@ -24,6 +24,7 @@ def smooth_points(
     keep=None,
     fixed_rim=False,
     progress=None,
+    base=None,
 ):
     """Filter the shape of the surface by frequency.
 
@@ -53,6 +54,8 @@ def smooth_points(
         film. Otherwise a rim shrinks like all else, as the modes meet it level.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+    base : ndarray, (n, 3), optional
+        From `smoothing_base` with the same fixed_rim, to save its time.
 
     Returns
     -------
@@ -72,8 +75,9 @@ def smooth_points(
     """
     if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
-    blend = _Blend(laplacian, strength, mask, keep, fixed_rim)
-    base, rest = _split(laplacian, fixed_rim, progress)
+    blend = PointBlend(laplacian, strength, mask, keep, fixed_rim)
+    base = smoothing_base(laplacian, fixed_rim, progress) if base is None else base
+    rest = laplacian.points - base
     if spectrum is None and callable(response):
         filtered = chebyshev_filter(laplacian, rest, response, fixed_rim, tolerance=_TOLERANCE, progress=progress)
     elif callable(response):
@@ -101,6 +105,7 @@ def fair_points(
     keep=None,
     fixed_rim=False,
     progress=None,
+    base=None,
 ):
     """Smooth the surface by an implicit step, without eigenvectors: for noise, also on large clouds.
 
@@ -116,7 +121,7 @@ def fair_points(
         square of the smoothing lengths, which removes the noise of single points.
     order : int
         1, 2 or 3: the higher, the sharper the line between what stays and what goes.
-    strength, mask, keep, fixed_rim, progress
+    strength, mask, keep, fixed_rim, progress, base
         As in `smooth_points`.
 
     Returns
@@ -143,7 +148,7 @@ def fair_points(
     if time is None:
         known = laplacian.component >= 0
         time = 0.5 * np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known])
-    return smooth_points(laplacian, fairing(time, order), None, strength, mask, keep, fixed_rim, progress)
+    return smooth_points(laplacian, fairing(time, order), None, strength, mask, keep, fixed_rim, progress, base)
 
 
 def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
@@ -184,10 +189,21 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
     return points + (amplitude * np.cos(phase) / largest) * mode[:, None] * laplacian.normals
 
 
-def _split(laplacian, fixed_rim, progress):
-    """Divide the places of the points into a base that filters leave alone and the rest, both (n, 3).
+def smoothing_base(laplacian, fixed_rim=False, progress=None):
+    """Return the part of the points' places that filters leave alone.
 
-    The base is the centre of each connected part or, with a fixed rim, the harmonic surface that spans it.
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+    fixed_rim : bool
+        As in `smooth_points`.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n, 3)
+        The centre of each connected part or, with a fixed rim, the harmonic surface that spans it [L].
     """
     points, part = laplacian.points, laplacian.component
     base = points.copy()
@@ -203,7 +219,7 @@ def _split(laplacian, fixed_rim, progress):
         base[order] += root[:, None] * np.column_stack(
             [conjugate_gradients(operator, column, progress=progress) for column in force.T]
         )
-    return base, points - base
+    return base
 
 
 def _centers(laplacian, weights):
@@ -253,10 +269,21 @@ def rim_places(laplacian):
     return places
 
 
-class _Blend:
-    """Strength, mask and what is kept, checked before any work: turns filtered places into the result."""
+class PointBlend:
+    """Strength, mask and what is kept, checked before any work: called with filtered places, it gives the result.
 
-    def __init__(self, laplacian, strength, mask, keep, fixed_rim):
+    Parameters
+    ----------
+    laplacian, strength, mask, keep, fixed_rim
+        As in `smooth_points`, whose results without these are filtered places.
+
+    Raises
+    ------
+    PointCloudError
+        A mask, strength or choice that makes no sense.
+    """
+
+    def __init__(self, laplacian, strength=1.0, mask=None, keep=None, fixed_rim=False):
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         if not np.isfinite(strength):

@@ -30,8 +30,8 @@ class Spectrum:
     eigenvectors: np.ndarray
 
 
-def solve_spectrum(laplacian, stiffness, count, raw, progress=None):
-    """Compute eigenpairs; see `LaplaceBeltrami.eigenpairs`."""
+def solve_spectrum(laplacian, stiffness, count, progress=None):
+    """Compute raw eigenpairs; see `LaplaceBeltrami.eigenpairs`."""
     areas = laplacian.areas
     n = len(areas)
     if int(count) != count or count < 1:
@@ -48,8 +48,6 @@ def solve_spectrum(laplacian, stiffness, count, raw, progress=None):
         ) from error
     largest = np.argmax(np.abs(vectors), axis=0)
     vectors *= np.sign(vectors[largest, np.arange(count)])
-    if not raw:
-        values = correct_eigenvalues(laplacian, values, vectors)
     return Spectrum(values, vectors)
 
 

@@ -6,14 +6,14 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ..core import LaplaceBeltrami, PointCloudError, Spectrum, UnresolvedModesError
+from ..core import LaplaceBeltrami, Spectrum, UnresolvedModesError
 from . import cache
+from .application import ShownOperator
 from .attributes import point_count
 from .options import laplacian_options
 from .reading import read_points
-from .ready import ReadyOperator
-from .result import analysis_names, area_text, check_writable, write_result
-from .stages import Stages
+from .result import analysis_names, area_text, write_result
+from .stages import Stages, StageTimes
 
 WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each takes 4 bytes per point in the file
 
@@ -45,15 +45,27 @@ class Analysis:
         }
 
 
+def plan_analysis(context, obj, modes: int = 0):
+    """Read an object; return a function of a progress callback that analyzes it, with the lowest modes if any."""
+    reading = read_points(context, obj)
+    options = laplacian_options(obj.meshfree)
+
+    def compute(progress):
+        with StageTimes(progress) as times:
+            laplacian, curvature = cache.build(reading.points, options, reading.rim, times)
+            spectrum, unresolved = resolved_modes(laplacian, modes, times) if modes else (None, [])
+        notices = reading.notices + laplacian.notices + unresolved
+        return Analysis(
+            laplacian, reading.local_normals(laplacian.normals), curvature, spectrum, times.seconds, notices
+        )
+
+    return compute
+
+
 def analyze_object(context, obj, modes: int = 0) -> Analysis:
     """Compute all that an analysis gives, with the lowest modes if any are asked for; write nothing."""
-    reading = read_points(context, obj)
-    with Stages(context.window_manager) as stages:
-        laplacian, curvature = cache.build(reading.points, laplacian_options(obj.meshfree), reading.rim, stages)
-        spectrum, unresolved = resolved_modes(laplacian, modes, stages) if modes else (None, [])
-    notices = reading.notices + laplacian.notices + unresolved
-    local_normals = reading.local_normals(laplacian.normals)
-    return Analysis(laplacian, local_normals, curvature, spectrum, stages.seconds, notices)
+    with Stages(context.window_manager, "Analyze Points") as stages:
+        return plan_analysis(context, obj, modes)(stages)
 
 
 def resolved_modes(laplacian, modes, progress):
@@ -67,8 +79,11 @@ def resolved_modes(laplacian, modes, progress):
         return cache.lowest_modes(laplacian, error.resolved, progress), [notice]
 
 
-class AnalysisOperator(ReadyOperator):
-    """What the operators that analyze the active object have in common."""
+class AnalysisOperator(ShownOperator):
+    """What the operators that analyze objects have in common; `wanted` is how many modes one computes."""
+
+    asks = False
+    adjustable = ("write_limit", "show")
 
     write_limit: IntProperty(
         name="Modes to Write",
@@ -83,28 +98,25 @@ class AnalysisOperator(ReadyOperator):
         default=False,
         options={"SKIP_SAVE"},
     )
-    show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
 
-    def run(self, context, modes: int, shown: str):
-        """Analyze the active object, write the result, then show the attribute `shown`; empty for the one on show."""
-        obj = context.object
-        written = min(modes, self.write_limit)
-        try:
-            check_writable(obj, analysis_names(written), self.make_single_user or obj.meshfree.make_single_user)
-            analysis = analyze_object(context, obj, modes)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        write_result(obj, analysis, self.write_limit)
-        for notice in analysis.notices:
-            self.report({"WARNING"}, notice)
-        message = f"{area_text(analysis.total_area)} from {point_count(obj.data):,} points"
-        if analysis.spectrum is not None:
-            message += f", {len(analysis.spectrum.eigenvalues)} modes"
-        self.report({"INFO"}, f"{message}, {sum(analysis.seconds.values()):.1f} s")
-        if self.show:
-            bpy.ops.meshfree.colormap(attribute=shown if shown in obj.data.attributes else "")
-        return {"FINISHED"}
+    @property
+    def writes(self):
+        """Names of the attributes."""
+        return analysis_names(min(self.wanted, self.write_limit))
+
+    def becomes_single(self, obj):
+        return self.make_single_user or super().becomes_single(obj)
+
+    def plan(self, context, obj):
+        return plan_analysis(context, obj, self.wanted)
+
+    def write(self, context, obj, result):
+        write_result(obj, result, self.write_limit)
+        self.warn(result.notices)
+        message = f"{obj.name}: {area_text(result.total_area)} from {point_count(obj.data):,} points"
+        if result.spectrum is not None:
+            message += f", {len(result.spectrum.eigenvalues)} modes"
+        return f"{message}, {sum(result.seconds.values()):.1f} s"
 
 
 class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
@@ -112,13 +124,16 @@ class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.analyze"
     bl_label = "Analyze Points"
+    shown = ""  # what is on show already
 
     modes: IntProperty(
         name="Modes", description="Compute this many vibration modes in the same run", default=0, min=0, soft_max=100
     )
 
-    def execute(self, context):
-        return self.run(context, self.modes, shown="")
+    @property
+    def wanted(self):
+        """How many modes to compute."""
+        return self.modes
 
 
 CLASSES = (MESHFREE_OT_analyze,)

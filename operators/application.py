@@ -6,16 +6,13 @@ from dataclasses import dataclass, field
 import bpy
 from bpy.props import BoolProperty
 
-from ..core import Cancelled, PointCloudError
+from ..core import PointCloudError
 from . import cache
+from .job import JobOperator
 from .options import laplacian_options
 from .reading import TYPES, obstacle, read_points, sharing_objects
-from .ready import ReadyOperator
 from .result import check_writable
-from .stages import Stages, Work
-
-_TICK = 0.1  # seconds between two looks at the work
-_VIEWING = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
+from .stages import Stages
 
 
 @dataclass
@@ -30,7 +27,7 @@ class Done:
 done = Done()
 
 
-class ApplicationOperator(ReadyOperator):
+class ApplicationOperator(JobOperator):
     """An operator on the active object and on all other selected ones that can be read and written.
 
     Of objects that share a mesh and its scale one is enough. A subclass says what to do by two methods: `plan` reads
@@ -39,73 +36,53 @@ class ApplicationOperator(ReadyOperator):
     """
 
     only_active = False  # for what has one object by nature
+    asks = True  # whether a dialog comes before the work
     writes = ()  # names of the attributes that `write` makes
-    _attended = False  # somebody at the window waits for it, and may press Esc
+    adjustable = ()  # names of the settings that change a result without computing anything again that takes time
 
     def invoke(self, context, event):
         self._attended = True
-        return context.window_manager.invoke_props_dialog(self)
+        return context.window_manager.invoke_props_dialog(self) if self.asks else self.execute(context)
 
     def execute(self, context):
-        """Do all at once for scripts; let somebody at the window stop it."""
+        """Do all at once for scripts; beside the window for somebody there."""
+        attended = self.takes_window()
         context.view_layer.update()  # a script may have moved or scaled an object a line ago
-        objects, left_out = ([context.object], []) if self.only_active else chosen_objects(context)
+        objects, left_out = [context.object], []
+        if not self.only_active:
+            objects, left_out = chosen_objects(context, self.becomes_single)
         plans = []
         try:
             for obj in objects:
                 with naming(obj.name):
-                    check_writable(obj, self.writes, obj.meshfree.make_single_user, among=context.selected_objects)
+                    check_writable(obj, self.writes, self.becomes_single(obj), among=context.selected_objects)
                     plans.append((obj.name, self.plan(context, obj)))
+            self._left_out = left_out
+            if attended:
+                return self.start(context, objects, lambda progress: compute_all(plans, progress))
+            with Stages(context.window_manager, self.bl_label) as stages:
+                results = compute_all(plans, stages)
         except PointCloudError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self._objects, self._left_out = objects, left_out
-        attended, self._attended = self._attended, False  # Adjust Last Operation comes here again, and waits
-        if attended and not bpy.app.background:
-            self._work = Work(lambda progress: compute_all(plans, progress))
-            self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
-            context.window_manager.modal_handler_add(self)
-            return {"RUNNING_MODAL"}
-        with Stages(context.window_manager) as stages:
-            return self._finish(context, lambda: compute_all(plans, stages), stages)
+        return self.finish(context, objects, results, stages.seconds)
 
-    def modal(self, context, event):
-        if event.type == "ESC":
-            self._work.cancel()
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"} if event.type in _VIEWING else {"RUNNING_MODAL"}
-        if not self._work.ended:
-            context.workspace.status_text_set(
-                f"{self.bl_label}: stopping"
-                if self._work.stopping
-                else f"{self.bl_label}: {self._work.stage}, {self._work.fraction:.0%}    Esc to stop"
-            )
-            return {"RUNNING_MODAL"}
-        context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
-        return self._finish(context, self._work.result, self._work)
-
-    def _finish(self, context, compute, stages):
-        """Write what was computed, or report why there is nothing."""
-        objects = self._objects
-        try:
-            results = compute()
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except Cancelled:
-            self.report({"INFO"}, "Stopped: nothing was changed")
-            return {"CANCELLED"}
-        done.messages, done.notices, done.seconds = [], [], stages.seconds
+    def finish(self, context, objects, results, seconds):
+        """Write what was computed."""
+        done.messages, done.notices, done.seconds = [], [], seconds
         self.warn([f"Left out: {reason}." for reason in self._left_out])
         for obj in objects:  # before anything is written to a mesh that is copied
-            if obj.meshfree.make_single_user and sharing_objects(obj):
+            if self.becomes_single(obj) and sharing_objects(obj):
                 obj.data = obj.data.copy()
         for obj, result in zip(objects, results, strict=True):
             done.messages.append(self.write(context, obj, result))
             self.report({"INFO"}, done.messages[-1])
         self.conclude(context, objects)
         return {"FINISHED"}
+
+    def becomes_single(self, obj) -> bool:
+        """Whether an object that shares its mesh gets its own."""
+        return obj.meshfree.make_single_user
 
     def conclude(self, context, objects):
         """Do what is left when all objects are written."""
@@ -116,25 +93,51 @@ class ApplicationOperator(ReadyOperator):
             self.report({"WARNING"}, notice)
         done.notices += notices
 
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        if not self.is_repeated(context):
+            self.draw_settings(context, layout)
+            return
+        for name in self.adjustable:
+            layout.prop(self, name)
+
+    def draw_settings(self, context, layout):
+        """Draw what the dialog asks for; in Adjust Last Operation, which waits, `adjustable` alone is drawn."""
+
+    def is_repeated(self, context) -> bool:
+        """Whether this has run before, and is run again by Adjust Last Operation."""
+        return any(last.as_pointer() == self.as_pointer() for last in context.window_manager.operators)
+
 
 class ShownOperator(ApplicationOperator):
     """An operator whose attribute is shown when it is done."""
 
     show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
+    adjustable = ("show",)
+
+    @property
+    def shown(self) -> str:
+        """Name of the attribute."""
+        return self.writes[0]
 
     def conclude(self, context, objects):
         if self.show:
             for obj in objects:
                 with context.temp_override(object=obj):
-                    bpy.ops.meshfree.colormap(attribute=self.writes[0])
+                    bpy.ops.meshfree.colormap(attribute=self.shown if self.shown in obj.data.attributes else "")
 
 
 def compute_all(plans, progress):
     """Carry out what was planned for some objects, given by name, and return the results."""
     results = []
-    for name, plan in plans:
+    for number, (name, plan) in enumerate(plans):
+
+        def report(stage, fraction, number=number):
+            progress(stage, (number + fraction) / len(plans))
+
         with naming(name):
-            results.append(plan(progress))
+            results.append(plan(report))
     return results
 
 
@@ -149,8 +152,14 @@ def naming(name):
         raise PointCloudError(f'"{name}": {error}') from error
 
 
-def chosen_objects(context):
+def chosen_objects(context, becomes_single):
     """Choose among the active object and the other selected ones.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    becomes_single : callable
+        Tells of an object whether it is to get a mesh of its own.
 
     Returns
     -------
@@ -164,7 +173,7 @@ def chosen_objects(context):
     for obj in [context.object, *context.selected_objects]:
         reason = obstacle(obj)
         if not reason:
-            chosen.setdefault(obj if obj.meshfree.make_single_user else obj.data, obj)
+            chosen.setdefault(obj if becomes_single(obj) else obj.data, obj)
         elif obj.type in TYPES:
             left_out.append(reason)
     return list(chosen.values()), left_out

@@ -117,13 +117,9 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
     works_stale = True
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if not is_baked(context.object):
-            cls.poll_message_set(f'Nothing of "{context.object.name}" is baked')
-            return False
-        return True
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        return reason or ("" if is_baked(context.object) else f'Nothing of "{context.object.name}" is baked')
 
     def change(self, context, obj):
         delete_bake(obj)

@@ -26,13 +26,13 @@ from .binding import (
     write_displacement,
 )
 from .deform_nodes import add_deform, find_deform, is_baked, show_live
-from .groups import HANDLE, has_group
+from .groups import HANDLE, assign, check_assignable, has_group
 from .modifiers import get_input
 from .positions import check_movable
 from .reading import key_positions, read_points, shape_keys
 from .ready import ReadyOperator
 from .result import length_text
-from .selecting import SelectionOperator, assign, selected
+from .selecting import SelectionOperator, selected
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -41,16 +41,25 @@ class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
     bl_idname = "meshfree.handle_add"
     bl_label = "Add Handle"
 
-    def change(self, context, obj):
+    surface = False
+
+    def prepare(self, context, obj):
         chosen = selected(obj)
         base = obj.meshfree.deform.handles or HANDLE
         names = [base, *(f"{base}.{number:03d}" for number in range(1, 1000))]
         name = next(name for name in names if not has_group(obj, name))
         others = handle_names(obj)
-        assign(obj, name, chosen)
-        for other in others:  # a point has one handle
-            assign(obj, other, chosen, "REMOVE")
-        return f'{np.count_nonzero(chosen):,} points are in the group "{name}"'
+        check_assignable(obj, name, must_exist=False)
+        for other in others:
+            check_assignable(obj, other, must_exist=True)
+
+        def change():
+            for other in others:  # a point has one handle
+                assign(obj, other, chosen, "REMOVE", 1.0)
+            assign(obj, name, chosen, "REPLACE", 1.0)
+            return f'{np.count_nonzero(chosen):,} points are in the group "{name}"'
+
+        return change
 
 
 class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
@@ -61,10 +70,6 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
     only_active = True
     asks = False
     writes = WRITES
-
-    def invoke(self, context, event):
-        self._attended = True
-        return self.execute(context)
 
     def plan(self, context, obj):
         settings = obj.meshfree.deform
@@ -133,8 +138,8 @@ class BoundOperator(ReadyOperator):
     works_stale = False  # whether the handles may have lost their hold
 
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) and poll_bound(cls, context)
+    def obstacle(cls, context):
+        return super().obstacle(context) or not_bound(context.object)
 
     def execute(self, context):
         obj = context.object
@@ -151,12 +156,9 @@ class BoundOperator(ReadyOperator):
         return {"FINISHED"}
 
 
-def poll_bound(cls, context) -> bool:
-    """Tell whether the active object is bound, and why the button is gray."""
-    bound = is_bound(context.object)
-    if not bound:
-        cls.poll_message_set(f'"{context.object.name}" is not bound. Bind it to its handles first')
-    return bound
+def not_bound(obj) -> str:
+    """Say that an object is not bound, and what to do; empty if it is."""
+    return "" if is_bound(obj) else f'"{obj.name}" is not bound. Bind it to its handles first'
 
 
 def check_fresh(obj):
@@ -176,12 +178,8 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
     writes = WRITES
 
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) and poll_bound(cls, context)
-
-    def invoke(self, context, event):
-        self._attended = True
-        return self.execute(context)
+    def obstacle(cls, context):
+        return super().obstacle(context) or not_bound(context.object)
 
     def plan(self, context, obj):
         check_fresh(obj)
@@ -224,13 +222,10 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
     bl_label = "To Shape Key"
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if context.object.type != "MESH":
-            cls.poll_message_set("Point clouds have no shape keys. Apply the deformation, or bake it")
-            return False
-        return True
+    def obstacle(cls, context):
+        keyless = context.object is not None and context.object.type != "MESH"
+        reason = "Point clouds have no shape keys. Apply the deformation, or bake it" if keyless else ""
+        return super().obstacle(context) or reason
 
     def change(self, context, obj):
         check_movable(obj, "SHAPE_KEY")

@@ -5,6 +5,7 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
+from . import cache
 from .application import ShownOperator, operator_reader
 from .attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
 from .groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind, is_chosen, search_group
@@ -40,6 +41,11 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
         description="Attribute with the source f of Poisson's equation -Laplacian u = f; empty for a harmonic field",
     )
 
+    @property
+    def adjustable(self):
+        """Names of the settings that need no new solution: with a source, the given values do."""
+        return ("show",) if self.source else ("low", "high", "show")
+
     def plan(self, context, obj):
         if self.values == "GROUPS":
             low = chosen_members(obj, self.low_group, "Low Group")
@@ -49,18 +55,18 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
                 raise PointCloudError(
                     f'{both} points are both in "{self.low_group}" and in "{self.high_group}". Remove them from one.'
                 )
-            fixed, values = low | high, np.where(high, self.high, self.low)
+            fixed, shares = low | high, high.astype(np.float64)
         elif self.group or not self.source:
-            weights = chosen_weights(obj, self.group, "Group", least=0, outside=np.nan)
-            fixed = np.isfinite(weights)  # with weight 0 too
+            shares = chosen_weights(obj, self.group, "Group", least=0, outside=np.nan)
+            fixed = np.isfinite(shares)  # with weight 0 too
             if not fixed.any():
                 raise PointCloudError(
                     f'The {group_kind(obj)} "{self.group}" of "{obj.name}" holds no points. Assign some to it in'
                     " Edit Mode."
                 )
-            values = self.low + (self.high - self.low) * weights
         else:
-            fixed = values = np.zeros(point_count(obj.data), dtype=bool)
+            shares = np.zeros(point_count(obj.data))
+            fixed = np.zeros(len(shares), dtype=bool)
         source = None
         if self.source:
             source = read_attribute(obj.data, self.source).astype(np.float64)
@@ -70,12 +76,28 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
                     " point as the source."
                 )
         _, operator = operator_reader(context, obj)
+        low, high = self.low, self.high
 
         def compute(progress):
-            laplacian = operator(progress)
-            if source is None:
-                return harmonic_field(laplacian, fixed, values[fixed], progress=progress)
-            return solve_poisson(laplacian, source, fixed, values[fixed], progress=progress)
+            laplacian, given = operator(progress), shares[fixed]
+            if source is None:  # between 0 and 1, so that both values can change without solving again
+                field = cache.result(
+                    laplacian,
+                    "harmonic",
+                    fixed,
+                    given,
+                    compute=lambda: harmonic_field(laplacian, fixed, given, progress=progress),
+                )
+                return low + (high - low) * field
+            values = low + (high - low) * given
+            return cache.result(
+                laplacian,
+                "poisson",
+                source,
+                fixed,
+                values,
+                compute=lambda: solve_poisson(laplacian, source, fixed, values, progress=progress),
+            )
 
         return compute
 
@@ -84,9 +106,7 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
         tag_changed(obj.data)
         return f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
+    def draw_settings(self, context, layout):
         layout.prop(self, "values")
         names = ("group",) if self.values == "WEIGHTS" else ("low_group", "high_group")
         for name in names:
@@ -124,7 +144,13 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
         _, operator = operator_reader(context, obj)
 
         def compute(progress):
-            return geodesic_distance(operator(progress), sources, progress=progress)
+            laplacian = operator(progress)
+            return cache.result(
+                laplacian,
+                "distance",
+                sources,
+                compute=lambda: geodesic_distance(laplacian, sources, progress=progress),
+            )
 
         return compute
 
@@ -137,9 +163,7 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
             self.warn([f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."])
         return f"{obj.name}: distances up to {length_text(result[reached].max())}"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
+    def draw_settings(self, context, layout):
         search_group(layout, self, "group", context.object)
         layout.prop(self, "show")
 

@@ -17,10 +17,9 @@ from bpy.app.handlers import persistent
 
 from ..core import Cancelled, Deformer, PointCloudError
 from . import binding, cache
+from .job import Job
 from .options import laplacian_options
-from .reading import TYPES
-from .rim import rim_points
-from .stages import Work
+from .reading import TYPES, rim_points
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
 _TICK = 0.05  # seconds between two looks at a thread
@@ -50,12 +49,12 @@ class Live:
 
 
 @dataclass
-class _Job:
+class _Settling:
     """A thread that settles an object, for the timer to look at.
 
     Attributes
     ----------
-    work : Work
+    work : Job
     key : tuple
         The `live_key` that it works for.
     pose : ndarray
@@ -64,7 +63,7 @@ class _Job:
         Whether it makes the factors first.
     """
 
-    work: Work
+    work: Job
     key: tuple
     pose: np.ndarray
     prepares: bool
@@ -245,7 +244,7 @@ def settle_later(obj):
     _due = perf_counter() + _IDLE
     job = _jobs.get(obj.session_uid)
     if job is not None and not job.prepares:
-        job.work.cancel()  # what it settles is past
+        job.work.stop()  # what it settles is past
     if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=_TICK)
 
@@ -257,7 +256,7 @@ def _tick():
     scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
     objects = {obj.session_uid: obj for obj in _bound_objects(scene)}
     for uid in _jobs.keys() - objects.keys():
-        _jobs.pop(uid).work.cancel()
+        _jobs.pop(uid).work.stop()
     with _guarded():
         waiting = [_attend(obj, depsgraph) for obj in objects.values()]
     if any(waiting):
@@ -272,7 +271,7 @@ def _attend(obj, depsgraph) -> bool:
     try:
         if binding.stale_reason(obj, glance=True):
             if job is not None:
-                _jobs.pop(uid).work.cancel()
+                _jobs.pop(uid).work.stop()
             return False
         key, pose = live_key(obj), binding.read_pose(obj, depsgraph)
         if job is None:
@@ -281,7 +280,7 @@ def _attend(obj, depsgraph) -> bool:
             del _jobs[uid]
             _take(obj, job, key, pose)
         elif job.key != key:
-            job.work.cancel()
+            job.work.stop()
     except PointCloudError as error:
         _troubles[uid] = str(error), None if job is None else job.pose
     return True
@@ -296,7 +295,7 @@ def _start(obj, key, pose, depsgraph):
         return False  # it would go wrong again
     if perf_counter() >= _due or key not in _lives:
         compute, pose = plan_settled(obj, depsgraph)
-        _jobs[obj.session_uid] = _Job(Work(compute), key, pose, prepares=key not in _lives)
+        _jobs[obj.session_uid] = _Settling(Job("Deform", [], compute), key, pose, prepares=key not in _lives)
     return True
 
 
@@ -353,7 +352,7 @@ def _on_render(scene, *_):
 def _forget(*_):
     """Forget everything about a file when another one is opened."""
     for job in _jobs.values():
-        job.work.cancel()
+        job.work.stop()
     for known in (_lives, _jobs, _troubles):
         known.clear()
     binding.forget_glances()

@@ -20,6 +20,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.minimal_surface"
     bl_label = "Minimal Surface"
+    adjustable = ("target",)
 
     group: StringProperty(
         name="Fixed",
@@ -57,18 +58,8 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
                         f'"{name}" has no rim, so that its surface would shrink to nothing. Assign the points that stay'
                         f' to the {kind} "{FIXED}".'
                     )
-            count = 0
-
-            def stepped(step, points, area):
-                nonlocal count
-                count = step
-
-            def report(stage, fraction):
-                progress("Steps", min(1.0, (count + fraction) / steps))
-
-            return reading, minimal_surface(
-                reading.points, rim, tolerance, steps, options, callback=stepped, progress=report
-            )
+            settings = (reading.points, rim, tolerance, steps, options)
+            return reading, cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
 
         return compute
 
@@ -84,12 +75,24 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
             f" ({film.reason})"
         )
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
+    def draw_settings(self, context, layout):
         search_group(layout, self, "group", context.object)
         for name in ("tolerance", "steps", "target"):
             layout.prop(self, name)
+
+
+def _shrink(points, rim, tolerance, steps, options, progress):
+    """Compute the film that a rim spans, with the share of the steps as progress."""
+    count = 0
+
+    def stepped(step, points, area):
+        nonlocal count
+        count = step
+
+    def report(stage, fraction):
+        progress("Steps", min(1.0, (count + fraction) / steps))
+
+    return minimal_surface(points, rim, tolerance, steps, options, callback=stepped, progress=report)
 
 
 CLASSES = (MESHFREE_OT_minimal_surface,)

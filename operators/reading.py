@@ -9,9 +9,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core import PointCloudError, check_points
+from ..core.rims import FEWEST
 from .attributes import own_positions, point_count
+from .groups import chosen_members, members
 from .modifiers import is_own
-from .rim import rim_checksum, rim_points
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 
@@ -82,12 +83,7 @@ def read_points(context, obj) -> Reading:
     PointCloudError
         The points cannot be read or used as they are; the text says what to do.
     """
-    context.view_layer.update()  # a script may have moved the object a line ago
-    mesh = obj.data
-    if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
-        positions = _evaluated_positions(context, obj)
-    else:
-        positions = own_positions(mesh)
+    positions = seen_positions(context, obj)
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     if not np.linalg.cond(matrix) < 1e6:
         raise PointCloudError(
@@ -95,9 +91,24 @@ def read_points(context, obj) -> Reading:
             " scale above zero along each axis."
         )
     notices = []
-    if obj.type == "MESH" and mesh.polygons:
-        notices.append(f"The mesh has {len(mesh.polygons)} faces: it is taken as its {point_count(mesh)} vertices.")
+    if obj.type == "MESH" and obj.data.polygons:
+        faces = len(obj.data.polygons)
+        notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
     return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
+
+
+def seen_positions(context, obj):
+    """Read the local positions of an object's points as `read_points` takes them, whatever they are, (n, 3) float32."""
+    context.view_layer.update()  # a script may have moved the object a line ago
+    if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
+        return _evaluated_positions(context, obj)
+    return own_positions(obj.data)
+
+
+def rim_points(obj):
+    """Read which points the rim group of an object holds, (n,) bool; None if the settings name no group."""
+    name = obj.meshfree.rim_group
+    return chosen_members(obj, name, "Rim Group", FEWEST) if name else None
 
 
 def key_positions(key):
@@ -154,8 +165,7 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
     A glance is quick enough for a panel, a few milliseconds for 1 million points, and may see a change of the rim
     group some seconds late. Of modifiers, if they are used, both see which ones there are, not their settings.
     """
-    mesh = obj.data
-    positions = own_positions(mesh)
+    positions = own_positions(obj.data)
     positions[np.asarray(left_out, dtype=int)] = 0.0
     checksum = zlib.crc32(positions)
     keys = shape_keys(obj)
@@ -169,7 +179,7 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
         state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_own(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.rim_group:
-        checksum = zlib.crc32(repr(rim_checksum(obj, glance)).encode(), checksum)
+        checksum = zlib.crc32(repr(members(obj, obj.meshfree.rim_group, glance).checksum).encode(), checksum)
     return f"{checksum:08x}"
 
 
@@ -178,6 +188,11 @@ def sharing_objects(obj) -> list:
     if obj.data.users == 1:  # as most of the time, for the panel's sake
         return []
     return [other for other in bpy.data.objects if other.data == obj.data and other != obj]
+
+
+def find_object(uid):
+    """Find an object by its session_uid, which neither undo nor another name changes; None if it is gone."""
+    return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
 
 
 def spacing(data) -> float:

@@ -42,7 +42,7 @@ def check_writable(obj, names, make_single_user: bool, among=()):
     others = [
         other.name
         for other in sharing_objects(obj)
-        if other not in among or not (other.meshfree.make_single_user or _same(metric(other), metric(obj)))
+        if other not in among or not (other.meshfree.make_single_user or same_lengths(metric(other), metric(obj)))
     ]
     if others and not make_single_user:
         shown = ", ".join(f'"{name}"' for name in others[:3]) + (", ..." if len(others) > 3 else "")
@@ -58,20 +58,20 @@ def analysis_names(modes: int) -> list:
 
 
 def write_result(obj, analysis, write_limit: int):
-    """Write an analysis to its object; modes up to `write_limit` become attributes."""
-    if sharing_objects(obj):
-        obj.data = obj.data.copy()
-    mesh = obj.data
+    """Write an analysis to its object and those that share its mesh; modes up to `write_limit` become attributes."""
+    mesh, owners = obj.data, [obj, *sharing_objects(obj)]
     if analysis.spectrum is not None:
         vectors = analysis.spectrum.eigenvectors[:, :write_limit]
         remove_numbered(mesh, EIGENVECTOR, beyond=vectors.shape[1])
         for index, vector in enumerate(vectors.T):
             write_attribute(mesh, eigenvector_name(index + 1), vector)
-        # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
-        obj[EIGENVALUES] = analysis.spectrum.eigenvalues.tolist()
+        for owner in owners:
+            # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
+            owner[EIGENVALUES] = analysis.spectrum.eigenvalues.tolist()
     elif is_stale(obj):
         remove_numbered(mesh, EIGENVECTOR, beyond=0)
-        obj.pop(EIGENVALUES, None)
+        for owner in owners:
+            owner.pop(EIGENVALUES, None)
     laplacian = analysis.laplacian
     write_attribute(mesh, AREA, laplacian.areas)
     write_attribute(mesh, NORMAL, analysis.local_normals)
@@ -79,10 +79,16 @@ def write_result(obj, analysis, write_limit: int):
     write_attribute(mesh, GAUSSIAN_CURVATURE, laplacian.gaussian_curvature)
     write_attribute(mesh, BOUNDARY, laplacian.boundary)
     write_attribute(mesh, COMPONENT, laplacian.component)
+    for owner in owners:
+        _note_analysis(owner, analysis, settings_values(obj.meshfree))
+    tag_changed(mesh)
 
+
+def _note_analysis(obj, analysis, settings):
+    """Keep on an object what tells of an analysis with some settings."""
     kept = obj.meshfree
     kept.total_area = analysis.total_area
-    kept.point_count = point_count(mesh)
+    kept.point_count = point_count(obj.data)
     for name, count in analysis.counts.items():
         setattr(kept, name, count)
     kept.stages.clear()
@@ -91,8 +97,7 @@ def write_result(obj, analysis, write_limit: int):
         stage.name, stage.seconds = name, seconds
     kept.fingerprint = fingerprint(obj)
     kept.metric = metric(obj).reshape(-1)
-    kept.settings_used = repr(settings_values(kept))
-    tag_changed(mesh)
+    kept.settings_used = repr(settings)
 
 
 def is_analyzed(obj) -> bool:
@@ -108,10 +113,10 @@ def is_stale(obj, glance=False) -> bool:
     kept = obj.meshfree
     if kept.fingerprint != fingerprint(obj, glance) or kept.settings_used != repr(settings_values(kept)):
         return True
-    return not _same(np.reshape(kept.metric, (3, 3)), metric(obj))
+    return not same_lengths(np.reshape(kept.metric, (3, 3)), metric(obj))
 
 
-def _same(before, now) -> bool:
+def same_lengths(before, now) -> bool:
     """Whether two metrics give the same lengths."""
     return np.allclose(before, now, rtol=0.0, atol=1e-5 * np.abs(now).max())
 

@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ..core import PointCloudError, heat_kernel_signature, modes_needed, nodal_domains, segment, wave_kernel_signature
 from . import cache
+from .analyze import resolved_modes
 from .application import ApplicationOperator, ShownOperator, operator_reader
 from .attributes import (
     HEAT_SIGNATURE,
@@ -29,6 +30,7 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
     bl_idname = "meshfree.segment"
     bl_label = "Segment"
     writes = (SEGMENT,)
+    adjustable = ("vertex_groups", "show")
 
     method: EnumProperty(
         name="Method",
@@ -40,7 +42,9 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         default="PARTS",
     )
     parts: IntProperty(name="Parts", description="How many parts", default=6, min=1, soft_max=50)
-    mode: IntProperty(name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1)
+    mode: IntProperty(
+        name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
+    )
     vertex_groups: BoolProperty(
         name="Vertex Groups",
         description="Make a vertex group of each part; of point clouds an attribute",
@@ -56,8 +60,8 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         def compute(progress):
             laplacian = operator(progress)
             if by_mode:
-                return nodal_domains(cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1], laplacian)
-            return segment(laplacian, parts, cache.known_modes(laplacian, modes_needed(laplacian, parts)), progress)
+                return cache.result(laplacian, "nodal", mode, compute=lambda: _by_mode(laplacian, mode, progress))
+            return cache.result(laplacian, "parts", parts, compute=lambda: _by_shape(laplacian, parts, progress))
 
         return compute
 
@@ -69,11 +73,24 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         tag_changed(obj.data)
         return f"{obj.name}: {count} part{'s' if count > 1 else ''}"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
+    def draw_settings(self, context, layout):
         for name in ("method", "mode" if self.method == "NODAL" else "parts", "vertex_groups", "show"):
             layout.prop(self, name)
+
+
+def _by_mode(laplacian, mode, progress):
+    """Divide the points by the signs of a mode."""
+    vector = cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1]
+    progress("Regions", 0.5)
+    return nodal_domains(vector, laplacian)
+
+
+def _by_shape(laplacian, parts, progress):
+    """Divide the points into parts, by modes from before if there are enough."""
+    count, spectrum = modes_needed(laplacian, parts), None
+    if cache.known_modes(laplacian) >= count:
+        spectrum = resolved_modes(laplacian, count, progress)[0]
+    return segment(laplacian, parts, spectrum, progress)
 
 
 def _is_numbered(name):
@@ -114,6 +131,7 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.separate_by_segment"
     bl_label = "Separate by Segment"
+    asks = False
 
     @classmethod
     def poll(cls, context):
@@ -123,9 +141,6 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
             cls.poll_message_set(f'"{context.object.name}" has no parts. Segment it first')
             return False
         return True
-
-    def invoke(self, context, event):
-        return self.execute(context)
 
     def plan(self, context, obj):
         leaving = [other for other in context.selected_objects if other.meshfree.make_single_user]
@@ -187,6 +202,7 @@ class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.signature"
     bl_label = "Signatures"
+    adjustable = ("kind", "count", "show")
 
     kind: EnumProperty(
         name="Kind",
@@ -217,6 +233,10 @@ class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
         signature = heat_kernel_signature if self.kind == "HEAT" else wave_kernel_signature
         count, modes = self.count, self.modes
         return lambda progress: signature(cache.lowest_modes(operator(progress), modes, progress), count=count)
+
+    def draw_settings(self, context, layout):
+        for name in ("kind", "count", "modes", "show"):
+            layout.prop(self, name)
 
     def write(self, context, obj, result):
         remove_numbered(obj.data, self._prefix(), beyond=self.count)

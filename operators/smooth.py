@@ -4,7 +4,16 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..core import PointCloudError, boost, displace_by_mode, exponential, fair_points, smooth_points
+from ..core import (
+    PointBlend,
+    PointCloudError,
+    boost,
+    displace_by_mode,
+    exponential,
+    fair_points,
+    smooth_points,
+    smoothing_base,
+)
 from . import cache
 from .application import ApplicationOperator, operator_reader
 from .groups import chosen_weights, search_group
@@ -12,6 +21,7 @@ from .positions import check_movable, target_property, write_positions
 from .result import length_text
 
 _HEAT, _DETAIL = 6.0, 12.0  # smoothing lengths of a wavelength that suits a scan: finer ones the kernel does not see
+_READY = 20  # modes computed together at least, so that Adjust Last Operation can go through them
 _FINEST = 8.0  # details finer than this share of the wavelength count as noise, which is not boosted
 
 
@@ -20,6 +30,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.smooth"
     bl_label = "Smooth Points"
+    adjustable = ("strength", "keep", "target")
 
     method: EnumProperty(
         name="Method",
@@ -41,7 +52,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         subtype="DISTANCE",
     )
     modes: IntProperty(
-        name="Modes", description="How many modes are kept, the constant one included", default=100, min=4
+        name="Modes", description="How many modes are kept, the constant one included", default=100, min=4, soft_max=500
     )
     gain: FloatProperty(name="Gain", description="How much stronger details become", default=1.5, min=0.0, soft_max=3.0)
     strength: FloatProperty(
@@ -78,7 +89,6 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
 
         def compute(progress):
             laplacian = operator(progress)
-            length = np.median(laplacian.smoothing_lengths)
             fixed_rim = keep_rim and bool(laplacian.boundary.any())
             if fixed_rim and shared["keep"]:
                 raise PointCloudError(
@@ -90,18 +100,21 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
                 raise PointCloudError(
                     f'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.'
                 )
-            settings = {**shared, "fixed_rim": fixed_rim, "progress": progress}
-            if method == "NOISE":
-                time = (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None
-                return reading, fair_points(laplacian, time, **settings)
-            if method == "MODES":
-                known = None if fixed_rim else cache.known_modes(laplacian, modes)
-                return reading, smooth_points(laplacian, modes, known, **settings)
-            if method == "HEAT":
-                squared = ((wavelength or _HEAT * length) / (2.0 * np.pi)) ** 2
-                return reading, smooth_points(laplacian, exponential(np.log(2.0) * squared), **settings)
-            low = (2.0 * np.pi / (wavelength or _DETAIL * length)) ** 2
-            return reading, smooth_points(laplacian, boost(gain, low, _FINEST**2 * low), **settings)
+            blend = PointBlend(laplacian, fixed_rim=fixed_rim, **shared)
+            settings = (
+                method,
+                fixed_rim,
+                modes if method == "MODES" else wavelength,
+                gain if method == "DETAIL" else 0,
+            )
+            return reading, blend(
+                cache.result(
+                    laplacian,
+                    "smooth",
+                    *settings,
+                    compute=lambda: _smooth(laplacian, method, fixed_rim, modes, wavelength, gain, progress),
+                )
+            )
 
         return compute
 
@@ -111,9 +124,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         moved = np.sqrt(np.mean(np.sum((points - reading.points) ** 2, axis=1)))
         return f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
+    def draw_settings(self, context, layout):
         layout.prop(self, "method")
         names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
         for name in [*names, "strength"]:
@@ -123,17 +134,38 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
             layout.prop(self, name)
 
 
+def _smooth(laplacian, method, fixed_rim, modes, wavelength, gain, progress):
+    """Return the places of the points, (n, 3), that a method gives at full strength."""
+    base = cache.result(laplacian, "base", fixed_rim, compute=lambda: smoothing_base(laplacian, fixed_rim, progress))
+    settings = {"fixed_rim": fixed_rim, "progress": progress, "base": base}
+    length = np.median(laplacian.smoothing_lengths)
+    if method == "NOISE":
+        return fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None, **settings)
+    if method == "MODES":
+        spectrum = cache.lowest_modes(laplacian, modes, progress, fixed_rim, raw=True)
+        return smooth_points(laplacian, modes, spectrum, **settings)
+    if method == "HEAT":
+        squared = ((wavelength or _HEAT * length) / (2.0 * np.pi)) ** 2
+        return smooth_points(laplacian, exponential(np.log(2.0) * squared), **settings)
+    low = (2.0 * np.pi / (wavelength or _DETAIL * length)) ** 2
+    return smooth_points(laplacian, boost(gain, low, _FINEST**2 * low), **settings)
+
+
 class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     """Move the points along their normals by a vibration mode, on demand as an animated shape key"""
 
     bl_idname = "meshfree.mode_shape"
     bl_label = "Deform by Mode"
+    adjustable = ("mode", "amplitude", "phase", "animate", "period", "target")
 
-    mode: IntProperty(name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1)
+    mode: IntProperty(
+        name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
+    )
     amplitude: FloatProperty(
         name="Amplitude",
         description="Largest displacement; 0 for a tenth of the object's radius",
         default=0.0,
+        min=0.0,
         subtype="DISTANCE",
     )
     phase: FloatProperty(
@@ -145,7 +177,7 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     animate: BoolProperty(
         name="Animate", description="Keyframe the shape key as a vibration over the frames of the scene", default=False
     )
-    period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4)
+    period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4, soft_max=250)
     target: target_property()
 
     def plan(self, context, obj):
@@ -158,17 +190,26 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
         check_movable(obj, target)
         reading, operator = operator_reader(context, obj)
         mode, amplitude, phase = self.mode, self.amplitude or None, self.phase
+        repeated = self.is_repeated(context)
 
         def compute(progress):
             laplacian = operator(progress)
-            vector = cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1]
-            return reading, displace_by_mode(laplacian, vector, amplitude, phase)
+            number = mode
+            if repeated and cache.known_modes(laplacian):
+                number = min(mode, cache.known_modes(laplacian))
+            else:
+                several = max(mode, min(_READY, len(reading.points) // 3))
+                cache.lowest_modes(laplacian, several, progress, raw=True)
+            vector = cache.lowest_modes(laplacian, number, progress).eigenvectors[:, number - 1]
+            return reading, displace_by_mode(laplacian, vector, amplitude, phase), number
 
         return compute
 
     def write(self, context, obj, result):
-        reading, points = result
-        key = write_positions(obj, reading, points, "SHAPE_KEY" if self.animate else self.target, f"Mode {self.mode}")
+        reading, points, mode = result
+        if mode < self.mode:
+            self.warn([f"Only {mode} modes are computed: this is the last. Start {self.bl_label} again for more."])
+        key = write_positions(obj, reading, points, "SHAPE_KEY" if self.animate else self.target, f"Mode {mode}")
         if self.animate:
             key.slider_min = -1.0
             scene, quarter = context.scene, 0.25 * self.period
@@ -176,11 +217,9 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
                 key.value = (1.0, 0.0, -1.0, 0.0)[index % 4]
                 key.keyframe_insert("value", frame=scene.frame_start + index * quarter)
         largest = np.linalg.norm(points - reading.points, axis=1).max()
-        return f"{obj.name}: moved by mode {self.mode}, at most by {length_text(largest)}"
+        return f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
+    def draw_settings(self, context, layout):
         for name in ("mode", "amplitude", "phase", "animate"):
             layout.prop(self, name)
         layout.prop(self, "period" if self.animate else "target")

@@ -21,8 +21,15 @@ class MESHFREE_OT_spectrum(AnalysisOperator, bpy.types.Operator):
         soft_max=100,
     )
 
-    def execute(self, context):
-        return self.run(context, self.count, shown=eigenvector_name(min(2, self.count)))
+    @property
+    def wanted(self):
+        """How many modes to compute."""
+        return self.count
+
+    @property
+    def shown(self):
+        """Name of the attribute: the first mode that is not constant."""
+        return eigenvector_name(min(2, self.count))
 
 
 CLASSES = (MESHFREE_OT_spectrum,)

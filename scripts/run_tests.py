@@ -1,4 +1,4 @@
-"""Run the tests: core without Blender, then the installed extension in Blender's module."""
+"""Run the tests: core without Blender, the installed extension in Blender's module, and in a window with real keys."""
 
 import argparse
 import itertools
@@ -7,6 +7,7 @@ import sys
 import time
 import xml.etree.ElementTree as ElementTree
 
+import gui_blender
 import package
 import pythons
 from environments import ROOT, ensure, ensure_blender, isolated
@@ -39,6 +40,19 @@ def run_pytest(name, python, folder):
     return {**counts, "seconds": time.monotonic() - began}
 
 
+def run_gui(required):
+    """Run the tests in a window; where this machine cannot have it, say so, and stop if it is required."""
+    try:
+        gui_blender.ensure()
+    except gui_blender.LeftOutError as error:
+        if required:
+            sys.exit(f"No test ran: {error}")
+        print(f"\nLeft out: tests in a window, for {error}")
+        return {}
+    version, python = next(iter(pythons.find().items()))
+    return {"gui": run_pytest("gui", ensure(f"core-{version}", "test", python), "tests/gui")}
+
+
 def report(results):
     """Print a line per run and their sum in pytest's words."""
     print()
@@ -54,14 +68,10 @@ def _words(counts):
     return f"{', '.join(words)} in {counts['seconds']:.2f}s"
 
 
-def main():
-    """Run the tests for the Python to prefer and the newest Blender it has, or for all that can run here."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--all", action="store_true", help="every supported Python and Blender that can run here")
-    everything = parser.parse_args().all
-    found = pythons.find() if everything else dict(itertools.islice(pythons.find().items(), 1))
-    package.build([package.this_platform()])
+def run_modules(everything):
+    """Run the tests of core and in Blender's module: for the Python to prefer, or for all that can run here."""
     results = {}
+    found = pythons.find() if everything else dict(itertools.islice(pythons.find().items(), 1))
     for version, python in found.items():
         name = f"core-{version}"
         results[name] = run_pytest(name, ensure(name, "test", python), "tests/core")
@@ -70,6 +80,20 @@ def main():
             results[name] = run_pytest(name, ensure_blender(blender, python), "tests/blender")
     for version in pythons.BLENDERS.keys() - pythons.find().keys():
         print(f"\nLeft out: Blender {' and '.join(pythons.BLENDERS[version])}, no Python {version} is found")
+    return results
+
+
+def main():
+    """Run the tests for the Python to prefer and the newest Blender it has, all that can run here, or the window's."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument("--all", action="store_true", help="every supported Python and Blender that can run here")
+    choice.add_argument("--gui", action="store_true", help="only those in a window")
+    options = parser.parse_args()
+    package.build([package.this_platform()])
+    results = {} if options.gui else run_modules(options.all)
+    if options.gui or options.all:
+        results.update(run_gui(required=options.gui))
     sys.exit(bool(report(results)))
 
 

@@ -1,28 +1,8 @@
-"""The panels of what the operator is for: groups of points, and shapes by frequency."""
+"""The panels of what the operator is for."""
 
 import bpy
 
-from ..operators.reading import TYPES
-from .panel import ReadyPanel, SidebarPanel
-
-
-class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
-    """Selecting points, and the groups that the tools take"""
-
-    bl_label = "Points and Groups"
-    bl_parent_id = "MESHFREE_PT_main"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return context.object is not None and context.object.type in TYPES
-
-    def draw(self, context):
-        column = self.layout.column(align=True)
-        column.operator("meshfree.select_grow")
-        column.operator("meshfree.select_component")
-        column.operator("meshfree.select_front")
-        self.layout.operator_menu_enum("meshfree.group_from_selection", "role")
+from .panel import ReadyPanel
 
 
 class MESHFREE_PT_shape(ReadyPanel, bpy.types.Panel):
@@ -73,7 +53,6 @@ class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
 
 
 CLASSES = (
-    MESHFREE_PT_points,
     MESHFREE_PT_shape,
     MESHFREE_PT_segment,
     MESHFREE_PT_fields,

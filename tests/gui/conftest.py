@@ -1,0 +1,39 @@
+"""The tests play in a real Blender window, with the extension installed: `make test-gui`.
+
+Every test starts from an empty file, so each can run alone; all share one window.
+"""
+
+from pathlib import Path
+
+import pytest
+
+import gui_blender
+import package
+from window import Window
+
+CLOUDS = (Path(__file__).parents[1] / "blender" / "clouds.py").read_text(encoding="utf-8")  # run inside Blender
+
+
+@pytest.fixture(scope="session")
+def window():
+    """One Blender for all tests."""
+    try:
+        place = gui_blender.find()
+    except gui_blender.LeftOutError as error:
+        pytest.skip(str(error))
+    archive = package.archive(package.this_platform())
+    assert archive.exists(), f"{archive.name} is missing in dist/, `make build` makes it"
+    with Window(place, archive) as window:
+        yield window
+
+
+@pytest.fixture
+def gui(window, request):
+    """Give the window with an empty file; keep a picture of the end, and let no error in Python pass unseen."""
+    window.new_file()
+    window.python(CLOUDS)
+    known = len(window.complaints)
+    yield window
+    if window.running:
+        window.shot(request.node.name.removeprefix("test_"))
+    assert window.complaints[known:] == []

@@ -1,0 +1,100 @@
+"""Menus of the 3D view, where the search (F3) finds operators; File > Import and Export; dropped files."""
+
+import bpy
+
+from ..operators.importing import OWN
+
+_TOOLS = (
+    ("analyze", "spectrum", "colormap"),
+    ("smooth", "mode_shape"),
+    ("segment", "separate_by_segment", "signature"),
+    ("geodesic_distance", "harmonic_field"),
+    ("deform_bind", "deform_update"),
+    ("minimal_surface",),
+    ("stop",),
+)
+_SELECTING = ("select_grow", "select_component", "select_front", "select_rim")
+
+
+class MESHFREE_MT_object(bpy.types.Menu):
+    """All tools for point clouds"""
+
+    bl_label = "Mesh-Free"
+
+    def draw(self, context):
+        for index, names in enumerate(_TOOLS):
+            if index:
+                self.layout.separator()
+            for name in names:
+                self.layout.operator(f"meshfree.{name}")
+
+
+class MESHFREE_MT_points(bpy.types.Menu):
+    """Selecting points, and the groups that the tools take"""
+
+    bl_label = "Mesh-Free"
+
+    def draw(self, context):
+        for name in _SELECTING:
+            self.layout.operator(f"meshfree.{name}")
+        self.layout.separator()
+        self.layout.operator_menu_enum("meshfree.group_from_selection", "role")
+
+
+def _draw_object(menu, context):
+    menu.layout.separator()
+    menu.layout.menu(MESHFREE_MT_object.__name__)
+
+
+def _draw_points(menu, context):
+    menu.layout.separator()
+    menu.layout.menu(MESHFREE_MT_points.__name__)
+
+
+def _draw_import(self, _context):
+    self.layout.operator("meshfree.import_points", text="Points (.ply/.obj/.xyz/.pts/.csv/.npy)")
+
+
+def _draw_export(self, _context):
+    layout = self.layout
+    layout.operator("meshfree.export_points", text="Points with Results (.ply/.xyz/.csv)")
+    layout.operator("meshfree.export_operator", text="Laplacian and Modes (.npz)")
+    layout.operator("meshfree.export_eigenvalues", text="Eigenvalues (.csv)")
+
+
+class MESHFREE_FH_points(bpy.types.FileHandler):
+    """Import files that are dropped onto a 3D view, of kinds that Blender does not read by itself"""
+
+    bl_idname = "MESHFREE_FH_points"
+    bl_label = "Points"
+    bl_import_operator = "meshfree.import_points"
+    bl_file_extensions = ";".join(OWN)
+
+    @classmethod
+    def poll_drop(cls, context):
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+def _entries():
+    """Menus and what is added to them; point clouds have an Edit Mode from Blender 4.5 on."""
+    yield bpy.types.VIEW3D_MT_object, _draw_object
+    yield bpy.types.VIEW3D_MT_edit_mesh, _draw_points
+    if hasattr(bpy.types, "VIEW3D_MT_edit_pointcloud"):
+        yield bpy.types.VIEW3D_MT_edit_pointcloud, _draw_points
+    yield bpy.types.TOPBAR_MT_file_import, _draw_import
+    yield bpy.types.TOPBAR_MT_file_export, _draw_export
+
+
+def attach():
+    """Add the entries to Blender's menus."""
+    for menu, draw in _entries():
+        menu.append(draw)
+
+
+def detach():
+    """Take the entries away again."""
+    for menu, draw in _entries():
+        menu.remove(draw)
+
+
+CLASSES = (MESHFREE_MT_object, MESHFREE_MT_points, MESHFREE_FH_points)

@@ -1,0 +1,38 @@
+"""The panel about points: selecting them, and the groups that the tools take."""
+
+import bpy
+
+from ..operators.groups import ANCHOR, FIXED, HANDLE, RIM, SOURCE, VALUE, has_group, members
+from ..operators.reading import TYPES
+from .panel import SidebarPanel
+
+_TITLES = {HANDLE: "Handles", ANCHOR: "Anchors", FIXED: "Fixed", SOURCE: "Sources", VALUE: "Values", RIM: "Rim"}
+
+
+class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
+    """Selecting points, and the groups that the tools take"""
+
+    bl_label = "Points and Groups"
+    bl_parent_id = "MESHFREE_PT_main"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.object is not None and context.object.type in TYPES
+
+    def draw(self, context):
+        layout, obj = self.layout, context.object
+        column = layout.column(align=True)
+        for name in ("grow", "component", "front", "rim"):
+            column.operator(f"meshfree.select_{name}")
+        column = layout.column(align=True)
+        for role, title in _TITLES.items():
+            row = column.row(align=True)
+            row.operator("meshfree.group_from_selection", text=f"Assign to {title}").role = role.upper()
+            count = members(obj, role, glance=True).count
+            selecting = row.row(align=True)
+            selecting.enabled = has_group(obj, role)
+            selecting.operator("meshfree.select_group", text=f"{count:,}", icon="RESTRICT_SELECT_OFF").name = role
+
+
+CLASSES = (MESHFREE_PT_points,)
