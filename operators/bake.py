@@ -11,6 +11,7 @@ from .binding import stale_reason
 from .deform import BoundOperator, check_fresh, delete_bake
 from .deform_nodes import find_deform, is_baked, show_baked
 
+_LAST = 1048574  # frame of Blender
 _TICK = 0.01  # seconds between two frames, for the window to notice Esc
 
 
@@ -21,9 +22,13 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
     bl_label = "Bake"
 
     first: IntProperty(
-        name="First Frame", description="First frame to bake; 0 for both takes the range of the scene", default=0, min=0
+        name="First Frame",
+        description="First frame to bake; 0 for both takes the range of the scene",
+        default=0,
+        min=0,
+        max=_LAST,
     )
-    last: IntProperty(name="Last Frame", description="Last frame to bake", default=0, min=0)
+    last: IntProperty(name="Last Frame", description="Last frame to bake", default=0, min=0, max=_LAST)
 
     def invoke(self, context, event):
         self.first, self.last = context.scene.frame_start, context.scene.frame_end

@@ -207,13 +207,13 @@ def show_shape(obj, normals="", like=None):
     An attribute of normals makes the shading smooth.
     """
     modifier = add_display(obj, CLOSED * part("operators.reading").spacing((like or obj).data))
-    part("ui.display").set_input(modifier, "Material", paint("Clay", CLAY, normals))
+    part("operators.modifiers").set_input(modifier, "Material", paint("Clay", CLAY, normals))
 
 
 def mark(points, color, radius):
     """Add points of one colour to the scene, (n, 3), such as the handles of a deformation."""
     obj = make_object(points, "Marks")
-    part("ui.display").set_input(add_display(obj, radius), "Material", paint("Mark", color))
+    part("operators.modifiers").set_input(add_display(obj, radius), "Material", paint("Mark", color))
     return obj
 
 
@@ -221,7 +221,7 @@ def add_display(obj, radius):
     """Make an object's vertices round points of this radius, and return the modifier."""
     modifier = part("ui.display").find_display(obj) or obj.modifiers.new("Points", "NODES")
     modifier.node_group = part("ui.nodes").display_group()
-    part("ui.display").set_input(modifier, "Radius", radius)
+    part("operators.modifiers").set_input(modifier, "Radius", radius)
     return modifier
 
 

@@ -5,7 +5,7 @@ import bpy
 from ..operators.importing import OWN
 
 _TOOLS = (
-    ("analyze", "spectrum", "colormap"),
+    ("analyze", "spectrum", "colormap", "legend"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
     ("geodesic_distance", "harmonic_field"),
@@ -13,7 +13,7 @@ _TOOLS = (
     ("minimal_surface",),
     ("stop",),
 )
-_SELECTING = ("select_grow", "select_component", "select_front", "select_rim")
+_SELECTING = ("select_grow", "select_component", "select_front", "select_rim", "select_by_range")
 
 
 class MESHFREE_MT_object(bpy.types.Menu):

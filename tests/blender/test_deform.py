@@ -193,8 +193,7 @@ class TestFollowing:
         bpy.ops.meshfree.deform_update()
         assert_allclose(displacement(strip), turned, atol=1e-5)
 
-    def test_strength(self, extension, strip):
-        modifiers = importlib.import_module(f"{extension.__name__}.operators.modifiers")
+    def test_strength(self, modifiers, strip):
         before = local_points(strip)
         lift(bind(), 1.0)
         full = shown_points(strip)

@@ -5,7 +5,11 @@ import importlib
 import bpy
 import pytest
 
-NOT_IN_MENUS = {"meshfree.select_group"}  # of the panel, where it has the name of a group
+NOT_IN_MENUS = {  # of the panel, where they have the name of a group or a preset
+    "meshfree.select_group",
+    "meshfree.add_preset",
+    "meshfree.apply_preset",
+}
 
 
 class Layout:
@@ -14,7 +18,7 @@ class Layout:
     def __init__(self):
         self.operators = []
 
-    def operator(self, name):
+    def operator(self, name, text=""):
         self.operators.append(name)
 
     def operator_menu_enum(self, name, _):
@@ -32,8 +36,10 @@ class Menu:
 def test_menus_hold_every_operator(extension):
     menus = importlib.import_module(f"{extension.__name__}.ui.menus")
     menu = Menu()
-    for cls in menus.CLASSES:
+    for cls in (menus.MESHFREE_MT_object, menus.MESHFREE_MT_points):
         cls.draw(menu, bpy.context)
+    menus._draw_import(menu, bpy.context)
+    menus._draw_export(menu, bpy.context)
     operators = {f"meshfree.{name}" for name in dir(bpy.ops.meshfree)}
     assert sorted(menu.layout.operators) == sorted(operators - NOT_IN_MENUS)
 
