@@ -14,13 +14,20 @@ OPERATORS = (
     "analyze",
     "apply_preset",
     "colormap",
+    "deform_apply",
+    "deform_bake",
     "deform_bind",
+    "deform_free",
+    "deform_reset",
+    "deform_to_shape_key",
+    "deform_unbind",
     "deform_update",
     "export_eigenvalues",
     "export_operator",
     "export_points",
     "geodesic_distance",
     "group_from_selection",
+    "handle_add",
     "harmonic_field",
     "import_points",
     "legend",
@@ -60,7 +67,10 @@ class Layout:
     def menu(self, idname, text=""):
         self.texts.append(text or getattr(bpy.types, idname).bl_label)
 
-    def prop(self, data, path, text=None, toggle=False):
+    def context_pointer_set(self, name, data):
+        assert name == "object"
+
+    def prop(self, data, path, text=None, toggle=False, slider=False):
         data.path_resolve(path)
         self.texts.append(text or path)
 
