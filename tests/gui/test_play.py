@@ -175,7 +175,7 @@ class TestDeformation:
         gui.wait_until(f"{MOVED} > 0.9")
 
         gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'bent.blend')")
-        gui.key("r", "y", "30", "Return")
+        gui.key("r", "y", "3", "0", "Return")
         bent = "attribute(bpy.data.objects['Cloud'], 'lb_displacement').round(3)"
         gui.wait_until("bpy.data.is_dirty")
         gui.settle()
