@@ -1,12 +1,39 @@
 """Mesh-Free Laplacian: areas, normals, curvature and vibration modes of point clouds, inside Blender."""
 
 
-def _classes():
-    from .operators import analyze, deform, fields, job, minimal, segment, selecting, smooth, spectrum
-    from .ui import applications, colormap, menus, panel, points, settings
-
-    modules = (
+def _modules():
+    """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
+    from .operators import (
+        analyze,
+        cache,
+        command,
+        deform,
+        exporting,
+        fields,
+        importing,
+        job,
+        minimal,
+        segment,
+        selecting,
+        smooth,
+        spectrum,
+    )
+    from .ui import (
+        applications,
+        colormap,
+        legend,
+        menus,
+        overlay,
+        panel,
+        points,
+        presets,
+        range_selection,
         settings,
+    )
+
+    return (
+        settings,
+        cache,
         job,
         analyze,
         spectrum,
@@ -16,44 +43,38 @@ def _classes():
         deform,
         minimal,
         selecting,
+        importing,
+        exporting,
+        command,
         colormap,
+        legend,
+        range_selection,
+        presets,
         panel,
         points,
         applications,
         menus,
+        overlay,
     )
-    return [cls for module in modules for cls in module.CLASSES]
 
 
 def register():
-    """Add the extension's classes, the settings of objects and the command line to Blender."""
+    """Add the extension's classes, the settings of objects, menus, handlers and the command line to Blender."""
     import bpy
 
-    from .operators import cache, command, deform, job
-    from .ui import menus, settings
-
-    for cls in _classes():
-        bpy.utils.register_class(cls)
-    settings.attach()
-    menus.attach()
-    command.attach()
-    deform.attach()
-    cache.attach()
-    job.attach()
+    for module in _modules():
+        for cls in getattr(module, "CLASSES", ()):
+            bpy.utils.register_class(cls)
+        if hasattr(module, "attach"):
+            module.attach()
 
 
 def unregister():
     """Take everything out again, in reverse order."""
     import bpy
 
-    from .operators import cache, command, deform, job
-    from .ui import menus, settings
-
-    job.detach()
-    cache.detach()
-    deform.detach()
-    command.detach()
-    menus.detach()
-    settings.detach()
-    for cls in reversed(_classes()):
-        bpy.utils.unregister_class(cls)
+    for module in reversed(_modules()):
+        if hasattr(module, "detach"):
+            module.detach()
+        for cls in reversed(getattr(module, "CLASSES", ())):
+            bpy.utils.unregister_class(cls)

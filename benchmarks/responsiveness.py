@@ -7,7 +7,7 @@ thread goes on computing, unseen, after Esc has ended the operator.
 
 import sys
 import time
-from threading import Event, Thread
+from threading import Thread
 
 import numpy as np
 
@@ -21,35 +21,41 @@ _NAP = 0.002  # seconds between two looks at the clock
 
 
 class Gaps:
-    """The longest time between two calls, and what went on in it."""
+    """The longest time between two calls, and the stage in which it was."""
 
     def __init__(self):
-        self.longest, self.stage = 0.0, ""
-        self._last, self._now = time.perf_counter(), ""
+        self.longest, self.during, self.stage = 0.0, "", "Start"
+        self._last = time.perf_counter()
 
-    def __call__(self, stage="", _fraction=0.0):
-        """Note the time since the last report."""
+    def __call__(self, stage, _fraction=0.0, most=np.inf):
+        """Note that a stage goes on or begins; a gap counts for `most` seconds at most."""
         now = time.perf_counter()
-        if now - self._last > self.longest:
-            self.longest, self.stage = now - self._last, self._now
-        self._last, self._now = now, stage
+        gap = min(now - self._last, most)
+        if gap > self.longest:
+            self.longest, self.during = gap, self.stage
+        self._last, self.stage = now, stage
 
 
 def watch(compute):
-    """Run a function of a progress callback in a thread and return seconds, both kinds of gaps, and its result."""
-    reports, held, over, result = Gaps(), Gaps(), Event(), []
+    """Run a function of a progress callback in a thread; return its seconds, and the gaps of both kinds.
 
-    def run():
-        result.append(compute(reports))
-        reports()
-        over.set()
-
+    What other programs take from this thread does not count: a wait is no longer than what the worker computed then.
+    """
+    reports, held = Gaps(), Gaps()
+    worker = Thread(target=compute, args=(reports,), daemon=True)
     began = time.perf_counter()
-    Thread(target=run, daemon=True).start()
-    while not over.is_set():
-        held(reports._now)
+    worker.start()
+    clock, spent = time.pthread_getcpuclockid(worker.ident), 0.0
+    while worker.is_alive():
+        try:
+            now = time.clock_gettime(clock)
+        except OSError:  # it ended meanwhile
+            break
+        held(reports.stage, most=now - spent)
+        spent = now
         time.sleep(_NAP)
-    return time.perf_counter() - began, held, reports, result[0]
+    reports("End")
+    return time.perf_counter() - began, held, reports
 
 
 def works(points):
@@ -83,17 +89,17 @@ def responsiveness(sizes=SIZES):
     rows = []
     for count in sizes:
         for name, compute in works(random_sphere(count)):
-            seconds, held, reports, _ = watch(compute)
+            seconds, held, reports = watch(compute)
             rows.append(
-                [f"{name}, {count:,} points", f"{seconds:.1f}", f"{held.longest:.2f}", held.stage]
-                + [f"{reports.longest:.2f}", reports.stage]
+                [f"{name}, {count:,} points", f"{seconds:.1f}", f"{held.longest:.2f}", held.during]
+                + [f"{reports.longest:.1f}", reports.during]
             )
-            print(rows[-1], flush=True)
+            print(" | ".join(rows[-1]), flush=True)
     return Table(
         "Responsiveness",
         ["computation", "seconds", "window waits at most", "in", "no report for at most", "in"],
         rows,
-        "Random points on a sphere; every computation runs in a thread beside one that wants Python's lock.",
+        "Random points on a sphere; every computation runs in a thread beside one that wants Python's lock. Seconds.",
     )
 
 

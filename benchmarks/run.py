@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy
 import scipy
 
-from . import accuracy, applications, speed, targets
+from . import accuracy, applications, responsiveness, speed, targets
 
 TABLES = {
     "figure3": accuracy.paper_figure_3,
@@ -18,6 +18,7 @@ TABLES = {
     "targets": targets.targets,
     "applications": applications.applications,
     "areas": speed.areas_against_algorithm_1,
+    "responsiveness": responsiveness.responsiveness,
     "stages": speed.stages_and_memory,
 }
 

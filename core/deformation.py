@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import sparse
 
+from .dissection import dissection_order
 from .errors import InvalidPointsError, PointCloudError
 from .points import as_indices
 from .rotations import nearest_rotations
@@ -124,7 +125,9 @@ class Deformer:
         inside = self._row >= 0
         fixed = np.zeros(len(moving), dtype=bool)
         fixed[self._row[inside & hard]] = True
-        self._free, self._fixed = np.flatnonzero(~fixed), np.flatnonzero(fixed)
+        free, self._fixed = np.flatnonzero(~fixed), np.flatnonzero(fixed)
+        order = dissection_order(energy[free][:, free], self._rest[free], lambda: report("Equations", 0.5))
+        self._free = free[order]
         # A soft constraint adds its weight to the diagonal, and to the right-hand side times the place it pulls to.
         self._pull = np.zeros(len(moving))
         soft = inside & ~hard
@@ -135,7 +138,7 @@ class Deformer:
         if self.rotation_aware:
             self._edges = _edge_products(stiffness, self._rest)
 
-        report("Factors", 0.5)
+        report("Factors", 0.6)
         matrix = free_rows[:, self._free] + sparse.diags_array(self._pull[self._free])
         self._solve = factorize(matrix) if len(self._free) else None
 

@@ -88,6 +88,7 @@ def factorize(matrix):
     Parameters
     ----------
     matrix : sparse array, (m, m)
+        Its unknowns in the order that `dissection_order` gives, or factors become large.
 
     Returns
     -------
@@ -101,12 +102,10 @@ def factorize(matrix):
 
     Notes
     -----
-    A symmetric order of minimum degree without pivoting is 30 to 50 times faster here than SuperLU's defaults.
+    A symmetric order without pivoting is 30 to 50 times faster here than SuperLU's defaults.
     """
     try:
-        factors = splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
+        factors = splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError as error:
         raise SolverError(
             f"The equations of {matrix.shape[0]} points have no single solution ({error}). Fix some points on every"

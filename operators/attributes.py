@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -20,6 +21,7 @@ _STORAGE = {
     "INT": _Storage(np.int32, 1, "value"),
     "BOOLEAN": _Storage(np.bool_, 1, "value"),
 }
+_LAYERS = {"FLOAT": "float", "FLOAT_VECTOR": "float_vector", "INT": "int", "BOOLEAN": "bool"}  # in Edit Mode
 
 SELECTION = ".selection"  # of point clouds, as Blender names it
 PREFIX = "lb_"
@@ -38,6 +40,12 @@ HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # f
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT  # of every analysis, as in the panel
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {NORMAL: "FLOAT_VECTOR", BOUNDARY: "BOOLEAN", COMPONENT: "INT", SEGMENT: "INT"}  # all others are FLOAT
+STORABLE = tuple(_STORAGE)
+
+
+def type_of(name: str) -> str:
+    """Type of one of this extension's attributes."""
+    return _TYPES.get(name, "FLOAT")
 
 
 def eigenvector_name(mode: int) -> str:
@@ -96,7 +104,7 @@ def write_attribute(data, name: str, values, data_type: str = ""):
     data_type : str
         As Blender names it; empty for that of our own results.
     """
-    data_type = data_type or _TYPES.get(name, "FLOAT")
+    data_type = data_type or type_of(name)
     storage = _STORAGE[data_type]
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
     if len(values) != storage.components * point_count(data):
@@ -126,9 +134,20 @@ def read_attribute(data, name: str):
             f"Attribute {name} has the type {attribute.data_type} on the domain {attribute.domain}. Choose a number or"
             " a vector on points."
         )
-    values = np.empty((len(attribute.data), storage.components), storage.dtype)
-    attribute.data.foreach_get(storage.key, values.reshape(-1))
+    if isinstance(data, bpy.types.Mesh) and data.is_editmode:
+        values = _edited_values(data, name, attribute.data_type)
+    else:
+        values = np.empty((len(attribute.data), storage.components), storage.dtype)
+        attribute.data.foreach_get(storage.key, values.reshape(-1))
     return values[:, 0] if storage.components == 1 else values
+
+
+def _edited_values(mesh, name, data_type):
+    """Read an attribute of a mesh in Edit Mode, where only its vertices know it, one by one."""
+    vertices = bmesh.from_edit_mesh(mesh).verts
+    layer = getattr(vertices.layers, _LAYERS[data_type])[name]
+    storage = _STORAGE[data_type]
+    return np.array([vertex[layer] for vertex in vertices], storage.dtype).reshape(-1, storage.components)
 
 
 def remove_numbered(data, prefix: str, beyond: int):

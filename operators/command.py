@@ -173,7 +173,7 @@ def _process(path, arguments) -> dict:
     output = _output_path(path, arguments)
     if output is not None and output.resolve() == path.resolve():
         raise PointCloudError(f"The output {output} would overwrite its input. Choose another name.")
-    obj = files.load(path, arguments.object)
+    obj, notices = files.load(path, arguments.object)
     reason = obstacle(obj)
     if reason:
         raise PointCloudError(reason)
@@ -182,6 +182,7 @@ def _process(path, arguments) -> dict:
         if value is not None:
             setattr(obj.meshfree, name, value)
     result = _analyze(obj, arguments, output) if arguments.command == "analyze" else _apply(obj, arguments, output)
+    result["notices"] = notices + result["notices"]
     return {**result, "output": None if output is None else str(output)}
 
 
@@ -192,7 +193,10 @@ def _analyze(obj, arguments, output):
         obj.data = obj.data.copy()
     write_result(obj, analysis, arguments.write_limit)
     if output is not None:
-        files.save(output, obj, files.analysis_arrays(obj, analysis))
+        arrays = files.analysis_arrays(
+            files.place_of(obj), analysis.laplacian, analysis.mean_curvature, analysis.spectrum
+        )
+        files.save(output, obj, arrays)
     return {
         "points": len(analysis.laplacian.areas),
         "total_area": analysis.total_area,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PointCloudError
-from .attributes import point_count, read_attribute
+from .attributes import point_count, read_attribute, tag_changed, write_attribute
 
 HANDLE, ANCHOR, FIXED, SOURCE, VALUE, RIM = ROLES = "Handle", "Anchor", "Fixed", "Source", "Value", "Rim"
 _PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
@@ -131,3 +131,55 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
 def chosen_members(obj, name: str, setting: str, least: int = 1):
     """Read which points the group that a setting names gives a weight above zero, (n,) bool; see `chosen_weights`."""
     return chosen_weights(obj, name, setting, least) > 0.0
+
+
+def check_assignable(obj, name: str, must_exist: bool):
+    """Refuse a group that points cannot be assigned to, or removed from."""
+    kind, exists = group_kind(obj), has_group(obj, name)
+    if must_exist and not exists:
+        raise PointCloudError(f'"{obj.name}" has no {kind} named "{name}" to remove points from. Choose another.')
+    if name in obj.data.attributes and not (exists and obj.type != "MESH"):
+        reason = "vertex groups share their names" if obj.type == "MESH" else "it holds no weights"
+        raise PointCloudError(
+            f'"{obj.name}" has an attribute named "{name}", and {reason}. Choose another name, or rename the attribute.'
+        )
+    if obj.type == "MESH" and exists and obj.vertex_groups[name].lock_weight:
+        raise PointCloudError(
+            f'The vertex group "{name}" of "{obj.name}" is locked. Unlock it, or choose another name.'
+        )
+
+
+def assign(obj, name: str, chosen, action: str, weight: float):
+    """Change a group, or make it.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name : str
+        The group; see `check_assignable`.
+    chosen : ndarray, (n,) bool
+        The points.
+    action : {"REPLACE", "ADD", "REMOVE"}
+        What becomes of them and of those that the group holds already.
+    weight : float
+        Of the points in the group.
+    """
+    if obj.type == "MESH":
+        group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)
+        indices = np.flatnonzero(chosen).tolist()
+        if action == "REPLACE":
+            group.remove(range(len(chosen)))
+        if action == "REMOVE":
+            group.remove(indices)
+        else:
+            group.add(indices, weight, "REPLACE")
+        obj.vertex_groups.active = group
+    else:
+        exists = has_group(obj, name)
+        weights = group_weights(obj, name) if exists and action != "REPLACE" else np.zeros(len(chosen))
+        weights[chosen] = 0.0 if action == "REMOVE" else weight
+        weighted = exists and obj.data.attributes[name].data_type == "FLOAT"
+        plain = np.isin(weights, (0.0, 1.0)).all() and not weighted
+        write_attribute(obj.data, name, weights, "BOOLEAN" if plain else "FLOAT")
+        tag_changed(obj.data)
+    members(obj, name)  # for the panel's count

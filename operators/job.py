@@ -81,7 +81,7 @@ class Job(StageTimes):
         super().__init__()
         self.label, self.snapshots = label, snapshots
         self.stage, self.reason, self._stop = "Start", "", Event()
-        self._timer = None
+        self._timer, self._shown = None, ""
         self._future = Future()
         # Not of a pool: Blender must not wait for it at its end.
         self._thread = Thread(target=self._run, args=(compute,), name=label, daemon=True)
@@ -123,8 +123,11 @@ class Job(StageTimes):
 
     def show(self, context):
         """Tell in the status bar how far it is, and let the panel do so too."""
-        context.workspace.status_text_set(f"{self.label}: {self.stage}, {self.fraction:.0%}    Esc to stop")
-        _redraw_panels(context)
+        text = f"{self.label}: {self.stage}, {self.fraction:.0%}    Esc to stop"
+        if text != self._shown:
+            self._shown = text
+            context.workspace.status_text_set(text)
+            _redraw_panels(context)
 
     def open(self, context):
         """Begin to show it in the window and to look at it there again and again."""
@@ -138,7 +141,7 @@ class Job(StageTimes):
             return
         _jobs.remove(self)
         context.window_manager.event_timer_remove(self._timer)
-        for workspace in bpy.data.workspaces:  # another one may be open than when it was shown
+        for workspace in bpy.data.workspaces:  # another one may be open now than when it was shown
             workspace.status_text_set(None)
         _redraw_panels(context)
 
@@ -147,7 +150,7 @@ def _redraw_panels(context):
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
-                area.tag_redraw()
+                next(region for region in area.regions if region.type == "UI").tag_redraw()
 
 
 class JobOperator(ReadyOperator):

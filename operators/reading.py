@@ -90,12 +90,7 @@ def read_points(context, obj) -> Reading:
     PointCloudError
         The points cannot be read or used as they are; the text says what to do.
     """
-    context.view_layer.update()  # a script may have moved the object a line ago
-    mesh = obj.data
-    if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
-        positions = _evaluated_positions(context, obj)
-    else:
-        positions = own_positions(mesh)
+    positions = seen_positions(context, obj)
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     if not np.linalg.cond(matrix) < 1e6:
         raise PointCloudError(
@@ -103,9 +98,18 @@ def read_points(context, obj) -> Reading:
             " scale above zero along each axis."
         )
     notices = []
-    if obj.type == "MESH" and mesh.polygons:
-        notices.append(f"The mesh has {len(mesh.polygons)} faces: it is taken as its {point_count(mesh)} vertices.")
+    if obj.type == "MESH" and obj.data.polygons:
+        faces = len(obj.data.polygons)
+        notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
     return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
+
+
+def seen_positions(context, obj):
+    """Read the local positions of an object's points as `read_points` takes them, whatever they are, (n, 3) float32."""
+    context.view_layer.update()  # a script may have moved the object a line ago
+    if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
+        return _evaluated_positions(context, obj)
+    return own_positions(obj.data)
 
 
 def rim_points(obj):

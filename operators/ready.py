@@ -10,8 +10,13 @@ class ReadyOperator:
     works_in = ("OBJECT",)  # modes of the object
 
     @classmethod
+    def obstacle(cls, context) -> str:
+        """Return what keeps the operator from running, and what to do; empty if nothing does."""
+        return obstacle(context.object, cls.works_in)
+
+    @classmethod
     def poll(cls, context):
-        reason = obstacle(context.object, cls.works_in)
+        reason = cls.obstacle(context)
         if reason:
             cls.poll_message_set(reason)
         return not reason

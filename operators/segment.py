@@ -42,7 +42,9 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         default="PARTS",
     )
     parts: IntProperty(name="Parts", description="How many parts", default=6, min=1, soft_max=50)
-    mode: IntProperty(name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1)
+    mode: IntProperty(
+        name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
+    )
     vertex_groups: BoolProperty(
         name="Vertex Groups",
         description="Make a vertex group of each part; of point clouds an attribute",

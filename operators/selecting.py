@@ -7,50 +7,75 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
 from ..core import PointCloudError, grow
-from .application import naming, operator_reader
+from .application import compute_all, naming, operator_reader
 from .attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
-from .groups import HANDLE, chosen_members, group_weights, has_group, members
+from .groups import HANDLE, assign, check_assignable, chosen_members
 from .job import JobOperator
+from .reading import obstacle
 from .stages import Stages
 
 
 class SelectionOperator(JobOperator):
-    """An operator on the selected points of the active object, in Edit Mode or Object Mode.
+    """An operator on the selected points of the active object, and of all others in Edit Mode along with it.
 
     What takes long, the operator on the points, is computed beside the window, where somebody waits there; the rest is
-    done when it is kept.
+    done when it is kept. A subclass says what to do by `prepare`, which computes for an object and returns a function
+    that changes it and returns a line for the status bar.
     """
 
     works_in = ("OBJECT", "EDIT")
     surface = True  # whether it needs the operator on the points
+    needs_selection = True
 
     def invoke(self, context, event):
-        obj = context.object
         if bpy.app.background or not self.surface:
             return self.execute(context)
+        objects = edited_objects(context)
         try:
-            with object_mode(context, obj), naming(obj.name):
-                _, operator = operator_reader(context, obj)
-                return self.start(context, [obj], operator)
+            with object_mode(context, context.object):
+                objects = self.with_points(objects)
+                plans = [(obj.name, operator_reader(context, obj)[1]) for obj in objects]
+                return self.start(context, objects, lambda progress: compute_all(plans, progress))
         except PointCloudError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
 
     def finish(self, context, objects, results, seconds):
-        """Do it with the selection of now: the operator is kept."""
-        with context.temp_override(object=objects[0]):
-            return self.execute(context)
+        """Do it with the selection of now: the operators are kept."""
+        return self.execute(context)
 
     def execute(self, context):
-        obj = context.object
-        with object_mode(context, obj):
+        objects, messages = edited_objects(context), []
+        with object_mode(context, context.object):
             try:
-                message = self.change(context, obj)
+                objects, changes = self.with_points(objects), []
+                for obj in objects:
+                    with naming(obj.name):
+                        changes.append(self.prepare(context, obj))
             except PointCloudError as error:
                 self.report({"ERROR"}, str(error))
                 return {"CANCELLED"}
-        self.report({"INFO"}, message)
+            messages = [change() for change in changes]
+        for obj, message in zip(objects, messages, strict=True):
+            self.report({"INFO"}, f"{obj.name}: {message}")
         return {"FINISHED"}
+
+    def with_points(self, objects):
+        """Leave out objects without selected points, if it needs them, where there are others."""
+        if not self.needs_selection:
+            return objects
+        return [obj for obj in objects if selection(obj).any()] or objects[:1]
+
+
+def edited_objects(context):
+    """Return the active object, and the others that are in Edit Mode with it."""
+    active = context.object
+    found = {active.data: active}
+    if active.mode == "EDIT":
+        for obj in context.view_layer.objects:
+            if obj.mode == "EDIT" and not obstacle(obj, ("EDIT",)):
+                found.setdefault(obj.data, obj)
+    return list(found.values())
 
 
 @contextmanager
@@ -73,13 +98,19 @@ def object_mode(context, obj):
             other.select_set(other in chosen)
 
 
-def selected(obj):
+def selection(obj):
     """Read which points are selected, (n,) bool."""
     chosen = np.ones(point_count(obj.data), dtype=bool)
     if obj.type == "MESH":
         obj.data.vertices.foreach_get("select", chosen)
     elif SELECTION in obj.data.attributes:  # without it Blender takes all points of a point cloud as selected
         chosen = read_attribute(obj.data, SELECTION).astype(bool)
+    return chosen
+
+
+def selected(obj):
+    """Read which points are selected, (n,) bool; at least one is."""
+    chosen = selection(obj)
     if not chosen.any():
         raise PointCloudError(f'No points of "{obj.name}" are selected. Select some in Edit Mode.')
     return chosen
@@ -121,11 +152,12 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
         subtype="DISTANCE",
     )
 
-    def change(self, context, obj):
+    def prepare(self, context, obj):
         chosen = selected(obj)
         _, laplacian = analyzed(context, obj)
         distance = self.distance or 4.0 * np.sqrt(np.median(laplacian.areas))
-        return select(context, obj, grow(laplacian, chosen, distance))
+        grown = grow(laplacian, chosen, distance)
+        return lambda: select(context, obj, grown)
 
 
 class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
@@ -134,11 +166,11 @@ class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
     bl_idname = "meshfree.select_component"
     bl_label = "Select Connected Part"
 
-    def change(self, context, obj):
+    def prepare(self, context, obj):
         chosen = selected(obj)
         component = analyzed(context, obj)[1].component
         parts = np.unique(component[chosen & (component >= 0)])  # points left out belong to none
-        return select(context, obj, chosen | np.isin(component, parts))
+        return lambda: select(context, obj, chosen | np.isin(component, parts))
 
 
 class FrontOnly:
@@ -174,8 +206,9 @@ class MESHFREE_OT_select_front(SelectionOperator, FrontOnly, bpy.types.Operator)
     bl_idname = "meshfree.select_front"
     bl_label = "Front Only"
 
-    def change(self, context, obj):
-        return select(context, obj, selected(obj) & self.facing(context, obj))
+    def prepare(self, context, obj):
+        front = selected(obj) & self.facing(context, obj)
+        return lambda: select(context, obj, front)
 
 
 class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.Operator):
@@ -220,7 +253,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         """Whether it needs the operator on the points, for their normals."""
         return self.front_only
 
-    def change(self, context, obj):
+    def prepare(self, context, obj):
         chosen = selected(obj)
         if self.front_only:
             chosen &= self.facing(context, obj)
@@ -230,60 +263,16 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     " the other side."
                 )
         name = self.name or self.role.title()
-        if obj.type == "MESH":
-            self.assign_vertices(obj, name, chosen)
-        else:
-            self.assign_points(obj, name, chosen)
-        if self.role == "RIM" and self.action != "REMOVE":
-            obj.meshfree.rim_group = name
-        members(obj, name)  # for the panel's count
-        verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
-        return f'{np.count_nonzero(chosen):,} points {verb} the group "{name}"'
+        check_assignable(obj, name, must_exist=self.action == "REMOVE")
 
-    def assign_vertices(self, obj, name, chosen):
-        """Change a vertex group."""
-        if name in obj.data.attributes:
-            raise PointCloudError(
-                f'"{obj.name}" has an attribute named "{name}", and vertex groups share their names. Choose another'
-                " name, or rename the attribute."
-            )
-        group = obj.vertex_groups.get(name)
-        if group is not None and group.lock_weight:
-            raise PointCloudError(
-                f'The vertex group "{name}" of "{obj.name}" is locked. Unlock it, or choose another name.'
-            )
-        if group is None and self.action == "REMOVE":
-            raise PointCloudError(
-                f'"{obj.name}" has no vertex group named "{name}" to remove points from. Choose another.'
-            )
-        if group is None:
-            group = obj.vertex_groups.new(name=name)
-        if self.action == "REPLACE":
-            group.remove(range(len(chosen)))
-        indices = np.flatnonzero(chosen).tolist()
-        if self.action == "REMOVE":
-            group.remove(indices)
-        else:
-            group.add(indices, self.weight, "REPLACE")
-        obj.vertex_groups.active = group
+        def change():
+            assign(obj, name, chosen, self.action, self.weight)
+            if self.role == "RIM" and self.action != "REMOVE":
+                obj.meshfree.rim_group = name
+            verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
+            return f'{np.count_nonzero(chosen):,} points {verb} the group "{name}"'
 
-    def assign_points(self, obj, name, chosen):
-        """Change the attribute of a point cloud that stands for a group."""
-        exists = has_group(obj, name)
-        if name in obj.data.attributes and not exists:
-            raise PointCloudError(
-                f'"{obj.name}" has an attribute named "{name}", which holds neither truth values nor numbers on points.'
-                " Choose another name, or rename the attribute."
-            )
-        if not exists and self.action == "REMOVE":
-            raise PointCloudError(f'"{obj.name}" has no group named "{name}" to remove points from. Choose another.')
-        weights = group_weights(obj, name) if exists else np.zeros(len(chosen))
-        if self.action == "REPLACE":
-            weights[:] = 0.0
-        weights[chosen] = 0.0 if self.action == "REMOVE" else self.weight
-        weighted = (exists and obj.data.attributes[name].data_type == "FLOAT") or not np.isin(weights, (0.0, 1.0)).all()
-        write_attribute(obj.data, name, weights, "FLOAT" if weighted else "BOOLEAN")
-        tag_changed(obj.data)
+        return change
 
 
 class MESHFREE_OT_select_rim(SelectionOperator, bpy.types.Operator):
@@ -291,12 +280,13 @@ class MESHFREE_OT_select_rim(SelectionOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.select_rim"
     bl_label = "Select Rim"
+    needs_selection = False
 
-    def change(self, context, obj):
+    def prepare(self, context, obj):
         rim = analyzed(context, obj)[1].boundary
         if not rim.any():
             raise PointCloudError(f'"{obj.name}" has no rim: its surface is closed, or Rims is off in the settings.')
-        return select(context, obj, rim)
+        return lambda: select(context, obj, rim)
 
 
 class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
@@ -304,11 +294,14 @@ class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.select_group"
     bl_label = "Select Group"
+    needs_selection = False
+    surface = False
 
     name: StringProperty(name="Name", description="Name of the group", default=HANDLE, maxlen=63)
 
-    def change(self, context, obj):
-        return select(context, obj, chosen_members(obj, self.name, "Name"))
+    def prepare(self, context, obj):
+        chosen = chosen_members(obj, self.name, "Name")
+        return lambda: select(context, obj, chosen)
 
 
 CLASSES = (

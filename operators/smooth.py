@@ -52,7 +52,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         subtype="DISTANCE",
     )
     modes: IntProperty(
-        name="Modes", description="How many modes are kept, the constant one included", default=100, min=4
+        name="Modes", description="How many modes are kept, the constant one included", default=100, min=4, soft_max=500
     )
     gain: FloatProperty(name="Gain", description="How much stronger details become", default=1.5, min=0.0, soft_max=3.0)
     strength: FloatProperty(
@@ -158,11 +158,14 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     bl_label = "Deform by Mode"
     adjustable = ("mode", "amplitude", "phase", "animate", "period", "target")
 
-    mode: IntProperty(name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1)
+    mode: IntProperty(
+        name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
+    )
     amplitude: FloatProperty(
         name="Amplitude",
         description="Largest displacement; 0 for a tenth of the object's radius",
         default=0.0,
+        min=0.0,
         subtype="DISTANCE",
     )
     phase: FloatProperty(
@@ -174,7 +177,7 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     animate: BoolProperty(
         name="Animate", description="Keyframe the shape key as a vibration over the frames of the scene", default=False
     )
-    period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4)
+    period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4, soft_max=250)
     target: target_property()
 
     def plan(self, context, obj):

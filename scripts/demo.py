@@ -59,7 +59,7 @@ class Coral:
 
 def load_scan(path, up):
     """Open a scan as the command line does, and put it upright."""
-    obj = studio.part("operators.files").load(path)
+    obj, _ = studio.part("operators.files").load(path)
     if up == "Y":
         obj.rotation_mode = "XYZ"
         obj.rotation_euler.x += math.pi / 2.0

@@ -283,8 +283,8 @@ def take(path, legend, view=VIEW, size=WIDE):
 
 def set_range(obj, low, high):
     """Set the range of the colours of an object, as in the panel."""
-    node = part("ui.display").range_node(obj)
-    node.inputs["From Min"].default_value, node.inputs["From Max"].default_value = low, high
+    obj.meshfree.range_low, obj.meshfree.range_high = low, high
+    obj.meshfree.range_mode = "LOCKED"
 
 
 def activate(obj):

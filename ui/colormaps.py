@@ -2,77 +2,109 @@
 
 import numpy as np
 
-# sRGB in hexadecimal, low to high. Viridis is perceptually uniform: S. van der Walt, N. Smith, E. Firing, CC0.
+# sRGB in hexadecimal, low to high. Viridis and Magma are perceptually uniform: S. van der Walt, N. Smith, CC0.
 _VIRIDIS = (
     "440154 481a6c 472f7d 414487 39568c 31688e 2a788e 23888e 1f988b 22a884 35b779 54c568 7ad151 a5db36 d2e21b fde725"
+)
+_MAGMA = (
+    "000004 0b0924 20114b 3b0f70 57157e 721f81 8c2981 a8327d c43c75 de4968 f1605d fa7f5e fe9f6d febf84 fddea0 fcfdbf"
 )
 # Diverging with a light middle: K. Moreland, Diverging Color Maps for Scientific Visualization, 2009.
 _COOL_WARM = (
     "3b4cc0 4e68d8 6282ea 779af7 8db0fe a3c2fe b9d0f9 ccd9ed dddcdc ecd3c5 f5c4ac f7b093 f4987a eb7d62 dd5f4b ca3b37"
     " b40426"
 )
-_MAPS = {"VIRIDIS": _VIRIDIS, "COOL_WARM": _COOL_WARM}
+# A circle in OKLab, so that all steps look alike and the ends meet: centre (0.6, 0.03, -0.04), radius 0.16, tilted by
+# 40 degrees, so that lightness tells its halves apart where hues do not.
+_CYCLIC = (
+    "40b2bb 2aaed4 25a6e8 349af5 488cfc 5b7bfc 6a6af5 775ae7 814cd5 8941bf 9039a7 96348e 9d3376 a3355f a83c49 ac4634"
+    " ae541e ae6307 aa7409 a28526 969443 86a162 71ab81 5ab09f 40b2bb"
+)
+_MAPS = {"VIRIDIS": _VIRIDIS, "MAGMA": _MAGMA, "COOL_WARM": _COOL_WARM, "CYCLIC": _CYCLIC}
 # For -1 as "none", then 0 to 6, which any colour vision tells apart: M. Okabe, K. Ito, Color Universal Design, 2008.
-_CLASSES = ("555555", "0072b2", "e69f00", "009e73", "d55e00", "56b4e9", "cc79a7", "f0e442")
-_MOST = len(_CLASSES) - 1
-_FALSE, _TRUE = "bdbdbd", "d55e00"
+_NONE, *_CLASSES = ("555555", "0072b2", "e69f00", "009e73", "d55e00", "56b4e9", "cc79a7", "f0e442")
+CLASSES = len(_CLASSES)  # whole numbers from 0 with a colour of their own; they repeat from there
+_TRUTH = ("bdbdbd", "d55e00")
+STEPPED = ("TRUTH", "CATEGORICAL")  # maps with a colour for each whole number
 
 
-def fit(values, coverage: float, name: str = "AUTO"):
+def fit(values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 98.0, locked=(0.0, 1.0)):
     """Choose a colour map and its range for values.
 
     Parameters
     ----------
     values : ndarray, (n,)
         Numbers or truth values.
-    coverage : float
-        Percentage of the values inside the range, so that a few outliers do not wash the rest out; all of them for
-        whole numbers and truth values.
-    name : {"AUTO", "VIRIDIS", "COOL_WARM"}
+    name : {"AUTO", "VIRIDIS", "MAGMA", "COOL_WARM", "CYCLIC", "CATEGORICAL"}
         AUTO takes two colours for truth values, one for each of few whole numbers, and the diverging map if the values
         reach clearly to both sides of zero.
+    mode : {"AUTO", "DATA", "PERCENTILE", "SYMMETRIC", "LOCKED"}
+        Range from the least to the greatest value, from one percentile to the other, as far to both sides of zero as
+        those reach, or as given. AUTO is SYMMETRIC for the diverging map of signed values, DATA for the cyclic map,
+        whose ends would not meet otherwise, and PERCENTILE for all else.
+    coverage : float
+        Percentage of the values between the percentiles, so that a few outliers do not wash the rest out; all of them
+        for whole numbers and truth values.
+    locked : tuple of float
+        Range to keep.
 
     Returns
     -------
     name : str
-        As given, or what AUTO came to: also "TRUTH" or "CLASSES".
+        As given, or what AUTO came to: also "TRUTH".
     low, high : float
-        Symmetric about zero for the diverging map of signed values.
+        Of stepped maps the first and the last whole number.
     """
-    if name == "AUTO" and values.dtype.kind == "b":
+    kind = values.dtype.kind
+    if name == "AUTO" and kind == "b":
         return "TRUTH", 0.0, 1.0
-    if name == "AUTO" and values.dtype.kind == "i" and len(values) and values.min() >= -1:
-        if values.max() < _MOST:
-            return "CLASSES", float(values.min()), float(values.max())
-        name = "VIRIDIS"
-    outside = 0.5 * (100.0 - coverage) if values.dtype.kind == "f" else 0.0  # whole numbers have no outliers
     values = values[np.isfinite(values)].astype(np.float64)
-    low, high = np.percentile(values, (outside, 100.0 - outside)) if len(values) else (0.0, 1.0)
-    if low == high:  # most values alike: the few others are what there is to see
-        low, high = values.min(), values.max()
+    ends = (values.min(), values.max()) if len(values) else (0.0, 1.0)
+    if name == "AUTO" and kind == "i" and len(values) and ends[0] >= -1 and ends[1] < CLASSES:
+        name = "CATEGORICAL"
+    outside = 0.5 * (100.0 - coverage) if kind == "f" else 0.0  # whole numbers have no outliers
+    share = np.percentile(values, (outside, 100.0 - outside)) if len(values) else ends
+    if share[0] == share[1]:  # most values alike: the few others are what there is to see
+        share = ends
     if name == "AUTO":
-        name = "COOL_WARM" if min(-low, high) > 0.01 * max(-low, high) else "VIRIDIS"
-    if name == "COOL_WARM" and low < 0.0 < high:
-        high = max(-low, high)
+        signed = min(-share[0], share[1]) > 0.01 * max(-share[0], share[1])
+        name = "COOL_WARM" if signed and (kind == "f" or ends[0] < -1) else "VIRIDIS"
+    if mode == "AUTO":
+        signed = name == "COOL_WARM" and share[0] < 0.0 < share[1]
+        mode = "SYMMETRIC" if signed else "DATA" if name == "CYCLIC" else "PERCENTILE"
+    if mode == "LOCKED":
+        low, high = min(locked), max(locked)
+    elif mode == "SYMMETRIC":
+        high = np.abs(share).max()
         low = -high
+    else:
+        low, high = ends if mode == "DATA" else share
+    if name in STEPPED:
+        return name, float(np.rint(low)), float(np.rint(high))
     if high - low <= 1e-6 * max(abs(low), abs(high)):  # a constant, up to rounding: the middle of the map
         margin = 0.1 * abs(high) or 1.0
         low, high = low - margin, high + margin
     return name, float(low), float(high)
 
 
-def step_colors(name: str, low: float, high: float) -> list:
-    """Colours of the whole numbers from low to high as linear (r, g, b, 1); none for maps without steps."""
+def colors(name: str, reverse: bool = False) -> list:
+    """Colours of a map as linear (r, g, b, 1), low to high: what shaders and colour ramps take.
+
+    Those of "TRUTH" are for 0 and 1, those of "CATEGORICAL" for -1, and for 0 to 6 and so on.
+    """
+    first = []
     if name == "TRUTH":
-        return [_color(_FALSE), _color(_TRUE)]
-    if name == "CLASSES":
-        return [_color(code) for code in _CLASSES[int(low) + 1 : int(high) + 2]]
-    return []
+        codes = _TRUTH
+    elif name == "CATEGORICAL":
+        first, codes = [_NONE], _CLASSES
+    else:
+        codes = _MAPS[name].split()
+    return [_color(code) for code in (*first, *(reversed(codes) if reverse else codes))]
 
 
-def linear_colors(name: str) -> list:
-    """Colours of a map, low to high, as linear (r, g, b, 1): what shaders and colour ramps take."""
-    return [_color(code) for code in _MAPS[name].split()]
+def to_display(color):
+    """Turn a linear (r, g, b, a) into what screens take, sRGB."""
+    return (*(12.92 * v if v <= 0.0031308 else 1.055 * v ** (1.0 / 2.4) - 0.055 for v in color[:3]), color[3])
 
 
 def _color(code):

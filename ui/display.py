@@ -1,10 +1,11 @@
 """What an object shows: its display modifier, with the size of the points, and its material."""
 
-import bpy
+import numpy as np
 
-from ..operators.attributes import BOUNDARY, COMPONENT, DISTANCE, MEAN_CURVATURE, read_attribute
-from ..operators.reading import DISPLAY_TAG, is_display, spacing
-from .nodes import ATTRIBUTE, COLORS, RANGE, color_by, display_group
+from ..operators.attributes import BOUNDARY, COMPONENT, DISPLACEMENT, DISTANCE, read_attribute
+from ..operators.reading import DISPLAY_TAG, is_display
+from . import colormaps
+from .nodes import ATTRIBUTE, COLORS, RANGE
 
 NAME = "Mesh-Free Display"
 _TITLES = {BOUNDARY: "Rim", COMPONENT: "Connected Part"}
@@ -38,18 +39,66 @@ def color_node(obj):
     return _find_node(obj, COLORS)
 
 
+def shown_range(obj):
+    """Return the least and the greatest value in the colours' range; None where `range_node` is."""
+    node = range_node(obj)
+    if node is None:
+        return None
+    if color_node(obj).color_ramp.interpolation == "CONSTANT":
+        return obj.meshfree.range_low, obj.meshfree.range_high
+    return node.inputs["From Min"].default_value, node.inputs["From Max"].default_value
+
+
 def step_colors(obj) -> dict:
     """Return the colour of each whole number by its name, if each has one of its own; else nothing."""
     node = color_node(obj)
     if node is None or node.color_ramp.interpolation != "CONSTANT":
         return {}
     colors = [tuple(element.color) for element in node.color_ramp.elements]
-    first = round(range_node(obj).inputs["From Min"].default_value + 0.5)
-    attribute = obj.data.attributes.get(shown_attribute(obj))
-    names = [str(first + index) for index in range(len(colors))]
-    if attribute is not None and attribute.data_type == "BOOLEAN" and names == ["0", "1"]:
-        names = ["No", "Yes"]
-    return dict(zip(names, colors, strict=True))
+    if len(colors) == 2:
+        return dict(zip(("No", "Yes"), colors, strict=True))
+    first, last = (round(value) for value in shown_range(obj))
+    none, *repeated = colors
+    steps = range(first, last + 1)
+    return {str(number): none if number < 0 else repeated[number % colormaps.CLASSES] for number in steps}
+
+
+def shown_values(obj):
+    """Read the numbers that an object shows as colours, in the same order as its points.
+
+    Returns
+    -------
+    ndarray, (n,), or None
+        None where vectors are shown as directions, or nothing is.
+
+    Raises
+    ------
+    PointCloudError
+        The attribute on show is gone, or holds neither numbers nor vectors on points.
+    """
+    name = shown_attribute(obj)
+    return numbers(read_attribute(obj.data, name), component(name, obj.meshfree)) if name else None
+
+
+def component(name: str, settings) -> str:
+    """What is shown of an attribute if it holds vectors: "DIRECTION", "LENGTH", "X", "Y" or "Z"."""
+    if settings.component != "AUTO":
+        return settings.component
+    return "LENGTH" if name == DISPLACEMENT else "DIRECTION"
+
+
+def numbers(values, part: str):
+    """Return what of an attribute's values are the numbers to show; None for directions."""
+    if values.ndim == 1:
+        return values
+    if part == "LENGTH":
+        return np.linalg.norm(values, axis=1)
+    return None if part == "DIRECTION" else values[:, "XYZ".index(part)]
+
+
+def without_unreached(name: str, values):
+    """Leave out the numbers that say that no source reaches a point, which do not count for the range."""
+    return values[values >= 0.0] if name == DISTANCE else values
 
 
 def _find_node(obj, name):
@@ -63,48 +112,6 @@ def label(name: str) -> str:
         return _TITLES[name]
     words = name.removeprefix("lb_").replace("eigenvector", "mode").split("_")
     return " ".join(word.lstrip("0").title() for word in words)
-
-
-def show_attribute(obj, name: str = "", radius: float = 0.0):
-    """Show an attribute as colours on the points, by the display settings of the object.
-
-    Parameters
-    ----------
-    obj : bpy.types.Object
-        A mesh object.
-    name : str
-        The attribute; empty for the one on show, or the mean curvature.
-    radius : float
-        Radius of the points in local lengths; 0 keeps the one in use, or takes it from the spacing of the points.
-
-    Raises
-    ------
-    PointCloudError
-        There is no such attribute, or it holds neither numbers nor vectors on points.
-    """
-    if not name:
-        name = shown_attribute(obj)
-        if name not in obj.data.attributes:
-            name = MEAN_CURVATURE
-    values = read_attribute(obj.data, name)
-    if name == DISTANCE:
-        values = values[values >= 0.0]  # what no source reaches does not count for the range
-    modifier = find_display(obj)
-    if modifier is None:
-        radius = radius or 0.75 * spacing(obj.data) or 0.01
-        modifier = obj.modifiers.new(NAME, "NODES")
-        modifier.node_group = display_group()
-    modifier.use_pin_to_last = True
-    obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
-    if radius:
-        set_input(modifier, "Radius", radius)
-    material = find_material(obj)
-    if material is None or material.users - material.use_fake_user > 1:  # a duplicate of an object gets its own
-        material = bpy.data.materials.new(f"{NAME} {obj.name}")
-        material[DISPLAY_TAG] = True
-        set_input(modifier, "Material", material)
-    color_by(material, name, values, obj.meshfree)
-    obj.update_tag()
 
 
 def get_input(modifier, name: str):

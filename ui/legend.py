@@ -1,22 +1,20 @@
 """A legend for renders: the colours on show, their values and a title, fixed in front of a camera."""
 
 import bpy
+from bpy.props import BoolProperty
 
-from .display import color_node, label, range_node, shown_attribute, step_colors
-from .nodes import add_node, direction_color, new_tree
+from ..core import PointCloudError
+from ..operators.ready import ReadyOperator
+from .display import shown_attribute
+from .nodes import add_node, new_tree
+from .scale import shown_scale
 
 NAME = "Mesh-Free Legend"
-_TICKS = 5
+_OF = "meshfree_legend_of"  # custom property of the collection: the object whose colours it explains
 _STEPS = 64  # of the bar's colours
+_FEWEST = 6  # boxes that fill the plate
 _COLOR = "legend_color"  # attribute of the parts
-_DIRECTIONS = {
-    "+X": (1, 0, 0),
-    "+Y": (0, 1, 0),
-    "+Z": (0, 0, 1),
-    "-X": (-1, 0, 0),
-    "-Y": (0, -1, 0),
-    "-Z": (0, 0, -1),
-}
+_WHITE = (1.0, 1.0, 1.0, 1.0)
 
 
 def make_legend(scene, obj, camera, title: str = ""):
@@ -25,43 +23,98 @@ def make_legend(scene, obj, camera, title: str = ""):
     Parameters
     ----------
     scene : bpy.types.Scene
-        Its render resolution gives the shape of the picture.
+        Its render resolution gives the shape of the picture, its units those of the numbers.
     obj : bpy.types.Object
         An object with a display, as `meshfree.colormap` makes it.
     camera : bpy.types.Object
         The legend becomes its child, close in front of it.
     title : str
-        Text above the colours; empty for the name of the attribute.
+        Text above the colours; empty for the name and unit of the attribute.
 
     Returns
     -------
     bpy.types.Collection
         The legend's objects.
     """
+    scale = shown_scale(obj, scene)
     legend = _Legend(scene, camera)
+    legend.collection[_OF] = obj
     legend.rectangle((0.0, 0.0, 1.0, 1.0), [(0.01, 0.01, 0.01, 1.0)] * 2, depth=1.01)
-    legend.text(title or label(shown_attribute(obj)), 0.08, 0.94, width=0.84)
+    legend.text(title or scale.full_title, 0.08, 0.94, width=0.84)
     low, high, bottom, top = 0.1, 0.32, 0.05, 0.86
-    bounds = range_node(obj)
-    boxes = step_colors(obj)
-    if bounds is None:
-        boxes = {name: direction_color(direction) for name, direction in _DIRECTIONS.items()}
-    if boxes:
-        height = (top - bottom) / max(len(boxes), len(_DIRECTIONS))
-        for index, (name, color) in enumerate(boxes.items()):
+    if scale.boxes:
+        height = (top - bottom) / max(len(scale.boxes), _FEWEST)
+        for index, (name, color) in enumerate(scale.boxes.items()):
             y = top - (index + 1) * height
-            legend.rectangle((low, y, high, y + 0.85 * height), [color] * 2)
+            if color[3]:
+                legend.rectangle((low, y, high, y + 0.85 * height), [color] * 2)
             legend.text(name, high + 0.1, y + 0.42 * height)
         return legend.collection
-    ramp = color_node(obj).color_ramp
-    legend.rectangle((low, bottom, high, top), [ramp.evaluate(step / _STEPS) for step in range(_STEPS + 1)])
-    first, last = (bounds.inputs[name].default_value for name in ("From Min", "From Max"))
-    for tick in range(_TICKS):
-        share = tick / (_TICKS - 1)
+    legend.rectangle((low, bottom, high, top), [_between(scale.colors, step / _STEPS) for step in range(_STEPS + 1)])
+    for share, text in scale.ticks:
         y = bottom + share * (top - bottom)
-        legend.rectangle((high, y - 0.002, high + 0.05, y + 0.002), [(1.0, 1.0, 1.0, 1.0)] * 2)
-        legend.text(f"{first + share * (last - first):.3g}", high + 0.1, y)
+        legend.rectangle((high, y - 0.002, high + 0.05, y + 0.002), [_WHITE] * 2)
+        legend.text(text, high + 0.1, y)
     return legend.collection
+
+
+def find_legend(scene, obj):
+    """Return the collection with the legend of an object in a scene, or None."""
+    return next((item for item in scene.collection.children if item.get(_OF) == obj), None)
+
+
+def renew(obj):
+    """Let the legend of an object, where there is one, say what the object shows now."""
+    for scene in bpy.data.scenes:
+        legend = find_legend(scene, obj)
+        if legend is None:
+            continue
+        camera = next((part.parent for part in legend.objects if part.parent is not None), scene.camera)
+        if camera is not None and camera.type == "CAMERA" and shown_attribute(obj):
+            make_legend(scene, obj, camera)
+
+
+def remove_legend(legend):
+    """Remove a legend and all that belongs to it."""
+    _remove_parts(legend)
+    bpy.data.collections.remove(legend)
+
+
+class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
+    """Put a legend in front of the camera, which renders show; it follows the colors"""
+
+    bl_idname = "meshfree.legend"
+    bl_label = "Legend in Renders"
+    works_in = ("OBJECT", "EDIT")
+
+    show: BoolProperty(name="Show", description="Put the legend there; otherwise take it away", default=True)
+
+    def execute(self, context):
+        obj, scene = context.object, context.scene
+        try:
+            if not self.show:
+                legend = find_legend(scene, obj)
+                if legend is None:
+                    raise PointCloudError(f'There is no legend of "{obj.name}" in this scene to take away.')
+                remove_legend(legend)
+                return {"FINISHED"}
+            if scene.camera is None:
+                raise PointCloudError("The scene has no camera to put a legend in front of. Add one with Add > Camera.")
+            if not shown_attribute(obj):
+                raise PointCloudError(f'"{obj.name}" shows no colors yet. Choose what to see under Display first.')
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        make_legend(scene, obj, scene.camera)
+        return {"FINISHED"}
+
+
+def _between(colors, share):
+    """Return the colour at a share of the way through even samples."""
+    place = share * (len(colors) - 1)
+    index = min(int(place), len(colors) - 2)
+    part = place - index
+    return tuple((1.0 - part) * a + part * b for a, b in zip(colors[index], colors[index + 1], strict=True))
 
 
 class _Legend:
@@ -125,9 +178,13 @@ def _empty_collection(scene):
         collection = bpy.data.collections.new(NAME)
     if NAME not in scene.collection.children:
         scene.collection.children.link(collection)
+    _remove_parts(collection)
+    return collection
+
+
+def _remove_parts(collection):
     parts = list(collection.objects)
     bpy.data.batch_remove([*parts, *(part.data for part in parts)])
-    return collection
 
 
 def _material(name, attribute):
@@ -145,3 +202,6 @@ def _material(name, attribute):
         source = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=attribute)
         tree.links.new(source.outputs["Color"], emission.inputs["Color"])
     return material
+
+
+CLASSES = (MESHFREE_OT_legend,)

@@ -1,6 +1,8 @@
-"""Menus of the 3D view, which is where the search (F3) finds operators."""
+"""Menus of the 3D view, where the search (F3) finds operators; File > Import and Export; dropped files."""
 
 import bpy
+
+from ..operators.importing import OWN
 
 _TOOLS = (
     ("analyze", "spectrum", "colormap"),
@@ -49,16 +51,50 @@ def _draw_points(menu, context):
     menu.layout.menu(MESHFREE_MT_points.__name__)
 
 
+def _draw_import(self, _context):
+    self.layout.operator("meshfree.import_points", text="Points (.ply/.obj/.xyz/.pts/.csv/.npy)")
+
+
+def _draw_export(self, _context):
+    layout = self.layout
+    layout.operator("meshfree.export_points", text="Points with Results (.ply/.xyz/.csv)")
+    layout.operator("meshfree.export_operator", text="Laplacian and Modes (.npz)")
+    layout.operator("meshfree.export_eigenvalues", text="Eigenvalues (.csv)")
+
+
+class MESHFREE_FH_points(bpy.types.FileHandler):
+    """Import files that are dropped onto a 3D view, of kinds that Blender does not read by itself"""
+
+    bl_idname = "MESHFREE_FH_points"
+    bl_label = "Points"
+    bl_import_operator = "meshfree.import_points"
+    bl_file_extensions = ";".join(OWN)
+
+    @classmethod
+    def poll_drop(cls, context):
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+def _entries():
+    """Menus and what is added to them; point clouds have an Edit Mode from Blender 4.5 on."""
+    yield bpy.types.VIEW3D_MT_object, _draw_object
+    yield bpy.types.VIEW3D_MT_edit_mesh, _draw_points
+    if hasattr(bpy.types, "VIEW3D_MT_edit_pointcloud"):
+        yield bpy.types.VIEW3D_MT_edit_pointcloud, _draw_points
+    yield bpy.types.TOPBAR_MT_file_import, _draw_import
+    yield bpy.types.TOPBAR_MT_file_export, _draw_export
+
+
 def attach():
-    """Add the menus to those of the 3D view."""
-    bpy.types.VIEW3D_MT_object.append(_draw_object)
-    bpy.types.VIEW3D_MT_edit_mesh.append(_draw_points)
+    """Add the entries to Blender's menus."""
+    for menu, draw in _entries():
+        menu.append(draw)
 
 
 def detach():
-    """Take them out again."""
-    bpy.types.VIEW3D_MT_edit_mesh.remove(_draw_points)
-    bpy.types.VIEW3D_MT_object.remove(_draw_object)
+    """Take the entries away again."""
+    for menu, draw in _entries():
+        menu.remove(draw)
 
 
-CLASSES = (MESHFREE_MT_object, MESHFREE_MT_points)
+CLASSES = (MESHFREE_MT_object, MESHFREE_MT_points, MESHFREE_FH_points)

@@ -6,7 +6,10 @@ from ..operators.reading import DISPLAY_TAG
 from . import colormaps
 
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
+LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
+_KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
+_BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
 
@@ -59,84 +62,147 @@ def display_group():
     return group
 
 
-def color_by(material, name, values, settings):
-    """Rebuild a material so that it shows an attribute."""
-    tree = new_tree(material)
-    attribute = add_node(tree, "ShaderNodeAttribute", 0, 0, name=ATTRIBUTE, attribute_name=name)
-    if values.ndim == 1:
-        color = _number_color(tree, attribute.outputs["Fac"], values, settings)
-    elif settings.component == "DIRECTION":
-        color = _direction_color(tree, attribute.outputs["Vector"])
-    else:
-        separate = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0)
-        tree.links.new(attribute.outputs["Vector"], separate.inputs[0])
-        number = separate.outputs[settings.component]
-        color = _number_color(tree, number, values[:, "XYZ".index(settings.component)], settings)
+def color_by_direction(material, name):
+    """Let a material show the directions of an attribute of vectors."""
+    if _begin(material, name, "DIRECTION"):
+        tree = material.node_tree
+        _shine(tree, _direction_color(tree, tree.nodes[ATTRIBUTE].outputs["Vector"]), hidden=None)
 
-    # Mostly emission, so that colours read as in the legend; some diffuse light, so that shapes show.
-    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", 4, 100)
-    emission = add_node(tree, "ShaderNodeEmission", 4, -100)
-    mixed = add_node(tree, "ShaderNodeMixShader", 5, 0)
+
+def color_by_number(material, name, component, color_map, low, high, settings):
+    """Let a material show numbers as colours; only values of its nodes change where it did so before.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+    name : str
+        The attribute.
+    component : {"", "LENGTH", "X", "Y", "Z"}
+        What of a vector is the number.
+    color_map : str
+        One of the names of `colormaps.colors`.
+    low, high : float
+        Range of the numbers.
+    settings : MESHFREE_PG_settings
+        Reverse, iso lines, and what becomes of numbers beyond the range.
+    """
+    stepped = color_map in colormaps.STEPPED
+    repeated, hiding = color_map == "CATEGORICAL", settings.outside == "HIDE"
+    if _begin(material, name, f"{component} {repeated} {hiding}"):
+        _build_number_tree(material.node_tree, component, repeated, hiding)
+    nodes = material.node_tree.nodes
+    colors = colormaps.colors(color_map, settings.reverse)
+    # Of a stepped map each number is in the middle of its colour, and the last one as wide as the others.
+    ends = (-1.5, len(colors) - 1.5) if repeated else (-0.5, len(colors) - 0.5) if stepped else (low, high)
+    nodes[RANGE].inputs["From Min"].default_value, nodes[RANGE].inputs["From Max"].default_value = ends
+    ramp = nodes[COLORS].color_ramp
+    ramp.interpolation = "CONSTANT" if stepped else "LINEAR"
+    _set_colors(ramp.elements, colors, last=len(colors) if stepped else len(colors) - 1)
+    nodes[LINES].inputs[1].default_value = 0 if stepped else settings.iso_lines
+    nodes[BELOW].inputs[1].default_value = low - 0.5 if stepped else low
+    nodes[ABOVE].inputs[1].default_value = high + 0.5 if stepped else high
+    if not hiding:
+        nodes[GRAY].inputs[1].default_value = float(settings.outside == "GRAY")
+
+
+def _begin(material, name, kind):
+    """Let a material read an attribute; return whether it is empty but for that, since its nodes were of other kind."""
+    fits = material.get(_KIND) == kind and material.node_tree.nodes.get(ATTRIBUTE) is not None
+    if not fits:
+        add_node(new_tree(material), "ShaderNodeAttribute", 0, 0, name=ATTRIBUTE)
+        material[_KIND] = kind
+    attribute = material.node_tree.nodes[ATTRIBUTE]
+    if attribute.attribute_name != name:
+        attribute.attribute_name = name
+    return not fits
+
+
+def _build_number_tree(tree, component, repeated, hiding):
+    """Add the nodes from a number to its colour: range, map, iso lines, and what lies beyond the range."""
+    number = tree.nodes[ATTRIBUTE].outputs["Fac"]
+    if component == "LENGTH":
+        length = add_node(tree, "ShaderNodeVectorMath", 1, 0, operation="LENGTH")
+        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], length.inputs[0])
+        number = length.outputs["Value"]
+    elif component:
+        separate = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0)
+        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], separate.inputs[0])
+        number = separate.outputs[component]
+    place = number
+    if repeated:  # -1 and below have one colour, 0 and above repeat
+        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", number, -1.0), colormaps.CLASSES)
+    bounds = add_node(tree, "ShaderNodeMapRange", 3, 0, name=RANGE)
+    ramp = add_node(tree, "ShaderNodeValToRGB", 4, 0, name=COLORS)
+    tree.links.new(place, bounds.inputs["Value"])
+    tree.links.new(bounds.outputs["Result"], ramp.inputs[0])
+    # Lines in the middle of so many even steps of the range, where values beyond it end.
+    part = _math(tree, 5, -300, "FRACT", _math(tree, 4, -300, "MULTIPLY", bounds.outputs["Result"], name=LINES))
+    line = _math(tree, 6, -300, "COMPARE", part, 0.5)
+    line.node.inputs[2].default_value = 0.5 * _LINE
+    color = _mix(tree, 7, line, ramp.outputs["Color"], _DARK)
+    below = _math(tree, 4, -600, "LESS_THAN", number, name=BELOW)
+    above = _math(tree, 4, -800, "GREATER_THAN", number, name=ABOVE)
+    beyond = _math(tree, 5, -600, "ADD", below, above)
+    if hiding:
+        _shine(tree, color, hidden=beyond)
+    else:
+        _shine(tree, _mix(tree, 8, _math(tree, 6, -600, "MULTIPLY", beyond, name=GRAY), color, _BEYOND), hidden=None)
+
+
+def _shine(tree, color, hidden):
+    """Give the surface a colour; nothing is seen of it where a number, if there is one, is 1.
+
+    Mostly emission, so that colours read as in the legend; some diffuse light, so that shapes show.
+    """
+    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", 9, 100)
+    emission = add_node(tree, "ShaderNodeEmission", 9, -100)
+    mixed = add_node(tree, "ShaderNodeMixShader", 10, 0)
     mixed.inputs[0].default_value = 0.6
-    output = add_node(tree, "ShaderNodeOutputMaterial", 6, 0)
+    output = add_node(tree, "ShaderNodeOutputMaterial", 12, 0)
     tree.links.new(color, diffuse.inputs["Color"])
     tree.links.new(color, emission.inputs["Color"])
     tree.links.new(diffuse.outputs[0], mixed.inputs[1])
     tree.links.new(emission.outputs[0], mixed.inputs[2])
+    if hidden is not None:
+        nothing = add_node(tree, "ShaderNodeBsdfTransparent", 10, -200)
+        shown, mixed = mixed, add_node(tree, "ShaderNodeMixShader", 11, 0)
+        tree.links.new(hidden, mixed.inputs[0])
+        tree.links.new(shown.outputs[0], mixed.inputs[1])
+        tree.links.new(nothing.outputs[0], mixed.inputs[2])
     tree.links.new(mixed.outputs[0], output.inputs["Surface"])
 
 
-def _number_color(tree, number, values, settings):
-    """Colour numbers by a map over their range."""
-    color_map, low, high = colormaps.fit(values, settings.coverage, settings.color_map)
-    steps = colormaps.step_colors(color_map, low, high)
-    if steps:
-        low, high = low - 0.5, high + 0.5
-    bounds = add_node(tree, "ShaderNodeMapRange", 2, 0, name=RANGE)
-    bounds.inputs["From Min"].default_value = low
-    bounds.inputs["From Max"].default_value = high
-    ramp = add_node(tree, "ShaderNodeValToRGB", 3, 0, name=COLORS)
-    if steps:
-        ramp.color_ramp.interpolation = "CONSTANT"
-        _set_colors(ramp.color_ramp.elements, steps, last=len(steps))  # the last one is as wide as the others
-    else:
-        colors = colormaps.linear_colors(color_map)
-        _set_colors(ramp.color_ramp.elements, colors, last=len(colors) - 1)
-    tree.links.new(number, bounds.inputs["Value"])
-    tree.links.new(bounds.outputs["Result"], ramp.inputs[0])
-    if steps or not settings.iso_lines:
-        return ramp.outputs["Color"]
-    return _with_lines(tree, bounds.outputs["Result"], ramp.outputs["Color"], settings.iso_lines)
+def _math(tree, column, y, operation, first, second=0.0, name=""):
+    """Add a node that calculates, from one or two numbers or results of other nodes; return its result."""
+    node = add_node(tree, "ShaderNodeMath", column, y, operation=operation)
+    node.name = name or node.name
+    for number, socket in zip((first, second), node.inputs, strict=False):
+        if isinstance(number, bpy.types.NodeSocket):
+            tree.links.new(number, socket)
+        else:
+            socket.default_value = number
+    return node.outputs[0]
 
 
-def _with_lines(tree, number, color, count):
-    """Darken a colour in the middle of so many even steps of a number from 0 to 1, where values beyond end."""
-    scaled = add_node(tree, "ShaderNodeMath", 2, -300, operation="MULTIPLY")
-    scaled.inputs[1].default_value = count
-    part = add_node(tree, "ShaderNodeMath", 3, -300, operation="FRACT")
-    line = add_node(tree, "ShaderNodeMath", 4, -300, operation="COMPARE")
-    line.inputs[1].default_value, line.inputs[2].default_value = 0.5, 0.5 * _LINE
-    mixed = add_node(tree, "ShaderNodeMixRGB", 5, -300)
-    mixed.inputs["Color2"].default_value = _DARK
-    for source, target in (
-        (number, scaled.inputs[0]),
-        (scaled.outputs[0], part.inputs[0]),
-        (part.outputs[0], line.inputs[0]),
-        (line.outputs[0], mixed.inputs["Fac"]),
-        (color, mixed.inputs["Color1"]),
-    ):
-        tree.links.new(source, target)
-    return mixed.outputs["Color"]
+def _mix(tree, column, share, first, second):
+    """Add a node that turns a colour into a fixed one by a share; return its result."""
+    node = add_node(tree, "ShaderNodeMixRGB", column, -300)
+    node.inputs["Color2"].default_value = second
+    tree.links.new(share, node.inputs["Fac"])
+    tree.links.new(first, node.inputs["Color1"])
+    return node.outputs["Color"]
 
 
 def _set_colors(elements, colors, last):
-    while len(elements) > len(colors):
-        elements.remove(elements[-1])
-    while len(elements) < len(colors):
-        elements.new(1.0)
-    for index, color in enumerate(colors):
-        elements[index].position = index / last
-        elements[index].color = color
+    places = [index / last for index in range(len(colors))]
+    if [round(element.position, 5) for element in elements] != [round(place, 5) for place in places]:
+        while len(elements) > 1:
+            elements.remove(elements[-1])
+        elements[0].position = 0.0
+        for place in places[1:]:
+            elements.new(place)
+    for element, color in zip(elements, colors, strict=True):
+        element.color = color
 
 
 def _direction_color(tree, vector):

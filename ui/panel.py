@@ -2,14 +2,16 @@
 
 import bpy
 
-from ..operators.attributes import APPLICATIONS, NORMAL, RESULTS, eigenvector_name, mode_number, point_count
+from ..operators.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.groups import search_group
 from ..operators.job import running
 from ..operators.reading import is_display, obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
-from .display import find_display, input_property, label, range_node, shown_attribute, step_colors
+from .display import find_display, label, range_node, shown_attribute, step_colors
+from .legend import find_legend
 
 _LISTED = 20  # eigenvalues in the panel
+_TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _SETTINGS = (  # what belongs together
     ("rims", "rim_group", "sheets", "projection"),
     ("bandwidth", "neighbors", "bandwidth_factor"),
@@ -52,6 +54,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             column = layout.column(align=True)
             for sentence in reason.split(". "):
                 column.label(text=sentence)
+            layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
         _draw_summary(layout, obj)
         row = layout.row(align=True)
@@ -117,6 +120,10 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
+        row = layout.row(align=True)
+        row.menu("MESHFREE_MT_presets", text=bpy.types.MESHFREE_MT_presets.bl_label)
+        row.operator("meshfree.add_preset", text="", icon="ADD")
+        row.operator("meshfree.add_preset", text="", icon="REMOVE").remove_active = True
         layout.use_property_split = True
         layout.use_property_decorate = False
         obj = context.object
@@ -144,6 +151,11 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
         if eigenvalues is None:
             return
         layout.label(text="Eigenvalues")
+        row = layout.row(align=True)
+        row.prop(obj.meshfree, "plot_eigenvalues", toggle=True)
+        column = row.row(align=True)
+        column.active = obj.meshfree.plot_eigenvalues
+        column.prop(obj.meshfree, "compare_weyl", toggle=True)
         shown = shown_attribute(obj)
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for mode, eigenvalue in enumerate(eigenvalues[:_LISTED], start=1):
@@ -163,6 +175,10 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
     bl_label = "Display"
     bl_order = 1  # below the tools
 
+    @classmethod
+    def poll(cls, context):
+        return not obstacle(context.object, ("OBJECT", "EDIT"))  # colors help to choose points there
+
     def draw(self, context):
         layout = self.layout
         obj = context.object
@@ -176,21 +192,44 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         _draw_mode_steps(layout, attributes, shown)
         if find_display(obj) is None:
             return
+        layout.operator("meshfree.colormap", text="Update Colors")
         layout.use_property_split = True
         layout.use_property_decorate = False
-        column = layout.column(align=True)
-        if shown == NORMAL:
-            column.prop(obj.meshfree, "component")
-        column.prop(obj.meshfree, "color_map")
-        column.prop(obj.meshfree, "coverage")
-        column.prop(obj.meshfree, "iso_lines")
-        column.operator("meshfree.colormap", text="Update Colors")
-        column = layout.column(align=True)
-        bounds = range_node(obj)
-        if bounds is not None and not step_colors(obj):
-            column.prop(bounds.inputs["From Min"], "default_value", text="Range From")
-            column.prop(bounds.inputs["From Max"], "default_value", text="To")
-        layout.prop(*input_property(find_display(obj), "Radius"), text="Point Radius")
+        if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
+            layout.prop(obj.meshfree, "component")
+        if range_node(obj) is not None:
+            _draw_colors(layout, obj)
+        layout.prop(obj.meshfree, "point_size")
+        column = layout.column(align=True, heading="Show")
+        column.prop(obj.meshfree, "legend")
+        column.prop(obj.meshfree, "histogram")
+        shows_legend = find_legend(context.scene, obj) is not None
+        layout.operator("meshfree.legend", depress=shows_legend).show = not shows_legend
+        if context.scene.view_settings.view_transform not in _TRUE_COLORS:
+            layout.label(text="Colors differ from the legend:", icon="INFO")
+            layout.prop(context.scene.view_settings, "view_transform")
+
+
+def _draw_colors(layout, obj):
+    """Draw the settings of colors for numbers."""
+    settings = obj.meshfree
+    column = layout.column(align=True)
+    column.prop(settings, "color_map")
+    column.prop(settings, "reverse")
+    column = layout.column(align=True)
+    column.prop(settings, "range_mode")
+    if settings.range_mode in {"AUTO", "PERCENTILE", "SYMMETRIC"}:
+        column.prop(settings, "coverage")
+    if settings.range_mode == "LOCKED" or not step_colors(obj):
+        bounds = column.column(align=True)
+        bounds.enabled = settings.range_mode == "LOCKED"  # in other modes they tell what the range came to
+        bounds.prop(settings, "range_low")
+        bounds.prop(settings, "range_high")
+    column = layout.column(align=True)
+    column.prop(settings, "outside")
+    if not step_colors(obj):
+        column.prop(settings, "iso_lines")
+    layout.operator("meshfree.select_by_range")
 
 
 def _draw_mode_steps(layout, attributes, shown):

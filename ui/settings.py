@@ -13,6 +13,50 @@ from bpy.props import (
 )
 
 from ..operators.options import DEFAULTS
+from . import show
+
+COLOR_MAPS = (
+    (
+        "AUTO",
+        "Automatic",
+        "Cool to Warm for values on both sides of zero, a color each for few whole numbers and for true or"
+        " false, Viridis otherwise",
+    ),
+    ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
+    ("MAGMA", "Magma", "From black over red to light yellow, in even steps to the eye"),
+    ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
+    ("CYCLIC", "Cyclic", "All around the hues back to the first one, for angles and phases"),
+    ("CATEGORICAL", "Categorical", "A color for each whole number; seven, which then repeat"),
+)
+RANGE_MODES = (
+    (
+        "AUTO",
+        "Automatic",
+        "Symmetric for Cool to Warm and values on both sides of zero, Data for Cyclic, Percentile otherwise",
+    ),
+    ("DATA", "Data", "From the least to the greatest value"),
+    ("PERCENTILE", "Percentile", "The share of the values that Coverage says, without the outermost ones"),
+    ("SYMMETRIC", "Symmetric", "As far below zero as above, by the share of the values that Coverage says"),
+    ("LOCKED", "Locked", "The values below, whatever is shown"),
+)
+
+
+def _recolor(settings, context):
+    show.recolor(settings.id_data)
+
+
+def _recolor_locked(settings, context):
+    """Follow bounds that somebody sets; in other modes they only tell what the range came to."""
+    if settings.range_mode == "LOCKED":
+        show.recolor(settings.id_data)
+
+
+def _resize(settings, context):
+    show.resize(settings.id_data)
+
+
+def _redraw(settings, context):
+    show.redraw()
 
 
 class MESHFREE_PG_stage(bpy.types.PropertyGroup):
@@ -145,17 +189,19 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     color_map: EnumProperty(
         name="Color Map",
         description="Colors from low to high values",
-        items=(
-            (
-                "AUTO",
-                "Automatic",
-                "Cool to Warm for values on both sides of zero, a color each for few whole numbers and for true or"
-                " false, Viridis otherwise",
-            ),
-            ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
-            ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
-        ),
+        items=COLOR_MAPS,
         default="AUTO",
+        update=_recolor,
+    )
+    reverse: BoolProperty(
+        name="Reverse", description="Turn the colors round, from high to low values", default=False, update=_recolor
+    )
+    range_mode: EnumProperty(
+        name="Range",
+        description="Which values the colors stretch over",
+        items=RANGE_MODES,
+        default="AUTO",
+        update=_recolor,
     )
     coverage: FloatProperty(
         name="Coverage",
@@ -164,6 +210,24 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         min=50.0,
         max=100.0,
         subtype="PERCENTAGE",
+        update=_recolor,
+    )
+    range_low: FloatProperty(
+        name="From", description="Value of the first color", default=0.0, precision=4, update=_recolor_locked
+    )
+    range_high: FloatProperty(
+        name="To", description="Value of the last color", default=1.0, precision=4, update=_recolor_locked
+    )
+    outside: EnumProperty(
+        name="Out of Range",
+        description="What becomes of points whose values lie outside the range",
+        items=(
+            ("CLAMP", "End Colors", "They have the color of the nearer end"),
+            ("GRAY", "Gray", "They are dark gray"),
+            ("HIDE", "Hidden", "They are not seen, in Material Preview and renders"),
+        ),
+        default="CLAMP",
+        update=_recolor,
     )
     iso_lines: IntProperty(
         name="Iso Lines",
@@ -171,18 +235,57 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         default=0,
         min=0,
         soft_max=50,
+        update=_recolor,
     )
     component: EnumProperty(
         name="Vector",
         description="What of a vector is shown",
         items=(
+            ("AUTO", "Automatic", "The length of displacements, the direction of normals"),
             ("DIRECTION", "Direction", "Red, green and blue for the directions x, y and z"),
+            ("LENGTH", "Length", "The length as a number"),
             ("X", "X", "The x component as a number"),
             ("Y", "Y", "The y component as a number"),
             ("Z", "Z", "The z component as a number"),
         ),
-        default="DIRECTION",
+        default="AUTO",
+        update=_recolor,
     )
+    point_size: FloatProperty(
+        name="Point Size",
+        description="Radius of the points as a multiple of their spacing, which it follows when they change",
+        default=0.75,
+        min=0.01,
+        soft_max=3.0,
+        max=100.0,
+        step=5,
+        update=_resize,
+    )
+    legend: BoolProperty(
+        name="Legend", description="Draw the colors with their values over the 3D view", default=True, update=_redraw
+    )
+    histogram: BoolProperty(
+        name="Histogram",
+        description="Draw over the 3D view how often each value occurs, with the range of the colors",
+        default=False,
+        update=_redraw,
+    )
+    plot_eigenvalues: BoolProperty(
+        name="Plot", description="Draw the eigenvalues over the 3D view", default=False, update=_redraw
+    )
+    compare_weyl: BoolProperty(
+        name="Weyl's Law",
+        description="Draw a line for comparison at 4 pi k / area, which the eigenvalues of any surface come near to",
+        default=True,
+        update=_redraw,
+    )
+    spacing: FloatProperty(
+        name="Spacing",
+        description="Typical distance of neighboring points when the Point Size was applied, in local lengths",
+        min=0.0,
+        subtype="DISTANCE",
+    )
+    spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
 
     # Results of the last analysis, for the panel and for scripts.
     total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)

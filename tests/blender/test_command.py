@@ -57,6 +57,8 @@ FORMATS = {
     "d.csv": write_text(",", header="# made by hand\nx,y,z,w", extra=1),
     "e.csv": write_text(";", header="x;y;z", decimal=","),
     "f.txt": write_text("\t"),
+    "h.pts": write_text(" ", header=str(len(POINTS))),
+    "i.npy": lambda path: np.save(path, POINTS),
     "g.blend": write_blend,
 }
 
@@ -87,7 +89,10 @@ def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
         assert_allclose(arrays["gaussian_curvature"], laplacian.gaussian_curvature, rtol=0.01)
         assert not arrays["boundary"].any()
         assert not arrays["component"].any()
-        assert {arrays[key].dtype for key in arrays.keys() - {"boundary", "component"}} == {np.dtype(np.float64)}
+        stiffness = {"format", "shape", "data", "indices", "indptr"}
+        numbers = arrays.keys() - {"boundary", "component"} - stiffness
+        assert {arrays[key].dtype for key in numbers} == {np.dtype(np.float64)}
+        assert stiffness < arrays.keys()
 
 
 def test_blend_output_holds_attributes_eigenvalues_and_colors(run, tmp_path):
@@ -108,10 +113,41 @@ def test_ply_output_holds_the_points_and_attributes(run, tmp_path):
     assert code == 0
     header = (tmp_path / "out.ply").read_bytes().split(b"end_header")[0].decode()
     assert "element vertex 1000" in header
-    for name in ("lb_area", "lb_normal_x", "lb_mean_curvature", "lb_gaussian_curvature", "lb_eigenvector_002"):
+    for name in ("x", "nx", "lb_area", "lb_mean_curvature", "lb_gaussian_curvature", "lb_eigenvector_002"):
         assert f"property float {name}\n" in header
     assert " lb_boundary\n" in header
     assert " lb_component\n" in header
+
+
+@pytest.mark.parametrize("suffix", ["ply", "xyz", "csv"])
+def test_points_far_from_the_origin_are_written_where_they_were(extension, run, tmp_path, suffix):
+    read_points = importlib.import_module(f"{extension.__name__}.core.files").read_points
+    far = np.array([400_000.0, 5_000_000.0, 100.0])
+    np.save(tmp_path / "in.npy", POINTS + far)
+    for verb in ("analyze", "segment"):
+        code, lines = run(verb, tmp_path / "in.npy", "--out-dir", tmp_path / verb, "--format", suffix)
+        assert code == 0, lines
+        table = read_points(tmp_path / verb / f"in.{suffix}")
+        assert_allclose(table.points, POINTS + far, rtol=0, atol=1e-6)
+        assert ("lb_area" if verb == "analyze" else "lb_segment") in table.attributes
+    code, lines = run("analyze", tmp_path / "segment" / f"in.{suffix}")
+    assert lines[0]["total_area"] == pytest.approx(4.0 * np.pi, rel=0.01)
+
+
+def test_what_of_a_file_is_left_out_is_told(run, tmp_path):
+    np.savetxt(tmp_path / "in.xyz", np.hstack([POINTS, POINTS]))
+    code, (line,) = run("analyze", tmp_path / "in.xyz")
+    assert (code, line["notices"]) == (0, ["in.xyz: left out 3 columns that no header names."])
+
+
+def test_stiffness_of_the_arrays(core, run, tmp_path):
+    from scipy.sparse import load_npz  # bundled with the extension
+
+    np.save(tmp_path / "in.npy", POINTS)
+    run("analyze", tmp_path / "in.npy", "--out", tmp_path / "out.npz")
+    laplacian = core.build_laplacian(POINTS, options=core.LaplacianOptions(orient=True))
+    difference = abs(load_npz(tmp_path / "out.npz") - laplacian.stiffness).max()
+    assert difference < 1e-3 * laplacian.stiffness.diagonal().max()
 
 
 def test_many_inputs_one_failing(run, tmp_path):
@@ -218,11 +254,13 @@ def test_unreadable_files(run, tmp_path):
     (tmp_path / "bad.blend").write_text("this is no Blender file")
     (tmp_path / "empty.obj").write_text("")
     (tmp_path / "scan.e57").write_text("")
+    (tmp_path / "scan.laz").write_text("")
     inputs = sorted(tmp_path.iterdir())
     code, lines = run("analyze", *inputs)
     assert code == 1
     assert all(line["error"] for line in lines)
-    assert len(lines) == 4
+    assert len(lines) == 5
+    assert "make convert LAS=scan.laz" in lines[-1]["error"]
 
 
 def test_input_is_never_overwritten(run, tmp_path):

@@ -242,8 +242,8 @@ def test_outliers_do_not_wash_the_colors_out(colormaps):
     ("values", "name"),
     [
         (np.zeros(5, bool), "TRUTH"),
-        (np.zeros(5, np.int32), "CLASSES"),
-        (np.arange(-1, 7), "CLASSES"),
+        (np.zeros(5, np.int32), "CATEGORICAL"),
+        (np.arange(-1, 7), "CATEGORICAL"),
         (np.arange(-1, 8), "VIRIDIS"),
         (np.arange(-2, 3), "COOL_WARM"),
         (np.arange(3.0), "VIRIDIS"),
@@ -269,7 +269,7 @@ def test_automatic_maps(colormaps, values, name):
 )
 def test_range_of_special_values(colormaps, values, low, high):
     coverage = 100.0 if np.isnan(values.astype(float)).any() else 98.0
-    assert colormaps.fit(values, coverage)[1:] == pytest.approx((low, high))
+    assert colormaps.fit(values, coverage=coverage)[1:] == pytest.approx((low, high))
 
 
 @pytest.mark.parametrize(
@@ -287,8 +287,10 @@ def test_titles(display, name, title):
 
 
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
-@pytest.mark.parametrize(("name", "texts"), [("lb_area", 6), ("lb_normal", 7), ("lb_boundary", 3), ("lb_component", 2)])
-def test_legend_lies_inside_the_picture_and_is_made_once(extension, obj, kind, name, texts):
+@pytest.mark.parametrize(
+    ("name", "texts"), [("lb_area", None), ("lb_normal", 7), ("lb_boundary", 3), ("lb_component", 2)]
+)
+def test_legend_lies_inside_the_picture_and_is_made_once(extension, display, obj, kind, name, texts):
     legend = importlib.import_module(f"{extension.__name__}.ui.legend")
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -300,7 +302,14 @@ def test_legend_lies_inside_the_picture_and_is_made_once(extension, obj, kind, n
     bpy.ops.meshfree.colormap(attribute=name)
     legend.make_legend(scene, obj, camera)
     parts = list(legend.make_legend(scene, obj, camera).objects)
-    assert len([part for part in parts if part.type == "FONT"]) == texts
+    written = [part.data.body for part in parts if part.type == "FONT"]
+    if texts is None:  # the title, and round numbers inside the range
+        assert written[0] == "Area (cm²)"
+        numbers, (low, high) = np.array(written[1:], float), bounds(display, obj)
+        assert len(numbers) >= 3
+        assert 1e4 * low <= numbers.min() < numbers.max() <= 1e4 * high
+    else:
+        assert len(written) == texts
     assert len([block for block in bpy.data.objects if block.parent == camera]) == len(parts)
     bpy.context.view_layer.update()
     from bpy_extras.object_utils import world_to_camera_view

@@ -155,9 +155,9 @@ def test_selected_points_become_an_attribute(mode):
 def test_other_attributes_are_never_overwritten_by_groups():
     cloud = add_pointcloud(rough_sphere(1000))
     cloud.data.attributes.new("Taken", "FLOAT_VECTOR", "POINT")
-    with pytest.raises(RuntimeError, match='attribute named "Taken", which holds neither'):
+    with pytest.raises(RuntimeError, match='attribute named "Taken", and it holds no weights'):
         bpy.ops.meshfree.group_from_selection(name="Taken")
-    with pytest.raises(RuntimeError, match='no group named "None" to remove'):
+    with pytest.raises(RuntimeError, match='no attribute named "None" to remove'):
         bpy.ops.meshfree.group_from_selection(name="None", action="REMOVE")
 
 

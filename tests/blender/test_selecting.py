@@ -207,3 +207,48 @@ def test_a_closed_surface_has_no_rim_to_select():
 def test_a_group_that_is_missing_is_not_selected(obj, mode):
     with pytest.raises(RuntimeError, match='no vertex group named "Handle"'):
         bpy.ops.meshfree.select_group()
+
+
+class TestSeveralObjectsInEditMode:
+    @pytest.fixture
+    def objects(self):
+        objects = [add_object(sphere_points(900, seed), name) for seed, name in enumerate(("One", "Two", "Three"))]
+        for obj in objects:
+            obj.select_set(True)
+        choose(objects[0], lambda points: points[:, 2] > 0.95)
+        choose(objects[1], lambda points: points[:, 2] < -0.9)
+        choose(objects[2], lambda points: points[:, 2] > 2.0)
+        bpy.context.view_layer.objects.active = objects[2]
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_mode(type="VERT")
+        yield objects
+        assert [obj.mode for obj in objects] == ["EDIT"] * 3
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    def test_each_with_selected_points_gets_the_group(self, objects):
+        bpy.ops.meshfree.group_from_selection(role="SOURCE")
+        assert [obj.mode for obj in objects] == ["EDIT"] * 3
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert (in_group(objects[0], "Source") == (local_points(objects[0])[:, 2] > 0.95)).all()
+        assert (in_group(objects[1], "Source") == (local_points(objects[1])[:, 2] < -0.9)).all()
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert not objects[2].vertex_groups
+
+    def test_each_grows(self, objects):
+        before = [self.count(obj) for obj in objects]
+        bpy.ops.meshfree.select_grow(distance=0.4)
+        after = [self.count(obj) for obj in objects]
+        assert after[0] > before[0] > 0
+        assert after[1] > before[1] > 0
+        assert after[2] == before[2] == 0
+
+    def test_an_error_in_one_leaves_all(self, objects):
+        objects[1].vertex_groups.new(name="Source").lock_weight = True
+        with pytest.raises(RuntimeError, match='"Source" of "Two" is locked'):
+            bpy.ops.meshfree.group_from_selection(role="SOURCE")
+        assert not objects[0].vertex_groups
+
+    @staticmethod
+    def count(obj):
+        obj.update_from_editmode()
+        return int(selected(obj).sum())

@@ -30,7 +30,7 @@ def imported(path):
 
 @pytest.mark.parametrize(("package", "forbidden"), [("core", ("bpy", "..operators", "..ui")), ("operators", ("..ui",))])
 def test_imports_point_one_way(package, forbidden):
-    files = sorted((ROOT / package).glob("*.py"))
+    files = sorted((ROOT / package).rglob("*.py"))
     assert files
     wrong = [f"{file.name}: {name}" for file in files for name in imported(file) if name.startswith(forbidden)]
     assert wrong == []
@@ -40,7 +40,7 @@ def test_core_needs_numpy_and_scipy_only():
     allowed = set(sys.stdlib_module_names) | {"numpy", "scipy"}
     wrong = [
         f"{file.name}: {name}"
-        for file in sorted((ROOT / "core").glob("*.py"))
+        for file in sorted((ROOT / "core").rglob("*.py"))
         for name in imported(file)
         if not name.startswith(".") and name.split(".")[0] not in allowed
     ]
@@ -54,4 +54,4 @@ def test_core_is_usable_from_the_repository_root_without_blender():
 
 
 def test_core_never_uses_the_warnings_module():
-    assert [file.name for file in (ROOT / "core").glob("*.py") if "warnings" in imported(file)] == []
+    assert [file.name for file in (ROOT / "core").rglob("*.py") if "warnings" in imported(file)] == []

@@ -357,7 +357,7 @@ def bound_to_two():
 def test_progress_is_reported_and_may_stop_the_work():
     seen = []
     core.Deformer(small_sphere(), [0], [1], progress=lambda *report: seen.append(report))
-    assert [stage for stage, _ in seen] == ["Operator", "Equations", "Factors"]
+    assert list(dict.fromkeys(stage for stage, _ in seen)) == ["Operator", "Equations", "Factors"]
     seen.clear()
     deformer = bound_to_two()
     deformer.solve(small_sphere().points[:2] + 0.1, progress=lambda *report: seen.append(report))

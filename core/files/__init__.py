@@ -1,0 +1,17 @@
+"""Point files to arrays in double precision and back: numpy only, so that scripts outside Blender can use it too."""
+
+from .formats import READABLE, WRITABLE, read_points, write_points
+from .origin import choose_origin, is_coarse
+from .table import PointTable
+from .whole import replacing
+
+__all__ = [
+    "READABLE",
+    "WRITABLE",
+    "PointTable",
+    "choose_origin",
+    "is_coarse",
+    "read_points",
+    "replacing",
+    "write_points",
+]

@@ -1,0 +1,179 @@
+"""PLY, the Stanford polygon format: the vertices and their properties, in text or binary."""
+
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InvalidPointsError
+from .table import PointTable, from_columns, to_columns
+
+_NAMES = {
+    "i1": "char",
+    "u1": "uchar",
+    "i2": "short",
+    "u2": "ushort",
+    "i4": "int",
+    "u4": "uint",
+    "f4": "float",
+    "f8": "double",
+}
+_TYPES = {name: code for code, name in _NAMES.items()}
+_TYPES |= {np.dtype(code).name: code for code in _NAMES}  # int8, ..., float64
+_ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
+_LONGEST = 1000  # characters of a line of the header, and lines
+
+
+class _Element(NamedTuple):
+    name: str
+    count: int
+    names: list  # of the properties
+    types: list  # numpy's codes; None for a list
+
+
+def read_ply(path) -> PointTable:
+    """Read the vertices of a PLY file with all their properties.
+
+    Raises
+    ------
+    InvalidPointsError
+        It is no PLY file, or broken; the text says where.
+    """
+    with open(path, "rb") as file:
+        order, elements = _read_header(file, path)
+        names = [element.name for element in elements]
+        if "vertex" not in names:
+            raise InvalidPointsError(
+                f"{path} has no vertices, only {', '.join(names) or 'nothing'}. It holds no points."
+            )
+        at = names.index("vertex")
+        for element in (elements[at], *elements[:at]):
+            if None in element.types and (element.count or element.name == "vertex"):
+                raise InvalidPointsError(
+                    f"{path} has lists in its element {element.name}, before or among its points. Save it again with"
+                    " plain vertices first."
+                )
+        vertex = elements[at]
+        if order is None:
+            before = sum(element.count for element in elements[:at])
+            columns = _read_text(file, vertex, before, path)
+        else:
+            file.seek(sum(element.count * _record(element, order).itemsize for element in elements[:at]), 1)
+            rows = np.fromfile(file, _record(vertex, order), vertex.count)
+            if len(rows) < vertex.count:
+                raise _too_short(path, len(rows), vertex.count)
+            columns = [np.ascontiguousarray(rows[f"f{i}"]) for i in range(len(vertex.names))]
+            columns = [column.astype(column.dtype.newbyteorder("=")) for column in columns]
+    table = from_columns(dict(zip(vertex.names, columns, strict=True)), path)
+    others = [
+        f"{element.count} {element.name} elements" for element in elements if element is not vertex and element.count
+    ]
+    if others:
+        table.notices.append(f"{path.name}: left out {', '.join(others)}. Only points are read.")
+    return table
+
+
+def _record(element, order):
+    return np.dtype([(f"f{index}", order + code) for index, code in enumerate(element.types)])
+
+
+def _read_header(file, path):
+    """Return the byte order, None for text, and the elements; leave the file where the data begin."""
+    if file.readline(_LONGEST).strip() != b"ply":
+        raise InvalidPointsError(f"{path} is no PLY file: its first line is not 'ply'. Export it again.")
+    order, elements = "", []
+    for number in range(2, _LONGEST):
+        line = file.readline(_LONGEST).decode("ascii", errors="replace").strip()
+        match line.split():
+            case ["end_header"]:
+                if order == "":
+                    raise InvalidPointsError(f"{path} does not say whether it is text or binary. Export it again.")
+                return order, elements
+            case ["format", kind, *_] if kind in _ORDERS:
+                order = _ORDERS[kind]
+            case ["comment" | "obj_info", *_]:
+                pass
+            case ["element", name, count] if count.isdecimal():
+                elements.append(_Element(name, int(count), [], []))
+            case ["property", "list", length, item, name] if elements and length in _TYPES and item in _TYPES:
+                elements[-1].names.append(name)
+                elements[-1].types.append(None)
+            case ["property", kind, name] if elements and kind in _TYPES:
+                elements[-1].names.append(name)
+                elements[-1].types.append(_TYPES[kind])
+            case _:
+                raise InvalidPointsError(
+                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PLY file."
+                )
+    raise InvalidPointsError(f"{path} has a header without an end. Export it again.")
+
+
+def _read_text(file, vertex, before, path):
+    rows = (line.decode("ascii", errors="replace") for line in file if line.strip())
+    for _ in islice(rows, before):
+        pass
+    lines = list(islice(rows, vertex.count))
+    if len(lines) < vertex.count:
+        raise _too_short(path, len(lines), vertex.count)
+    width = len(vertex.names)
+    try:
+        values = np.loadtxt(lines, ndmin=2, comments=None) if lines else np.empty((0, width))
+    except ValueError:
+        values = np.empty((0, 0))
+    if values.shape != (vertex.count, width):
+        _refuse_row(lines, width, path)
+    # The text may hold more digits than the float that the header names.
+    return [
+        column.astype("f8" if code[0] == "f" else code) for column, code in zip(values.T, vertex.types, strict=True)
+    ]
+
+
+def _too_short(path, found, count):
+    return InvalidPointsError(
+        f"{path} ends after {found} of the {count} points that its header names. Copy or save it again."
+    )
+
+
+def _refuse_row(lines, width, path):
+    """Say which of some lines does not hold so many numbers."""
+    for number, line in enumerate(lines, start=1):
+        words = line.split()
+        try:
+            wrong = "" if len(words) == width else f"{len(words)} numbers where the header names {width} properties"
+            [float(word) for word in words]
+        except ValueError as error:
+            wrong = str(error)
+        if wrong:
+            raise InvalidPointsError(f"{path}, point {number}: {wrong}. Correct the file.")
+
+
+def write_ply(path, table, double=True):
+    """Write a table as a binary PLY file.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    table : PointTable
+    double : bool
+        Whether coordinates are kept in double precision.
+    """
+    columns = to_columns(table)
+    if not double:
+        columns.update((axis, columns[axis].astype(np.float32)) for axis in "xyz")
+    columns = {name: values.view(np.uint8) if values.dtype == bool else values for name, values in columns.items()}
+    types = {name: _code(values) for name, values in columns.items()}
+    rows = np.empty(len(table.points), [(name, f"<{code}") for name, code in types.items()])
+    for name, values in columns.items():
+        rows[name] = values
+    properties = "".join(f"property {_NAMES[code]} {name.replace(' ', '_')}\n" for name, code in types.items())
+    with open(path, "wb") as file:
+        file.write(
+            f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n".encode()
+        )
+        rows.tofile(file)
+
+
+def _code(values):
+    """Return the type of the file that holds these numbers: PLY has none of 8 bytes for whole ones."""
+    code = values.dtype.str[1:]
+    return code if code in _NAMES else "f8"

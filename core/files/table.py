@@ -1,0 +1,126 @@
+"""What a point file holds: a place, and other values, for each point."""
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InvalidPointsError, TooFewPointsError
+
+NORMAL = "normal"  # the attribute that files call nx ny nz
+_NORMALS = ("nx", "ny", "nz")
+_COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+_AXES = ("x", "y", "z")
+
+
+@dataclass
+class PointTable:
+    """Points with attributes.
+
+    Attributes
+    ----------
+    points : ndarray, (n, 3) float64
+    attributes : dict of str to ndarray
+        Numbers, whole numbers or truth values (n,), or vectors (n, 3).
+    colors : ndarray, (n, 4) float32, or None
+        Red, green, blue and alpha from 0 to 1, in sRGB.
+    single : bool
+        Whether the coordinates were kept in single precision.
+    notices : list of str
+        What was left out.
+    """
+
+    points: np.ndarray
+    attributes: dict = field(default_factory=dict)
+    colors: np.ndarray | None = None
+    single: bool = False
+    notices: list = field(default_factory=list)
+
+
+def from_columns(columns, path):
+    """Make a table of columns by the names that files give them.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray, (n,)
+        x, y and z among them; nx ny nz become the attribute "normal", three columns a_x a_y a_z the vector a, and red
+        green blue, r g b, with alpha, the colors.
+    path : pathlib.Path
+        The file, for the texts of errors.
+    """
+    named = {name.lower(): name for name in reversed(columns)}  # the first of those that differ in case only
+    missing = [axis for axis in _AXES if axis not in named]
+    if missing:
+        raise InvalidPointsError(
+            f"{path} has no {' '.join(missing)} among its columns {', '.join(columns)}. Each point needs x y z."
+        )
+    left = dict(columns)
+
+    def take(names):
+        """Take columns out by their lower case names; none if one is missing."""
+        if not all(name in named and named[name] in left for name in names):
+            return None
+        return [left.pop(named[name]) for name in names]
+
+    places = take(_AXES)
+    table = PointTable(np.stack(places, axis=1).astype(np.float64))
+    table.single = any(place.dtype == np.float32 for place in places)
+    colors = next(filter(None, map(take, _COLORS)), None)
+    if colors is not None:
+        table.colors = _unit_colors(colors, take(("alpha",)))
+    normals = take(_NORMALS)
+    if normals is not None:
+        table.attributes[NORMAL] = np.stack(normals, axis=1)
+    for name in columns:
+        match = re.fullmatch(r"(.+)_x", name)
+        vector = [f"{match[1]}_{axis}" for axis in _AXES] if match else []
+        if vector and all(part in left for part in vector):
+            table.attributes[match[1]] = np.stack([left.pop(part) for part in vector], axis=1)
+        elif name in left:
+            table.attributes[name] = left.pop(name)
+    return table
+
+
+def _unit_colors(colors, alpha):
+    """Return red, green, blue and alpha from 0 to 1, by the type of the numbers or, where it tells nothing, by them."""
+    values = np.stack(colors, axis=1)
+    if values.dtype.kind == "f":
+        whole = bool((values == np.round(values)).all())
+        full = 1.0 if values.max() <= 1.0 and not whole else 255.0 if values.max() <= 255.0 else 65535.0
+    else:
+        full = float(np.iinfo(values.dtype).max) if values.dtype.itemsize <= 2 else 255.0
+    result = np.ones((len(values), 4), np.float32)
+    result[:, :3] = values / full
+    if alpha is not None:
+        result[:, 3] = alpha[0] / (full if alpha[0].dtype == values.dtype else max(1.0, float(alpha[0].max())))
+    return np.clip(result, 0.0, 1.0)
+
+
+def to_columns(table) -> dict:
+    """Return the columns of a table by the names of files, numbers as they are; the reverse of `from_columns`."""
+    columns = dict(zip(_AXES, table.points.T, strict=True))
+    attributes = dict(table.attributes)
+    if NORMAL in attributes:
+        columns.update(zip(_NORMALS, attributes.pop(NORMAL).T, strict=True))
+    if table.colors is not None:
+        values = np.round(255.0 * table.colors).astype(np.uint8)
+        columns.update(zip(("red", "green", "blue", "alpha"), values.T, strict=True))
+    for name, values in attributes.items():
+        if values.ndim == 1:
+            columns[name] = values
+        else:
+            columns.update((f"{name}_{axis}", part) for axis, part in zip(_AXES, values.T, strict=True))
+    return columns
+
+
+def check_table(table, path):
+    """Refuse a file without points, or with coordinates that are no places, and return it."""
+    if len(table.points) == 0:
+        raise TooFewPointsError(f"{path} has no points. Give a file with points.")
+    bad = np.flatnonzero(~np.isfinite(table.points).all(axis=1))
+    if len(bad):
+        raise InvalidPointsError(
+            f"{path}: {len(bad)} of {len(table.points)} points have coordinates that are not finite (NaN or infinity),"
+            f" the first of them is point {bad[0] + 1}. Delete these points from the file."
+        )
+    return table

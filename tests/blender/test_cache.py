@@ -1,0 +1,189 @@
+"""Results that are kept: what is only shown in another way is not computed again, and memory has a bound."""
+
+import importlib
+from threading import Thread
+
+import bpy
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.test_application import add_ready, run, wave
+from tests.blender.test_smooth import shown_points
+
+# Settings of a first run, and those of a second one that asks for nothing new.
+AGAIN = {
+    "analyze": ({"modes": 6}, {"modes": 6, "write_limit": 2, "show": False}),
+    "fewer modes": ("spectrum", {"count": 8}, {"count": 5, "write_limit": 3}),
+    "remove noise": ("smooth", {}, {"strength": 0.3, "target": "IN_PLACE"}),
+    "remove noise of a group": ("smooth", {}, {"group": "Handle"}),
+    "soften": ("smooth", {"method": "HEAT", "keep_rim": False}, {"method": "HEAT", "keep_rim": False, "keep": "AREA"}),
+    "scale details": ("smooth", {"method": "DETAIL"}, {"method": "DETAIL", "strength": 0.5}),
+    "keep modes": ("smooth", {"method": "MODES", "modes": 30}, {"method": "MODES", "modes": 20, "strength": 0.5}),
+    "mode_shape": ({}, {"mode": 7, "amplitude": 0.2, "phase": 1.0, "animate": True}),
+    "segment": ({"parts": 3}, {"parts": 3, "vertex_groups": True, "show": False}),
+    "signs": ("segment", {"method": "NODAL"}, {"method": "NODAL", "show": False}),
+    "signature": ({"modes": 12}, {"modes": 12, "kind": "WAVE", "count": 3}),
+    "harmonic_field": ({}, {"low": -1.0, "high": 3.0, "show": False}),
+    "geodesic_distance": ({}, {"show": False}),
+    "minimal_surface": ({"steps": 3}, {"steps": 3, "target": "IN_PLACE"}),
+}
+COSTLY = {  # where each is called from
+    "operators.cache": ("build_laplacian", "mean_curvature"),
+    "operators.minimal": ("minimal_surface",),
+    "core.solvers": ("build_laplacian", "splu", "cg"),
+    "core.spectrum": ("eigsh",),
+    "core.filters": ("eigsh",),
+    "core.geodesics": ("dijkstra",),
+}
+
+
+@pytest.fixture
+def cache(extension):
+    module = importlib.import_module(f"{extension.__name__}.operators.cache")
+    module.clear()
+    return module
+
+
+@pytest.fixture
+def calls(extension, monkeypatch):
+    """Names of the costly functions that were called."""
+    called = []
+
+    def count(module, name):
+        function = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *args, **rest: called.append(name) or function(*args, **rest))
+
+    for path, names in COSTLY.items():
+        module = importlib.import_module(f"{extension.__name__}.{path}")
+        for name in names:
+            count(module, name)
+    return called
+
+
+@pytest.mark.parametrize("case", AGAIN)
+def test_a_second_run_computes_nothing(cache, calls, case):
+    name, first, second = AGAIN[case] if len(AGAIN[case]) == 3 else (case, *AGAIN[case])
+    add_ready(wave())
+    bpy.ops.ed.undo_push(message="Before")
+    assert run(name, "EXEC_DEFAULT", True, **first) == {"FINISHED"}
+    assert "build_laplacian" in calls
+    bpy.ops.ed.undo()  # as Adjust Last Operation does
+    calls.clear()
+    assert run(name, "EXEC_DEFAULT", True, **second) == {"FINISHED"}
+    assert calls == []
+
+
+def test_what_changes_results_is_computed(cache, calls):
+    add_ready(wave())
+    bpy.ops.meshfree.geodesic_distance()
+    calls.clear()
+    bpy.ops.meshfree.geodesic_distance(group="Anchor")
+    assert calls == ["dijkstra"]
+    bpy.ops.meshfree.harmonic_field()
+    calls.clear()
+    bpy.context.object.vertex_groups["Value"].add([7], 0.5, "REPLACE")
+    bpy.ops.meshfree.harmonic_field()
+    assert "cg" in calls
+    calls.clear()
+    bpy.context.object.data.vertices[7].co.z += 1e-3
+    bpy.ops.meshfree.harmonic_field()
+    assert "build_laplacian" in calls
+
+
+def test_kept_results_are_those_of_a_first_run(cache):
+    def places(strength, **settings):
+        add_ready(wave())
+        bpy.ops.meshfree.smooth(strength=strength, **settings)
+        return shown_points(bpy.context.object)
+
+    for settings in ({}, {"method": "MODES", "modes": 20}, {"keep_rim": False, "keep": "AREA"}, {"group": "Handle"}):
+        cache.clear()
+        expected = places(0.4, **settings)
+        cache.clear()
+        places(1.0, **{**settings, "keep": "NONE", "group": ""})
+        assert_allclose(places(0.4, **settings), expected, atol=1e-6)
+
+
+def test_a_field_between_other_values_is_solved_once(cache, calls, core):
+    obj = add_ready(wave())
+    bpy.ops.meshfree.harmonic_field()
+    between = attribute(obj, "lb_field")
+    calls.clear()
+    bpy.ops.meshfree.harmonic_field(low=-1.0, high=3.0)
+    assert_allclose(attribute(obj, "lb_field"), 4.0 * between - 1.0, atol=1e-6)
+    assert calls == []
+
+
+def test_modes_of_another_rim_are_others(cache):
+    built = cache.build(wave(), options(cache), None, silent)
+    free = cache.lowest_modes(built.laplacian, 6, silent)
+    fixed = cache.lowest_modes(built.laplacian, 6, silent, fixed_rim=True, raw=True)
+    assert free.eigenvalues[0] < 1e-6 < fixed.eigenvalues[0]
+    again = cache.lowest_modes(built.laplacian, 6, silent)
+    assert_allclose(again.eigenvalues, built.laplacian.eigenpairs(6).eigenvalues, rtol=1e-9, atol=1e-9)
+
+
+def silent(stage, fraction):
+    pass
+
+
+def options(cache):
+    package = cache.__name__.rpartition(".")[0]
+    return importlib.import_module(f"{package}.options").DEFAULTS
+
+
+class TestMemory:
+    def test_bytes_are_those_of_the_arrays(self, cache, core):
+        laplacian = core.build_laplacian(sphere_points(500))
+        parts = (laplacian.stiffness.data, laplacian.stiffness.indices, laplacian.points)
+        known = sum(part.nbytes for part in parts)
+        assert known < cache.memory(laplacian) < 3 * known
+        assert cache.memory((laplacian, [laplacian, {"again": laplacian}])) == cache.memory(laplacian)
+
+    def test_factors_count(self, cache, core):
+        laplacian = core.build_laplacian(sphere_points(500))
+        deformer = core.Deformer(laplacian, [0], [1])
+        assert cache.memory(deformer._solve) > 12 * 500
+        assert cache.memory(deformer) > cache.memory(deformer._solve)
+
+    def test_what_was_not_used_for_longest_goes_first_and_the_newest_stays(self, cache, monkeypatch):
+        monkeypatch.setattr(cache, "LIMIT", 100)
+        made = []
+
+        def get(key, size=40):
+            return cache.fetch(key, lambda: made.append(key) or np.zeros(size, dtype=np.uint8))
+
+        for key in ("a", "b", "a", "c", "a", "b"):
+            get(key)
+        assert made == ["a", "b", "c", "b"]
+        assert len(get("large", 1000)) == 1000
+        get("large")
+        assert made[4:] == ["large"]
+        assert len(cache._kept) == 1
+
+    def test_another_file_gives_it_back(self, cache):
+        add_object(sphere_points(300))
+        bpy.ops.meshfree.analyze()
+        assert len(cache._kept) > 0
+        bpy.ops.wm.read_homefile(use_empty=True)
+        assert len(cache._kept) == 0
+
+    def test_threads_share_it(self, cache, monkeypatch):
+        monkeypatch.setattr(cache, "LIMIT", 2000)
+        failed = []
+
+        def work(seed):
+            for key in np.random.default_rng(seed).integers(0, 40, 2000):
+                value = cache.fetch(int(key), lambda key=key: np.full(100, key, dtype=np.uint8))
+                if not (value == key).all():
+                    failed.append(key)
+
+        threads = [Thread(target=work, args=(seed,)) for seed in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert not failed
+        assert sum(size for _, size in cache._kept.values()) <= 2000

@@ -1,0 +1,358 @@
+"""Import and export of point files: coordinates of any size, attributes, colors, undo, errors, and the menus."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.blender.clouds import add_object, attribute, everything, local_points, sphere_points
+from tests.blender.conftest import MODULE
+
+FAR = np.array([446_123.0, 4_000_456.0, 78.0])
+SURVEY = np.round(50.0 * sphere_points(1000), 3) + FAR  # in metres, with millimetres
+STEP = np.spacing(np.float32(100.0))  # of single precision at the size of the survey
+
+
+def read_file(path):
+    return importlib.import_module(f"{MODULE}.core.files").read_points(path)
+
+
+def write_file(path, points, attributes=None):
+    files = importlib.import_module(f"{MODULE}.core.files")
+    files.write_points(path, files.PointTable(points, attributes or {}))
+
+
+def write_text(path, points, delimiter=" ", head=""):
+    np.savetxt(path, points, "%.3f", delimiter, header=head, comments="")
+
+
+def write_obj(path, points):
+    path.write_text("".join(f"v {x:.3f} {y:.3f} {z:.3f}\n" for x, y, z in points))
+
+
+WRITERS = {
+    "a.ply": write_file,
+    "a.obj": write_obj,
+    "a.xyz": write_text,
+    "a.pts": lambda path, points: write_text(path, points, head=str(len(points))),
+    "a.csv": lambda path, points: write_text(path, points, ",", "x,y,z"),
+    "a.txt": lambda path, points: write_text(path, points, "\t"),
+    "a.npy": np.save,
+    "a.npz": lambda path, points: np.savez(path, points=points),
+}
+
+
+def run_import(*paths, **options):
+    """Import one file, or several of one folder."""
+    if len(paths) == 1:
+        assert bpy.ops.meshfree.import_points(filepath=str(paths[0]), **options) == {"FINISHED"}
+    else:
+        names = [{"name": path.name} for path in paths]
+        bpy.ops.meshfree.import_points(directory=str(paths[0].parent), files=names, **options)
+    return bpy.context.object
+
+
+def everywhere():
+    """All data-blocks by name and the selection, to compare before and after."""
+    blocks = {name: sorted(block.name for block in getattr(bpy.data, name)) for name in ("objects", "meshes")}
+    return blocks, [obj.name for obj in bpy.context.selected_objects], bpy.context.object and bpy.context.object.name
+
+
+@pytest.mark.parametrize("output", ["out.ply", "out.xyz", "out.csv"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_millimetres_survive_import_analysis_and_export(tmp_path, name, output):
+    WRITERS[name](tmp_path / name, SURVEY)
+    obj = run_import(tmp_path / name)
+    assert (obj.name, obj.type, obj.select_get()) == ("a", "MESH", True)
+    assert list(obj["lb_offset"]) == [446_120.0, 4_000_460.0, 80.0]
+    assert np.abs(local_points(obj)).max() < 150.0
+    assert bpy.ops.meshfree.analyze(show=False) == {"FINISHED"}
+    assert obj.meshfree.total_area == pytest.approx(4.0 * np.pi * 50.0**2, rel=0.01)
+    assert bpy.ops.meshfree.export_points(filepath=str(tmp_path / output)) == {"FINISHED"}
+    table = read_file(tmp_path / output)
+    assert np.abs(table.points - SURVEY).max() <= STEP
+    assert_allclose(table.attributes["lb_area"], attribute(obj, "lb_area"), rtol=1e-6)
+    assert_array_equal(table.attributes["lb_component"], attribute(obj, "lb_component"))
+    assert_allclose(table.attributes["normal"], attribute(obj, "lb_normal"), atol=1e-6)
+
+
+def test_near_coordinates_stay_as_they_are(tmp_path):
+    points = sphere_points().astype(np.float32)
+    np.save(tmp_path / "a.npy", points)
+    obj = run_import(tmp_path / "a.npy")
+    assert "lb_offset" not in obj
+    assert_array_equal(local_points(obj), points)
+    bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.ply"))
+    assert b"property float x\n" in (tmp_path / "a.ply").read_bytes()
+    assert_array_equal(read_file(tmp_path / "a.ply").points, points)
+
+
+def test_moved_turned_and_scaled_objects_are_exported_where_they_are(tmp_path):
+    np.save(tmp_path / "a.npy", SURVEY)
+    obj = run_import(tmp_path / "a.npy")
+    obj.location = (1000.0, 0.0, 0.0)
+    obj.rotation_euler.z = np.pi / 2.0
+    obj.scale = (1.0, 1.0, 2.0)
+    bpy.ops.meshfree.analyze(show=False)
+    bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.ply"))
+    local = local_points(obj)
+    expected = local[:, [1, 0, 2]] * (-1.0, 1.0, 2.0) + (1000.0, 0.0, 0.0) + obj["lb_offset"]
+    table = read_file(tmp_path / "a.ply")
+    assert_allclose(table.points, expected, rtol=0.0, atol=1e-4)
+    outward = (SURVEY - FAR)[:, [1, 0, 2]] * (-1.0, 1.0, 0.5)  # gradient of the ellipsoid's equation
+    cosine = np.einsum("ij,ij->i", outward / np.linalg.norm(outward, axis=1)[:, None], table.attributes["normal"])
+    assert np.abs(cosine).min() > 0.98
+
+
+def test_shape_keys_are_exported_as_they_are_seen(tmp_path):
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.mode_shape(mode=1, amplitude=0.5)
+    bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.ply"))
+    assert_allclose(np.linalg.norm(read_file(tmp_path / "a.ply").points, axis=1), 1.5, rtol=1e-2)
+    assert_allclose(np.linalg.norm(local_points(obj), axis=1), 1.0, rtol=1e-5)
+
+
+class TestSeveralFiles:
+    def test_tiles_of_a_survey_stay_aligned(self, tmp_path):
+        for number in range(3):
+            np.save(tmp_path / f"{number}.npy", SURVEY + [100.0 * number, 0.0, 0.0])
+        run_import(tmp_path / "0.npy", tmp_path / "1.npy")
+        run_import(tmp_path / "2.npy")  # later, too
+        objects = [bpy.data.objects[str(number)] for number in range(3)]
+        assert len({tuple(obj["lb_offset"]) for obj in objects}) == 1
+        for number in (1, 2):
+            shift = local_points(objects[number]) - local_points(objects[0])
+            assert_allclose(shift, np.tile([100.0 * number, 0.0, 0.0], (1000, 1)), atol=1e-4)
+        assert bpy.context.selected_objects == [objects[2]]
+
+    def test_far_apart_ones_do_not(self, tmp_path):
+        np.save(tmp_path / "a.npy", SURVEY)
+        np.save(tmp_path / "b.npy", SURVEY + 5e6)
+        run_import(tmp_path / "a.npy", tmp_path / "b.npy")
+        assert len(bpy.context.selected_objects) == 2
+        assert np.abs(local_points(bpy.data.objects["b"])).max() < 150.0
+
+    def test_one_broken_file_leaves_nothing(self, tmp_path):
+        np.save(tmp_path / "a.npy", SURVEY)
+        (tmp_path / "b.xyz").write_text("1 2 3\n4 5 x\n")
+        add_object(sphere_points()).select_set(True)
+        before = everywhere()
+        with pytest.raises(RuntimeError, match="line 2 has 'x' where a number should be"):
+            run_import(tmp_path / "a.npy", tmp_path / "b.xyz")
+        assert everywhere() == before
+
+
+class TestColumns:
+    def test_become_attributes(self, tmp_path):
+        rows = np.column_stack([sphere_points(), np.arange(1000), np.tile([255, 0, 51], (1000, 1)), sphere_points()])
+        np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="x,y,z,heat,r,g,b,nx,ny,nz", comments="")
+        obj = run_import(tmp_path / "a.csv")
+        assert_array_equal(attribute(obj, "heat"), np.arange(1000))
+        assert_allclose(attribute(obj, "normal"), sphere_points(), rtol=1e-6)
+        colors = np.empty(4000, np.float32)
+        obj.data.color_attributes.active_color.data.foreach_get("color_srgb", colors)
+        assert_allclose(colors[:4], [1.0, 0.0, 0.2, 1.0], atol=1e-3)
+        bpy.ops.meshfree.export_points(filepath=str(tmp_path / "b.ply"))
+        table = read_file(tmp_path / "b.ply")
+        assert_allclose(table.colors, np.tile([1.0, 0.0, 0.2, 1.0], (1000, 1)), atol=1e-3)
+        assert_allclose(table.attributes["normal"], sphere_points(), rtol=1e-5, atol=1e-6)
+
+    def test_by_choice(self, tmp_path):
+        (tmp_path / "a.csv").write_text("x,y,z,heat,r,g,b\n" + "1,2,3,4,5,6,7\n" * 9)
+        obj = run_import(tmp_path / "a.csv", attributes=False)
+        assert not obj.data.color_attributes
+        assert "heat" not in obj.data.attributes
+        obj = run_import(tmp_path / "a.csv")
+        for choice, names in (("ALL", {"heat"}), ("RESULTS", set()), ("NONE", set())):
+            bpy.ops.meshfree.export_points(filepath=str(tmp_path / "b.csv"), attributes=choice, colors=False)
+            table = read_file(tmp_path / "b.csv")
+            assert set(table.attributes) == names
+            assert table.colors is None
+
+    def test_results_come_back_as_results(self, tmp_path):
+        obj = add_object(sphere_points())
+        bpy.ops.meshfree.analyze(modes=2, show=False)
+        kinds = {layer.name: layer.data_type for layer in obj.data.attributes if layer.name.startswith("lb_")}
+        for name in ("a.ply", "a.csv"):
+            bpy.context.view_layer.objects.active = obj
+            bpy.ops.meshfree.export_points(filepath=str(tmp_path / name), attributes="RESULTS")
+            again = run_import(tmp_path / name)
+            found = {layer.name: layer.data_type for layer in again.data.attributes if layer.name.startswith("lb_")}
+            assert found == {key: kind for key, kind in kinds.items() if key != "lb_normal"}
+            assert_allclose(attribute(again, "lb_eigenvector_002"), attribute(obj, "lb_eigenvector_002"), rtol=1e-6)
+            assert bpy.ops.meshfree.colormap(attribute="lb_boundary") == {"FINISHED"}
+
+    def test_names_that_blender_keeps_for_itself(self, tmp_path):
+        columns = ["id", "material_index", "position", "n" * 80]
+        write_file(tmp_path / "a.ply", sphere_points(), {name: np.arange(1000.0) for name in columns})
+        names = {layer.name for layer in run_import(tmp_path / "a.ply").data.attributes}
+        assert {"file_id", "file_material_index", "file_position", "n" * 60} <= names
+
+
+def test_up_axis(tmp_path):
+    (tmp_path / "a.csv").write_text("x,y,z,nx,ny,nz\n" + "1,2,3,0,1,0\n" * 9)
+    assert_allclose(local_points(run_import(tmp_path / "a.csv"))[0], [1.0, 2.0, 3.0])
+    obj = run_import(tmp_path / "a.csv", up="Y")
+    assert_allclose(local_points(obj)[0], [1.0, -3.0, 2.0])
+    assert_allclose(attribute(obj, "normal")[0], [0.0, 0.0, 1.0])
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="Blender makes point clouds of meshes from 4.5 on")
+def test_point_cloud_objects(tmp_path):
+    np.save(tmp_path / "a.npy", SURVEY)
+    np.save(tmp_path / "b.npy", SURVEY + 10.0)
+    obj = run_import(tmp_path / "a.npy", tmp_path / "b.npy", kind="POINTCLOUD")
+    assert [other.type for other in bpy.data.objects] == ["POINTCLOUD", "POINTCLOUD"]
+    assert len(obj.data.points) == 1000
+    assert list(obj["lb_offset"]) == [446_120.0, 4_000_460.0, 80.0]
+    assert not bpy.data.meshes
+
+
+def test_undo_takes_an_import_back(tmp_path):
+    np.save(tmp_path / "a.npy", SURVEY)
+    add_object(sphere_points())
+    bpy.ops.ed.undo_push(message="Before")
+    before = everywhere()
+    bpy.ops.meshfree.import_points("EXEC_DEFAULT", True, filepath=str(tmp_path / "a.npy"))
+    assert "a" in bpy.data.objects
+    bpy.ops.ed.undo()
+    assert everywhere() == before
+
+
+def test_import_needs_object_mode(tmp_path):
+    add_object(sphere_points())
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="Switch to Object Mode first"):
+        bpy.ops.meshfree.import_points(filepath=str(tmp_path / "a.npy"))
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "text"),
+    [
+        ("missing.ply", None, "There is no file"),
+        ("a.laz", b"LASF", "make convert LAS=a.laz"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n", "line 5: '' does not belong"),
+        ("a.xyz", b"", "there are none"),
+        ("a.csv", b"x,y,z\n", "there are none"),
+        ("a.pts", b"5\n1 2 3\n", "announces 5 points, but 1 lines follow"),
+        ("a.obj", b"v 1 2 nan\n", "1 of 1 points"),
+    ],
+)
+def test_broken_files_leave_nothing(tmp_path, name, data, text):
+    if data is not None:
+        (tmp_path / name).write_bytes(data)
+    add_object(sphere_points()).select_set(True)
+    before = everywhere()
+    with pytest.raises(RuntimeError, match=text):
+        bpy.ops.meshfree.import_points(filepath=str(tmp_path / name))
+    assert everywhere() == before
+
+
+class TestExport:
+    def test_changes_nothing(self, tmp_path):
+        obj = add_object(sphere_points())
+        bpy.ops.meshfree.analyze(modes=3, show=False)
+        before = everything(obj)
+        bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.ply"))
+        bpy.ops.meshfree.export_operator(filepath=str(tmp_path / "a.npz"))
+        bpy.ops.meshfree.export_eigenvalues(filepath=str(tmp_path / "a.csv"))
+        assert everything(obj) == before
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.npz", "a.ply"]
+
+    def test_unknown_ending(self, tmp_path):
+        add_object(sphere_points())
+        with pytest.raises(RuntimeError, match="Give it one of .ply, .xyz, .csv"):
+            bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.stl"))
+
+    @pytest.mark.parametrize("scale", [(0.0, 1.0, 1.0), (-1.0, 1.0, 1.0)])
+    def test_any_scale(self, tmp_path, scale):
+        obj = add_object(sphere_points())
+        bpy.ops.meshfree.analyze(show=False)
+        obj.scale = scale
+        bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.ply"))
+        table = read_file(tmp_path / "a.ply")
+        assert_allclose(table.points, local_points(obj) * scale, atol=1e-6)
+        outward = sphere_points() * scale if scale[0] else np.sign(sphere_points()) * (1.0, 0.0, 0.0)
+        clear = np.abs(sphere_points()[:, 0]) > 0.1  # elsewhere the normal of a flat object is anybody's guess
+        assert np.einsum("ij,ij->i", table.attributes["normal"], outward)[clear].min() > 0.9
+
+    def test_a_folder_that_is_a_file(self, tmp_path):
+        add_object(sphere_points())
+        (tmp_path / "a").write_text("")
+        with pytest.raises(RuntimeError, match="Error: .*a"):
+            bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a" / "b.ply"))
+
+    def test_operator_and_spectrum_for_researchers(self, core, tmp_path):
+        from scipy.sparse import load_npz  # bundled with the extension
+
+        np.save(tmp_path / "a.npy", SURVEY)
+        obj = run_import(tmp_path / "a.npy")
+        bpy.ops.meshfree.spectrum(count=5, show=False)
+        bpy.ops.meshfree.export_operator(filepath=str(tmp_path / "a.npz"))
+        stiffness = load_npz(tmp_path / "a.npz")
+        arrays = np.load(tmp_path / "a.npz")
+        assert np.abs(arrays["points"] - SURVEY).max() <= STEP
+        assert_allclose(arrays["areas"], attribute(obj, "lb_area"), rtol=1e-6)
+        assert_array_equal(arrays["eigenvalues"], obj["lb_eigenvalues"])
+        laplacian = core.build_laplacian(local_points(obj), options=core.LaplacianOptions(orient=True))
+        assert abs(stiffness - laplacian.stiffness).max() <= 1e-9 * abs(stiffness).max()
+        vectors = arrays["eigenvectors"]
+        assert vectors.shape == (1000, 5)
+        quotients = np.einsum("ij,ij->j", vectors, stiffness @ vectors)  # raw eigenvalues, for unit modes
+        assert_allclose(vectors.T @ (arrays["areas"][:, None] * vectors), np.eye(5), atol=1e-9)
+        assert_allclose(quotients[1:], arrays["eigenvalues"][1:], rtol=0.2)
+
+    def test_operator_without_modes(self, tmp_path):
+        add_object(sphere_points())
+        bpy.ops.meshfree.export_operator(filepath=str(tmp_path / "a.npz"))
+        arrays = np.load(tmp_path / "a.npz")
+        assert arrays["eigenvalues"].shape == (0,)
+        assert arrays["eigenvectors"].shape == (1000, 0)
+
+    def test_eigenvalues(self, tmp_path):
+        obj = add_object(sphere_points())
+        with pytest.raises(RuntimeError, match="Press Compute Modes first"):
+            bpy.ops.meshfree.export_eigenvalues(filepath=str(tmp_path / "a.csv"))
+        bpy.ops.meshfree.spectrum(count=4, show=False)
+        bpy.ops.meshfree.export_eigenvalues(filepath=str(tmp_path / "a.csv"))
+        lines = (tmp_path / "a.csv").read_text().splitlines()
+        assert lines[0] == "mode,eigenvalue"
+        assert [line.split(",")[0] for line in lines[1:]] == ["1", "2", "3", "4"]
+        assert [float(line.split(",")[1]) for line in lines[1:]] == list(obj["lb_eigenvalues"])
+
+
+class TestMenus:
+    class Menu:
+        """Stands in for a menu that is drawn."""
+
+        def __init__(self):
+            self.layout, self.entries = self, []
+
+        def operator(self, idname, text):
+            self.entries.append((idname, text))
+
+    def test_entries(self, extension):
+        for name, idnames in (
+            ("import", ["import_points"]),
+            ("export", ["export_points", "export_operator", "export_eigenvalues"]),
+        ):
+            drawn = getattr(bpy.types, f"TOPBAR_MT_file_{name}")._dyn_ui_initialize()
+            (draw,) = [function for function in drawn if function.__module__.startswith(extension.__name__)]
+            menu = self.Menu()
+            draw(menu, bpy.context)
+            assert [idname for idname, _ in menu.entries] == [f"meshfree.{idname}" for idname in idnames]
+            for idname, text in menu.entries:
+                assert "(." in text
+                getattr(bpy.ops.meshfree, idname.removeprefix("meshfree.")).get_rna_type()
+
+    def test_dropped_files_do_not_fight_with_those_of_blender(self):
+        handlers = {name: getattr(bpy.types, name) for name in dir(bpy.types) if "_FH_" in name}
+        ours = handlers.pop("MESHFREE_FH_points")
+        assert ours.bl_import_operator == "meshfree.import_points"
+        extensions = set(ours.bl_file_extensions.split(";"))
+        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".las", ".laz"}
+        theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
+        assert not extensions & (theirs | {".ply", ".obj"})

@@ -1,0 +1,130 @@
+"""Draws the legend, the histogram and the eigenvalues of the active object over the 3D view."""
+
+import zlib
+
+import bpy
+import numpy as np
+
+from ..core import PointCloudError
+from ..operators.attributes import mode_number
+from ..operators.result import EIGENVALUES
+from . import canvas, plots
+from .display import range_node, shown_attribute, shown_values, without_unreached
+from .scale import shown_scale
+from .units import EIGENVALUE_POWER, unit
+
+_GAP = 10.0  # between pictures, and to the border
+_GIZMOS = 80.0  # width of the view's own controls, at the right edge above the lowest row
+_handlers = []
+_counted = {}  # the last histogram, by what it is of
+
+
+def attach():
+    """Begin to draw over 3D views; there are none in background mode."""
+    if not bpy.app.background:
+        _handlers.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+
+
+def detach():
+    """Stop drawing, and forget what was counted."""
+    while _handlers:
+        bpy.types.SpaceView3D.draw_handler_remove(_handlers.pop(), "WINDOW")
+    _counted.clear()
+
+
+def pictures(obj, scene) -> list:
+    """Return what is to be drawn for an object, the rightmost first."""
+    settings, found = obj.meshfree, []
+    scale = shown_scale(obj, scene)
+    if scale is not None and settings.legend:
+        found.append(plots.legend_picture(scale))
+    if scale is not None and settings.histogram and range_node(obj) is not None and obj.mode != "EDIT":
+        counted = _histogram(obj, scale)
+        if counted is not None:
+            found.append(plots.histogram_picture(scale, *counted))
+    eigenvalues = obj.get(EIGENVALUES)
+    if settings.plot_eigenvalues and eigenvalues is not None:
+        numbers = np.array(eigenvalues)
+        symbol, factor = unit(EIGENVALUE_POWER, numbers[-1], scene.unit_settings)
+        area = settings.total_area if settings.compare_weyl else 0.0
+        found.append(plots.spectrum_picture(numbers, mode_number(shown_attribute(obj)), symbol, factor, area))
+    return found
+
+
+def _histogram(obj, scale):
+    """Count the values on show, once for as long as they and the range stay; None if they cannot be read any more."""
+    try:
+        values = np.ascontiguousarray(without_unreached(shown_attribute(obj), shown_values(obj)))
+    except PointCloudError:  # the attribute is gone: what is drawn over the view is no place to say so
+        return None
+    key = zlib.crc32(values.view(np.uint8)), len(values), scale.bounds, bool(scale.boxes)
+    if key not in _counted:
+        _counted.clear()
+        _counted[key] = plots.histogram(values, scale.bounds, bool(scale.boxes))
+    return _counted[key]
+
+
+def arrange(sizes, left, bottom, right, top, indent=0.0) -> list:
+    """Place pictures from the lower right corner to the left, in rows upwards.
+
+    Parameters
+    ----------
+    sizes : list of (float, float)
+        Widths and heights.
+    left, bottom, right, top : float
+        The room there is.
+    indent : float
+        What upper rows leave free at the right.
+
+    Returns
+    -------
+    list of (float, float), or None in their place
+        Lower left corners; None for what has no room.
+    """
+    places, x, y, row = [], right, bottom, 0.0
+    for width, height in sizes:
+        if row and x - width < left:
+            x, y, row = right - indent, y + row, 0.0
+        if x - width < left or y + height > top:
+            places.append(None)
+            continue
+        x, row = x - width, max(row, height)
+        places.append((x, y))
+    return places
+
+
+def _free_room(area, region):
+    """Return left, bottom, right, top of what is seen of a region between those that lie over it, in its pixels."""
+    left, bottom, right, top = 0, 0, region.width, region.height
+    for other in area.regions:
+        x, y = other.x - region.x, other.y - region.y
+        apart = x >= region.width or y >= region.height or x + other.width <= 0 or y + other.height <= 0
+        if other.type == "WINDOW" or min(other.width, other.height) <= 1 or apart:
+            continue
+        if other.alignment == "RIGHT":
+            right = min(right, x)
+        elif other.alignment == "TOP":
+            top = min(top, y)
+        elif other.alignment == "BOTTOM":
+            bottom = max(bottom, y + other.height)
+        else:  # the toolbar, and Adjust Last Operation
+            left = max(left, x + other.width)
+    return left, bottom, right, top
+
+
+def _draw():
+    context = bpy.context
+    obj = context.object
+    if obj is None or not context.space_data.overlay.show_overlays or not obj.visible_get():
+        return
+    found = pictures(obj, context.scene)
+    if not found:
+        return
+    scale = context.preferences.system.ui_scale
+    gap = scale * _GAP
+    left, bottom, right, top = _free_room(context.area, context.region)
+    sizes = [(scale * picture.width + gap, scale * picture.height + gap) for picture in found]
+    places = arrange(sizes, left + gap, bottom + gap, right, top, indent=scale * _GIZMOS)
+    for picture, place in zip(found, places, strict=True):
+        if place is not None:
+            canvas.draw(picture, *place, scale)

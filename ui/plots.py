@@ -1,0 +1,187 @@
+"""The pictures over the view: the legend, the histogram of what is shown, and the eigenvalues."""
+
+import numpy as np
+
+from .canvas import DIM, WHITE, Picture
+from .colormaps import to_display
+from .ticks import round_ticks, tick_texts
+
+_HEIGHT = 230.0
+_EDGE = 12.0  # between the plate's border and what is on it
+_LINE = 16.0  # height of a line of text
+_BINS = 60
+_BEYOND = (0.45, 0.45, 0.45, 1.0)
+_MARK = (1.0, 0.75, 0.2, 1.0)
+_FEWEST = 6  # boxes that fill a legend
+
+
+def legend_picture(scale) -> Picture:
+    """Draw the colours of a scale with their numbers."""
+    picture = Picture(150.0, _HEIGHT)
+    top = _title(picture, scale.title, scale.unit)
+    left, right, bottom = _EDGE, _EDGE + 20.0, _EDGE
+    if scale.boxes:
+        height = (top - bottom) / max(len(scale.boxes), _FEWEST)
+        for index, (name, color) in enumerate(scale.boxes.items()):
+            y = top - (index + 1) * height
+            picture.rectangle(left, y + 0.1 * height, right, y + 0.9 * height, to_display(color))
+            picture.text(name, right + 8.0, y + 0.5 * height)
+        return picture
+    bottom, top = bottom + 0.4 * _LINE, top - 0.4 * _LINE  # half a number stands out at each end
+    colors = [to_display(color) for color in scale.colors]
+    rows = np.linspace(bottom, top, len(colors))
+    for index in range(len(colors) - 1):
+        picture.rectangle(left, rows[index], right, rows[index + 1], colors[index], colors[index + 1])
+    for share, text in scale.ticks:
+        y = bottom + share * (top - bottom)
+        picture.line((right, y), (right + 5.0, y), WHITE)
+        picture.text(text, right + 10.0, y)
+    return picture
+
+
+def histogram(values, bounds, stepped: bool):
+    """Count values along an axis that holds the range and, to half its width on each side, what lies beyond.
+
+    Returns
+    -------
+    ndarray, (b + 1,)
+        Edges of the bins; one for each whole number where these have a colour each.
+    ndarray, (b,)
+        How many values each holds.
+    tuple of int
+        How many values lie below and above the range.
+    """
+    values = values[np.isfinite(values)].astype(np.float64)
+    low, high = bounds
+    beyond = int(np.count_nonzero(values < low)), int(np.count_nonzero(values > high))
+    if stepped:
+        low, high = low - 0.5, high + 0.5
+        edges = np.arange(low, high + 0.5) if high - low <= 4 * _BINS else np.linspace(low, high, _BINS + 1)
+    else:
+        half = 0.5 * (high - low)
+        first, last = (values.min(), values.max()) if len(values) else (low, high)
+        edges = np.linspace(max(min(first, low), low - half), min(max(last, high), high + half), _BINS + 1)
+    return edges, np.histogram(values, edges)[0], beyond
+
+
+def histogram_picture(scale, edges, counts, beyond) -> Picture:
+    """Draw a histogram in the colours of a scale, with the range marked."""
+    picture = Picture(260.0, _HEIGHT)
+    total = int(counts.sum())
+    top = _title(picture, "Histogram", f"{scale.full_title}")
+    left, right, bottom = _EDGE, picture.width - _EDGE, _EDGE + 2.0 * _LINE
+    low, high = scale.bounds
+    if scale.boxes:
+        low, high = low - 0.5, high + 0.5
+
+    def across(value):
+        return left + (value - edges[0]) / (edges[-1] - edges[0]) * (right - left)
+
+    highest = max(int(counts.max()), 1)
+    for index in np.flatnonzero(counts):
+        middle = 0.5 * (edges[index] + edges[index + 1])
+        gap = 1.0 if scale.boxes else 0.0
+        picture.rectangle(
+            across(edges[index]) + gap,
+            bottom,
+            across(edges[index + 1]) - gap,
+            bottom + max(counts[index] / highest * (top - bottom), 1.0),
+            _color_at(scale, index, (middle - low) / (high - low)),
+        )
+    picture.line((left, bottom), (right, bottom), DIM)
+    if not scale.boxes:
+        for bound in (low, high):
+            picture.line((across(bound), bottom - 3.0), (across(bound), top), _MARK)
+        _write_axis(picture, scale.factor * edges[0], scale.factor * edges[-1], left, right, bottom - 0.7 * _LINE)
+    elif total:
+        names = list(scale.boxes)
+        for index in {0, len(counts) - 1} if len(counts) > _FEWEST else range(len(counts)):
+            x = across(0.5 * (edges[index] + edges[index + 1]))
+            picture.text(
+                names[index] if len(names) == len(counts) else f"{low + 0.5 + index:.0f}",
+                x,
+                bottom - 0.7 * _LINE,
+                "CENTER",
+            )
+    y = _EDGE + 0.2 * _LINE
+    if any(beyond):
+        picture.text(f"{beyond[0]:,} below", left, y)
+        picture.text(f"{beyond[1]:,} above", right, y, "RIGHT")
+    return picture
+
+
+def spectrum_picture(eigenvalues, shown_mode: int, unit: str, factor: float, area: float) -> Picture:
+    """Draw eigenvalues over their numbers, and for comparison those of a flat piece of the same area.
+
+    Parameters
+    ----------
+    eigenvalues : ndarray, (k,)
+    shown_mode : int
+        Number of the mode on show, from 1; 0 for none.
+    unit : str
+        Of the numbers; empty for none.
+    factor : float
+        What eigenvalues are to be multiplied by to be numbers of that unit.
+    area : float
+        Total area of the surface, for Weyl's law: about 4 pi k / area; 0 leaves it out.
+    """
+    picture = Picture(300.0, _HEIGHT)
+    top = _title(picture, "Eigenvalues", unit) - 0.5 * _LINE
+    numbers = factor * np.asarray(eigenvalues, dtype=np.float64)
+    count = len(numbers)
+    slope = factor * 4.0 * np.pi / area if area > 0.0 else 0.0
+    greatest = max(numbers.max(), slope * count) or 1.0
+    ticks = round_ticks(0.0, greatest, most=6)
+    texts = tick_texts(ticks)
+    left, right, bottom = _EDGE + 7.0 * max(map(len, texts)) + 6.0, picture.width - _EDGE, _EDGE + 2.2 * _LINE
+
+    def place(mode, number):
+        return left + mode / count * (right - left), bottom + number / greatest * (top - bottom)
+
+    for tick, text in zip(ticks, texts, strict=True):
+        y = place(0, tick)[1]
+        picture.line((left, y), (right, y), (1.0, 1.0, 1.0, 0.12))
+        picture.text(text, left - 6.0, y, "RIGHT")
+    picture.line((left, bottom), (left, top), DIM)
+    picture.line((left, bottom), (right, bottom), DIM)
+    if slope:
+        picture.line(place(0, 0.0), place(count, slope * count), _MARK)
+        picture.text("4 π k / Area", left + 8.0, top - 0.5 * _LINE, color=_MARK)
+    radius = float(np.clip(150.0 / count, 1.2, 3.0))
+    for mode, number in enumerate(numbers, start=1):
+        if mode != shown_mode:
+            picture.dot(*place(mode, number), radius, (0.45, 0.75, 1.0, 1.0))
+    if 0 < shown_mode <= count:
+        picture.dot(*place(shown_mode, numbers[shown_mode - 1]), radius + 2.5, WHITE)
+    for tick in (tick for tick in round_ticks(0.0, count) if tick == round(tick) and tick > 0.0):
+        x = place(tick, 0.0)[0]
+        picture.line((x, bottom), (x, bottom - 3.0), DIM)
+        picture.text(f"{tick:.0f}", x, bottom - 0.7 * _LINE, "CENTER")
+    picture.text("Mode k", 0.5 * (left + right), _EDGE + 0.2 * _LINE, "CENTER")
+    return picture
+
+
+def _title(picture, title, unit):
+    """Write a title and below it a unit, if there is one; return where the room below them begins."""
+    y = picture.height - _EDGE - 0.3 * _LINE
+    picture.text(title, _EDGE, y)
+    if unit:
+        y -= _LINE
+        picture.text(unit, _EDGE, y, color=(1.0, 1.0, 1.0, 0.7))
+    return y - 0.9 * _LINE
+
+
+def _color_at(scale, index, share):
+    """Return the colour of a bin: of the whole number, or of its share of the way from low to high."""
+    if scale.boxes:
+        colors = [color for color in scale.boxes.values() if color[3]]
+        return to_display(colors[index]) if index < len(colors) else _BEYOND
+    if not 0.0 <= share <= 1.0:
+        return _BEYOND
+    return to_display(scale.colors[round(share * (len(scale.colors) - 1))])
+
+
+def _write_axis(picture, low, high, left, right, y):
+    ticks = round_ticks(low, high, most=5)
+    for tick, text in zip(ticks, tick_texts(ticks), strict=True):
+        picture.text(text, left + (tick - low) / (high - low) * (right - left), y, "CENTER")

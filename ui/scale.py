@@ -1,0 +1,80 @@
+"""What a legend says: the title, the unit, the colours on show and the numbers beside them."""
+
+from typing import NamedTuple
+
+from .display import color_node, label, range_node, shown_attribute, shown_range, step_colors
+from .nodes import direction_color
+from .ticks import round_ticks, tick_texts
+from .units import attribute_power, unit
+
+_DIRECTIONS = {
+    "+X": (1, 0, 0),
+    "+Y": (0, 1, 0),
+    "+Z": (0, 0, 1),
+    "-X": (-1, 0, 0),
+    "-Y": (0, -1, 0),
+    "-Z": (0, 0, -1),
+}
+_MOST_BOXES = 12
+
+
+class Scale(NamedTuple):
+    """The colours of an attribute and what they stand for.
+
+    Attributes
+    ----------
+    title : str
+    unit : str
+        Empty for plain numbers.
+    factor : float
+        What values are to be multiplied by to be numbers of that unit.
+    bounds : tuple of float, or None
+        Range of the values; None where directions are shown.
+    colors : list
+        Linear (r, g, b, 1) at even steps from low to high; none where each box has its own.
+    boxes : dict
+        Colours by the names of whole numbers, truth values or directions.
+    ticks : list of (float, str)
+        Round numbers: their share of the way from low to high, and as text.
+    """
+
+    title: str
+    unit: str
+    factor: float
+    bounds: tuple | None
+    colors: list
+    boxes: dict
+    ticks: list
+
+    @property
+    def full_title(self) -> str:
+        """The title with the unit, if there is one."""
+        return f"{self.title} ({self.unit})" if self.unit else self.title
+
+
+def shown_scale(obj, scene) -> Scale | None:
+    """Return the scale of what an object shows, in units of a scene; None if it shows nothing."""
+    name = shown_attribute(obj)
+    if not name:
+        return None
+    title = label(name)
+    if range_node(obj) is None:
+        boxes = {text: direction_color(direction) for text, direction in _DIRECTIONS.items()}
+        return Scale(title, "", 1.0, None, [], boxes, [])
+    low, high = shown_range(obj)
+    boxes = step_colors(obj)
+    if boxes:
+        return Scale(title, "", 1.0, (low, high), [], _shortened(boxes), [])
+    symbol, factor = unit(attribute_power(name), max(abs(low), abs(high)), scene.unit_settings)
+    ticks = round_ticks(factor * low, factor * high, most=8)
+    shares = [(tick - factor * low) / (factor * (high - low)) for tick in ticks]
+    colors = [tuple(element.color) for element in color_node(obj).color_ramp.elements]
+    return Scale(title, symbol, factor, (low, high), colors, {}, list(zip(shares, tick_texts(ticks), strict=True)))
+
+
+def _shortened(boxes):
+    """Leave the first boxes, and say how many more there are."""
+    if len(boxes) <= _MOST_BOXES:
+        return boxes
+    kept = dict(list(boxes.items())[: _MOST_BOXES - 1])
+    return kept | {f"{len(boxes) - len(kept)} more": (0.0, 0.0, 0.0, 0.0)}

@@ -1,0 +1,122 @@
+"""Puts on show: the display modifier, the size of the points, and the colours by the settings of the object."""
+
+import math
+
+import bpy
+
+from ..operators.attributes import MEAN_CURVATURE, read_attribute
+from ..operators.reading import DISPLAY_TAG, fingerprint, spacing
+from . import colormaps, legend
+from .display import (
+    NAME,
+    component,
+    find_display,
+    find_material,
+    get_input,
+    numbers,
+    set_input,
+    shown_attribute,
+    without_unreached,
+)
+from .nodes import color_by_direction, color_by_number, display_group
+
+_NO_SPACING = 0.01  # stands in where points are too few to have one
+
+
+def show_attribute(obj, name: str = "", radius: float = 0.0):
+    """Show an attribute as colours on the points, by the display settings of the object.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        A mesh object.
+    name : str
+        The attribute; empty for the one on show, or the mean curvature.
+    radius : float
+        Radius of the points in local lengths; 0 leaves it to the setting Point Size, or to whoever set it by hand.
+
+    Raises
+    ------
+    PointCloudError
+        There is no such attribute, or it holds neither numbers nor vectors on points.
+    """
+    if not name:
+        name = shown_attribute(obj)
+        if name not in obj.data.attributes:
+            name = MEAN_CURVATURE
+    values = read_attribute(obj.data, name)
+    modifier = find_display(obj)
+    new = modifier is None
+    if new:
+        modifier = obj.modifiers.new(NAME, "NODES")
+        modifier.node_group = display_group()
+    modifier.use_pin_to_last = True
+    obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
+    if radius:
+        set_input(modifier, "Radius", radius)
+    elif new or not _sized_by_hand(obj):
+        resize(obj)
+    _color(obj, name, values)
+
+
+def recolor(obj):
+    """Color the points by settings that have changed, if there is anything on show."""
+    name = shown_attribute(obj)
+    if not name or name not in obj.data.attributes:
+        return
+    _color(obj, name, read_attribute(obj.data, name))
+
+
+def resize(obj):
+    """Make the points as large as the settings say, in units of their spacing, which is measured where they changed."""
+    modifier = find_display(obj)
+    if modifier is None:
+        return
+    kept = obj.meshfree
+    if obj.mode != "EDIT":
+        points = fingerprint(obj, glance=True)
+        if kept.spacing_of != points:
+            kept.spacing_of, kept.spacing = points, spacing(obj.data)
+    set_input(modifier, "Radius", _radius(kept))
+    obj.update_tag()
+
+
+def redraw():
+    """Draw all 3D views again, for what is drawn over them."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+def _radius(settings):
+    return settings.point_size * settings.spacing or _NO_SPACING
+
+
+def _sized_by_hand(obj):
+    """Whether the radius is another one than the settings gave."""
+    return not math.isclose(get_input(find_display(obj), "Radius"), _radius(obj.meshfree), rel_tol=1e-5)
+
+
+def _color(obj, name, values):
+    settings = obj.meshfree
+    material = find_material(obj)
+    if material is None or material.users - material.use_fake_user > 1:  # a duplicate of an object gets its own
+        material = bpy.data.materials.new(f"{NAME} {obj.name}")
+        material[DISPLAY_TAG] = True
+        set_input(find_display(obj), "Material", material)
+    part = component(name, settings)
+    shown = numbers(values, part)
+    if shown is None:
+        color_by_direction(material, name)
+    else:
+        locked = settings.range_low, settings.range_high
+        color_map, low, high = colormaps.fit(
+            without_unreached(name, shown), settings.color_map, settings.range_mode, settings.coverage, locked
+        )
+        if settings.range_mode != "LOCKED":
+            settings.range_low, settings.range_high = low, high
+        color_by_number(material, name, part if values.ndim > 1 else "", color_map, low, high, settings)
+    obj.update_tag()
+    legend.renew(obj)
+    redraw()

@@ -1,0 +1,62 @@
+"""In which unit the numbers of an attribute are written."""
+
+from ..operators.attributes import AREA, DISPLACEMENT, DISTANCE, GAUSSIAN_CURVATURE, MEAN_CURVATURE
+
+EIGENVALUE_POWER = -2
+_POWERS = {AREA: 2, MEAN_CURVATURE: -1, GAUSSIAN_CURVATURE: -2, DISTANCE: 1, DISPLACEMENT: 1}  # of a length
+_METERS = {
+    "KILOMETERS": ("km", 1000.0),
+    "METERS": ("m", 1.0),
+    "CENTIMETERS": ("cm", 0.01),
+    "MILLIMETERS": ("mm", 0.001),
+    "MICROMETERS": ("µm", 1e-6),
+    "MILES": ("mi", 1609.344),
+    "FEET": ("ft", 0.3048),
+    "INCHES": ("in", 0.0254),
+    "THOU": ("thou", 0.0000254),
+}
+_ADAPTIVE = {
+    "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
+    "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
+}
+_LEFT_OPEN = ("ADAPTIVE", "METERS", "FEET")  # the latter two stand in new scenes, without anybody's choice
+_RAISED = {1: "", 2: "²"}
+
+
+def attribute_power(name: str) -> int:
+    """Return which power of a length an attribute is: 2 for areas, -1 for curvature, 0 for plain numbers."""
+    return _POWERS.get(name, 0)
+
+
+def unit(power: int, greatest: float, settings):
+    """Choose a unit for a power of a length in a scene.
+
+    Parameters
+    ----------
+    power : int
+        As of `attribute_power`.
+    greatest : float
+        The greatest number to be written, in lengths of the world: the first unit in which it reaches 1 is taken where
+        the scene leaves it open, of lengths and areas, as Blender writes them too.
+    settings : bpy.types.UnitSettings
+        Of the scene.
+
+    Returns
+    -------
+    str
+        Such as "mm²" or "1/m"; empty for plain numbers and scenes without units.
+    float
+        What lengths of the world are to be multiplied by to be numbers of that unit.
+    """
+    if power == 0 or settings.system == "NONE":
+        return "", 1.0
+    if settings.length_unit not in _LEFT_OPEN:
+        names = (settings.length_unit,)
+    elif power > 0:
+        names = _ADAPTIVE[settings.system]
+    else:
+        names = _ADAPTIVE[settings.system][1:2]
+    factors = {name: (settings.scale_length / _METERS[name][1]) ** power for name in names}
+    name = next((name for name in names if factors[name] * abs(greatest) >= 1.0), names[-1])
+    raised = _METERS[name][0] + _RAISED[abs(power)]
+    return (raised if power > 0 else f"1/{raised}"), factors[name]
