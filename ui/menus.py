@@ -5,7 +5,7 @@ import bpy
 from ..operators.importing import OWN
 
 _TOOLS = (
-    ("analyze", "spectrum", "colormap"),
+    ("analyze", "spectrum", "colormap", "legend"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
     ("geodesic_distance", "harmonic_field"),
@@ -13,7 +13,7 @@ _TOOLS = (
     ("minimal_surface",),
     ("stop",),
 )
-_SELECTING = ("select_grow", "select_component", "select_front", "select_rim")
+_SELECTING = ("select_grow", "select_component", "select_front", "select_rim", "select_by_range")
 
 
 class MESHFREE_MT_object(bpy.types.Menu):
@@ -75,7 +75,7 @@ class MESHFREE_FH_points(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def _entries():
+def entries():
     """Menus and what is added to them; point clouds have an Edit Mode from Blender 4.5 on."""
     yield bpy.types.VIEW3D_MT_object, _draw_object
     yield bpy.types.VIEW3D_MT_edit_mesh, _draw_points
@@ -87,13 +87,13 @@ def _entries():
 
 def attach():
     """Add the entries to Blender's menus."""
-    for menu, draw in _entries():
+    for menu, draw in entries():
         menu.append(draw)
 
 
 def detach():
     """Take the entries away again."""
-    for menu, draw in _entries():
+    for menu, draw in entries():
         menu.remove(draw)
 
 
