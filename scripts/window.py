@@ -273,6 +273,10 @@ class Window:
             self.click(x + width - 10, y)
         raise WindowError(f"The sidebar has no tab {name}")
 
+    def open_panels(self, *names):
+        """Let these panels of the extension, such as "MESHFREE_PT_deform", be open in the next file, and no others."""
+        self.python(f"open_panels({set(names)!r})")
+
     def search(self, text):
         """Carry out an operator by the F3 search."""
         self.point_at_view()
@@ -281,13 +285,17 @@ class Window:
         self.key("Return")
 
     def find_button(self, operator, region="UI"):
-        """Find the button of an operator, such as "meshfree.analyze", and leave the mouse on it."""
+        """Find the button of an operator, such as "meshfree.analyze", and leave the mouse on it.
+
+        Of several buttons of an operator one is found by its settings: "meshfree.group_from_selection(role='ANCHOR'".
+        """
+        wanted = f"bpy.ops.{operator}" if "(" in operator else f"bpy.ops.{operator}("
         x, top, width, height = self.region(region)
         seen = []
         for y in range(top + 8, top + height, 9):
             self.move(x + width * 0.35, y)
             found = self.python(f"button_under_mouse({region!r})")
-            if found.startswith(f"bpy.ops.{operator}("):
+            if found.startswith(wanted):
                 return x + width * 0.35, y
             seen += [found] if found and found not in seen else []
         raise WindowError(f"No button of {operator} is seen, only {seen}")
@@ -297,6 +305,13 @@ class Window:
         self.click(*self.find_button(operator, region))
 
     # Pictures
+
+    def pack(self, picture, target, colors=128):
+        """Write a picture with few colors, as small as documents want it."""
+        copy = self.folder / picture.name
+        shutil.copy(picture, copy)
+        words = ("convert", self.place.inside(copy), "+dither", "-colors", str(colors), "png8:-")
+        target.write_bytes(self.run(*words))
 
     def shot(self, name, crop=None):
         """Keep a picture of the screen; crop is x, y, width, height."""
