@@ -4,6 +4,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
@@ -22,11 +23,12 @@ class ExportOperator(JobOperator, ExportHelper):
     """An operator that writes one file about the active object; an older file stays if that fails.
 
     A subclass has a method `plan`, which reads all that is needed and returns a function of a path and a progress
-    callback that writes the file, without touching Blender, and returns a few words about it.
+    callback that writes the file, without touching Blender, and returns the numbers that `told` has a place for.
     """
 
     bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
     suffix = ""  # of the name in the file browser
+    told = ""  # when it is done: about the object, with some numbers, and the file
 
     @property
     def filename_ext(self):
@@ -58,7 +60,7 @@ class ExportOperator(JobOperator, ExportHelper):
 
     def finish(self, context, objects, results, seconds):
         """Tell what was written."""
-        self.report({"INFO"}, f"{self._name}: {results} written to {self._path.name}")
+        self.report({"INFO"}, rpt_(self.told).format(self._name, *results, self._path.name))
         return {"FINISHED"}
 
 
@@ -67,6 +69,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_points"
     bl_label = "Export Points"
+    told = "{}: {:,} points written to {}"
 
     filter_glob: StringProperty(
         name="File Filter",
@@ -114,7 +117,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
         def write(path, progress):
             progress("Write", 0.0)
             write_points(path, table, double=not table.single)
-            return f"{len(table.points):,} points"
+            return (len(table.points),)
 
         return write
 
@@ -124,6 +127,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_operator"
     bl_label = "Export Laplacian"
+    told = "{}: {:,} weights and {} modes written to {}"
     suffix = ".npz"
 
     filter_glob: StringProperty(
@@ -139,7 +143,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
             save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))
-            return f"{built.laplacian.stiffness.nnz:,} weights and {count} modes"
+            return built.laplacian.stiffness.nnz, count
 
         return write
 
@@ -149,6 +153,7 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_eigenvalues"
     bl_label = "Export Eigenvalues"
+    told = "{}: {} eigenvalues written to {}"
     suffix = ".csv"
 
     filter_glob: StringProperty(
@@ -171,7 +176,7 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
             rows = np.stack([np.arange(1, len(values) + 1), values], axis=1)
             with replacing(path) as part:
                 np.savetxt(part, rows, ["%d", "%.17g"], ",", header="mode,eigenvalue", comments="")
-            return f"{len(values)} eigenvalues"
+            return (len(values),)
 
         return write
 

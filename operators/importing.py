@@ -5,6 +5,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
@@ -63,6 +64,11 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Import the other columns too: colors, normals, intensity and so on",
         default=True,
     )
+    frame: BoolProperty(
+        name="Frame in View",
+        description="Let the 3D views look at the imported points, unless a script imports them",
+        default=True,
+    )
 
     @classmethod
     def obstacle(cls, context):
@@ -75,15 +81,17 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        for name in ("up", "kind", "attributes"):
+        for name in ("up", "kind", "attributes", "frame"):
             layout.prop(self, name)
 
     def execute(self, context):
         attended = self.takes_window()
+        self._framed = False
         names = [item.name for item in self.files if item.name]
         self._paths = paths = [Path(self.directory, name) for name in names] or [Path(self.filepath)]
         try:
             if attended:
+                self._framed = self.frame
                 return self.start(context, [], lambda progress: _read_all(paths, progress))
             with Stages(context.window_manager, self.bl_label) as stages:
                 tables = _read_all(paths, stages)
@@ -113,6 +121,8 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             meshes = [obj.data for obj in context.selected_objects]
             bpy.ops.object.convert(target="POINTCLOUD")
             bpy.data.batch_remove(meshes)
+        if self._framed:
+            _frame_selected(context)
         return {"FINISHED"}
 
     def _tell(self, obj, table, shared):
@@ -120,10 +130,24 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         for notice in table.notices:
             self.report({"WARNING"}, notice)
         offset = offset_of(obj)
-        shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
-        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
+        if offset.any():
+            shift = ", ".join(f"{-value:.10g}" for value in offset)
+            text = rpt_("{}: {:,} points, shifted by ({})").format(obj.name, len(table.points), shift)
+        else:
+            text = rpt_("{}: {:,} points").format(obj.name, len(table.points))
+        self.report({"INFO"}, text)
         if shared is not None and (offset != shared).any():
-            self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
+            text = rpt_("{} is too far from the points imported before to share their shift").format(obj.name)
+            self.report({"WARNING"}, text)
+
+
+def _frame_selected(context):
+    """Let all 3D views of the window look at what is selected."""
+    for area in context.window.screen.areas:
+        if area.type == "VIEW_3D":
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            with context.temp_override(area=area, region=region):
+                bpy.ops.view3d.view_selected()
 
 
 def _read_all(paths, progress):

@@ -5,6 +5,8 @@ from threading import Event, Thread
 
 import bpy
 from bpy.app.handlers import persistent
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import Cancelled, PointCloudError
 from .options import settings_values
@@ -123,7 +125,7 @@ class Job(StageTimes):
 
     def show(self, context):
         """Tell in the status bar how far it is, and let the panel do so too."""
-        text = f"{self.label}: {self.stage}, {self.fraction:.0%}    Esc to stop"
+        text = iface_("{}: {}, {:.0%}    Esc to stop").format(iface_(self.label), iface_(self.stage), self.fraction)
         if text != self._shown:
             self._shown = text
             context.workspace.status_text_set(text)
@@ -215,7 +217,7 @@ class JobOperator(ReadyOperator):
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            self.report({"WARNING"}, f"{job.label} wrote nothing: {change}")
+            self.report({"WARNING"}, rpt_("{} wrote nothing: {}").format(iface_(job.label), change))
             return {"CANCELLED"}
         return self.finish(context, objects, results, job.seconds)
 

@@ -30,7 +30,6 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.smooth"
     bl_label = "Smooth Points"
-    adjustable = ("strength", "keep", "target")
 
     method: EnumProperty(
         name="Method",
@@ -79,6 +78,11 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
     keep_rim: BoolProperty(name="Keep Rim", description="Leave the rim where it is", default=True)
     target: target_property()
 
+    @property
+    def adjustable(self):
+        """Names of the settings that need no new solution: to keep a size, one looks for a scale."""
+        return ("strength", "target") if self.keep == "NONE" else ("target",)
+
     def plan(self, context, obj):
         check_movable(obj, self.target)
         reading, operator = operator_reader(context, obj)
@@ -107,14 +111,24 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
                 modes if method == "MODES" else wavelength,
                 gain if method == "DETAIL" else 0,
             )
-            return reading, blend(
-                cache.result(
+
+            def filtered():
+                return cache.result(
                     laplacian,
                     "smooth",
                     *settings,
                     compute=lambda: _smooth(laplacian, method, fixed_rim, modes, wavelength, gain, progress),
                 )
-            )
+
+            if not shared["keep"]:
+                return reading, blend(filtered())
+
+            def scaled():
+                places = filtered()
+                progress("Size", 0.9)
+                return blend(places)
+
+            return reading, cache.result(laplacian, "scaled", *settings, *shared.values(), compute=scaled)
 
         return compute
 

@@ -29,7 +29,7 @@ def make_legend(scene, obj, camera, title: str = ""):
     camera : bpy.types.Object
         The legend becomes its child, close in front of it.
     title : str
-        Text above the colours; empty for the name and unit of the attribute.
+        Text above the colours; empty for the name of the attribute, and its unit below.
 
     Returns
     -------
@@ -40,8 +40,11 @@ def make_legend(scene, obj, camera, title: str = ""):
     legend = _Legend(scene, camera)
     legend.collection[_OF] = obj
     legend.rectangle((0.0, 0.0, 1.0, 1.0), [(0.01, 0.01, 0.01, 1.0)] * 2, depth=1.01)
-    legend.text(title or scale.full_title, 0.08, 0.94, width=0.84)
+    legend.text(title or scale.title, 0.08, 0.94, width=0.84)
     low, high, bottom, top = 0.1, 0.32, 0.05, 0.86
+    if scale.unit and not title:
+        legend.text(scale.unit, 0.08, 0.88, width=0.3)
+        top = 0.81
     if scale.boxes:
         height = (top - bottom) / max(len(scale.boxes), _FEWEST)
         for index, (name, color) in enumerate(scale.boxes.items()):

@@ -1,6 +1,7 @@
 """The panel in the sidebar of the 3D view, tab "Mesh-Free"."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..operators.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.groups import search_group
@@ -69,9 +70,9 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
 def _draw_job(layout, job):
     """Draw what is computed, how far it is, and how to stop it."""
     column = layout.column(align=True)
-    column.label(text=f"{job.label} (Esc to Stop)")
+    column.label(text=iface_("{} (Esc to Stop)").format(iface_(job.label)))
     row = column.row(align=True)
-    row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
+    row.progress(text=f"{iface_(job.stage)}: {job.fraction:.0%}", factor=job.fraction)
     row.operator("meshfree.stop", text="", icon="X")
 
 
@@ -94,18 +95,19 @@ def _draw_result(layout, result):
 def _draw_summary(layout, obj):
     mesh = obj.data
     column = layout.column(align=True)
-    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon=f"OUTLINER_OB_{obj.type}")
+    points = iface_("{}: {:,} points").format(obj.name, point_count(mesh))
+    column.label(text=points, icon=f"OUTLINER_OB_{obj.type}")
     if obj.type == "MESH" and mesh.polygons:
-        column.label(text=f"Faces not used: {len(mesh.polygons):,}", icon="INFO")
+        column.label(text=iface_("Faces not used: {:,}").format(len(mesh.polygons)), icon="INFO")
     scale = obj.matrix_world.to_scale()
     if max(abs(factor - 1.0) for factor in scale) > 1e-5:
         shown = ", ".join(f"{factor:.4g}" for factor in scale)
-        column.label(text=f"Object scale ({shown}) is applied", icon="INFO")
+        column.label(text=iface_("Object scale ({}) is applied").format(shown), icon="INFO")
         column.label(text="to lengths and areas", icon="BLANK1")
     modifiers = [modifier for modifier in obj.modifiers if not is_display(modifier)]
     if modifiers:
-        state = "used" if obj.meshfree.use_modifiers else "left out"
-        column.label(text=f"Modifiers {state}: {len(modifiers)}", icon="MODIFIER")
+        text = "Modifiers used: {}" if obj.meshfree.use_modifiers else "Modifiers left out: {}"
+        column.label(text=iface_(text).format(len(modifiers)), icon="MODIFIER")
         column.prop(obj.meshfree, "use_modifiers")
     if sharing_objects(obj):
         column.label(text="Other objects share this mesh", icon="INFO")
@@ -166,7 +168,8 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
             else:
                 grid.label(text=text)
         if len(eigenvalues) > _LISTED:
-            layout.label(text=f"and {len(eigenvalues) - _LISTED} more, up to {eigenvalues[-1]:.5g}")
+            more = iface_("and {} more, up to {:.5g}").format(len(eigenvalues) - _LISTED, eigenvalues[-1])
+            layout.label(text=more)
 
 
 class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):

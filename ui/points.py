@@ -1,6 +1,7 @@
 """The panel about points: selecting them, and the groups that the tools take."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..operators.groups import ANCHOR, FIXED, HANDLE, RIM, SOURCE, VALUE, has_group, members
 from ..operators.reading import TYPES
@@ -28,7 +29,9 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         for role, title in _TITLES.items():
             row = column.row(align=True)
-            row.operator("meshfree.group_from_selection", text=f"Assign to {title}").role = role.upper()
+            row.operator(
+                "meshfree.group_from_selection", text=iface_("Assign to {}").format(iface_(title))
+            ).role = role.upper()
             count = members(obj, role, glance=True).count
             selecting = row.row(align=True)
             selecting.enabled = has_group(obj, role)

@@ -8,6 +8,7 @@ from ..errors import InvalidPointsError
 from .table import PointTable, from_columns, to_columns
 
 _DELIMITERS = (";", "\t", None, ",")  # in this order; None is white space
+_BLOCK = 10_000  # lines that are written at once
 _HEADER = 20  # lines before the first point at most
 _SCAN_NAMES = {  # of the columns of PTS files
     4: ("x", "y", "z", "intensity"),
@@ -87,7 +88,7 @@ def _read_rows(lines, path, usual=()) -> PointTable:
 
 
 def _load(rows, delimiter, columns):
-    if delimiter != ",":
+    if delimiter != "," and any("," in row for row in rows):
         rows = [row.replace(",", ".") for row in rows]
     return np.loadtxt(rows, delimiter=delimiter, usecols=columns, ndmin=2)
 
@@ -191,4 +192,7 @@ def write_columns(path, table, delimiter=" ", double=True):
     with open(path, "w", encoding="utf-8", newline="\n") as file:
         names = [name.replace(delimiter, "_") for name in columns]
         file.write(("# " if delimiter.isspace() else "") + delimiter.join(names) + "\n")
-        np.savetxt(file, np.stack(list(columns.values()), axis=1, dtype=np.float64), formats, delimiter)
+        line = delimiter.join(formats) + "\n"
+        for start in range(0, len(table.points), _BLOCK):  # some rows at a time take a third of the time of savetxt
+            rows = np.stack([values[start : start + _BLOCK] for values in columns.values()], axis=1, dtype=np.float64)
+            file.write((line * len(rows)) % tuple(rows.reshape(-1).tolist()))

@@ -18,7 +18,12 @@ AGAIN = {
     "fewer modes": ("spectrum", {"count": 8}, {"count": 5, "write_limit": 3}),
     "remove noise": ("smooth", {}, {"strength": 0.3, "target": "IN_PLACE"}),
     "remove noise of a group": ("smooth", {}, {"group": "Handle"}),
-    "soften": ("smooth", {"method": "HEAT", "keep_rim": False}, {"method": "HEAT", "keep_rim": False, "keep": "AREA"}),
+    "soften": ("smooth", {"method": "HEAT"}, {"method": "HEAT", "strength": 0.0}),
+    "keep area": (
+        "smooth",
+        {"keep": "AREA", "keep_rim": False},
+        {"keep": "AREA", "keep_rim": False, "target": "IN_PLACE"},
+    ),
     "scale details": ("smooth", {"method": "DETAIL"}, {"method": "DETAIL", "strength": 0.5}),
     "keep modes": ("smooth", {"method": "MODES", "modes": 30}, {"method": "MODES", "modes": 20, "strength": 0.5}),
     "mode_shape": ({}, {"mode": 7, "amplitude": 0.2, "phase": 1.0, "animate": True}),
@@ -36,6 +41,7 @@ COSTLY = {  # where each is called from
     "core.spectrum": ("eigsh",),
     "core.filters": ("eigsh",),
     "core.geodesics": ("dijkstra",),
+    "core.smoothing": ("match_size",),
 }
 
 

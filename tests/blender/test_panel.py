@@ -37,6 +37,7 @@ OPERATORS = (
     "signature",
     "smooth",
     "spectrum",
+    "stop",
 )
 PANELS = ("main", "settings", "spectrum", "display", "points", "shape", "segment", "fields", "deform", "minimal")
 
@@ -204,7 +205,7 @@ def test_all_operators_and_panels_are_known_to_these_tests():
 def test_dialogs_show_every_setting(name):
     add_object(sphere_points())
     operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
-    if not hasattr(operator, "draw"):
+    if not hasattr(operator, "draw") or not getattr(operator, "asks", True):
         return
     properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if not item.is_hidden]
     properties = [item for item in properties if item.type != "POINTER" and item.identifier != "filepath"]
@@ -213,8 +214,26 @@ def test_dialogs_show_every_setting(name):
     variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]
     texts = []
     for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
-        operator.draw(Settings(layout=Layout(texts), **values | variant), bpy.context)
+        settings = Settings(layout=Layout(texts), **values | variant)
+        if hasattr(operator, "draw_settings"):
+            operator.draw_settings(settings, bpy.context, settings.layout)
+        else:
+            operator.draw(settings, bpy.context)
     assert set(texts) == set(values)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_adjust_last_operation_shows_what_takes_no_time(name):
+    operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
+    if not isinstance(getattr(operator, "adjustable", None), tuple):
+        return
+    texts = []
+    settings = Settings(layout=Layout(texts), is_repeated=lambda context: True, adjustable=operator.adjustable)
+    for setting in operator.adjustable:
+        assert setting in getattr(bpy.ops.meshfree, name).get_rna_type().properties
+        setattr(settings, setting, None)
+    operator.draw(settings, bpy.context)
+    assert texts == list(operator.adjustable)
 
 
 def test_every_option_of_core_is_a_setting_with_its_default(extension, core):

@@ -437,7 +437,7 @@ def legend_texts():
 def test_legend_in_renders_follows_the_colors(obj):
     camera = add_camera()
     bpy.ops.meshfree.legend()
-    assert legend_texts()[0] == "Mean Curvature (1/m)"
+    assert legend_texts()[:2] == ["Mean Curvature", "1/m"]
     before = legend_texts()
     obj.meshfree.coverage = 50.0
     assert legend_texts() != before
@@ -574,3 +574,24 @@ def test_own_presets_are_files_in_the_users_folder(extension, installed):
     assert bpy.types.MESHFREE_MT_presets.bl_label == "My Scanner"
     bpy.ops.meshfree.add_preset(remove_active=True)
     assert not path.exists()
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
+def test_point_clouds_are_seen_as_meshes_are(display, overlay):
+    obj = add_object(sphere_points())
+    obj.select_set(True)
+    bpy.ops.object.convert(target="POINTCLOUD")
+    obj = bpy.context.object
+    assert obj.type == "POINTCLOUD"
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.colormap(attribute="lb_area", color_map="MAGMA", range_mode="DATA")
+    values = attribute(obj, "lb_area")
+    assert bounds(display, obj) == pytest.approx((values.min(), values.max()))
+    before = radius(display, obj)
+    obj.meshfree.point_size *= 2.0
+    assert radius(display, obj) == pytest.approx(2.0 * before)
+    obj.meshfree.histogram = True
+    assert len(overlay.pictures(obj, bpy.context.scene)) == 2
+    middle = float(np.median(values))
+    bpy.ops.meshfree.select_by_range(low=middle, high=1.0)
+    assert (attribute(obj, ".selection") == (values >= np.float32(middle))).all()
