@@ -170,7 +170,7 @@ class Window:
 
     # Asking Blender
 
-    def python(self, code, seconds=60):
+    def python(self, code, seconds=DRAWING):
         """Run code in Blender and return the value of its last line, as JSON can carry it."""
         os.write(self._requests, json.dumps(code).encode() + b"\n")
         until = time.monotonic() + seconds

@@ -60,6 +60,7 @@ def analyzed(gui):
     begin(gui, "MESHFREE_PT_spectrum", "MESHFREE_PT_display")
     gui.press("meshfree.analyze")
     gui.wait_until("'lb_area' in bpy.context.object.data.attributes", 180)
+    gui.settle()
     gui.python("bpy.ops.meshfree.colormap(attribute='lb_eigenvector_008')")
     gui.python("bpy.context.object.select_set(False)")
 
