@@ -289,7 +289,7 @@ def test_growing_a_selection_in_edit_mode(operator, extension, obj):
     class Grow(selecting.SelectionOperator, operator):
         bl_label = "Grow"
         distance = 0.5
-        change = selecting.MESHFREE_OT_select_grow.change
+        prepare = selecting.MESHFREE_OT_select_grow.prepare
         finish = selecting.SelectionOperator.finish
 
         def __init__(self):
