@@ -577,7 +577,7 @@ def test_own_presets_are_files_in_the_users_folder(extension, installed):
 
 
 @pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
-def test_point_clouds_are_seen_as_meshes_are(display, overlay):
+def test_point_clouds_are_seen_as_meshes_are(display, modifiers, overlay):
     obj = add_object(sphere_points())
     obj.select_set(True)
     bpy.ops.object.convert(target="POINTCLOUD")
