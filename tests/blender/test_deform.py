@@ -165,8 +165,8 @@ class TestFollowing:
         bpy.context.view_layer.update()
         empty.location.z += 1.0
         handlers = bpy.app.handlers.depsgraph_update_post
-        following = [function for function in handlers if function.__module__ == live.__name__]
-        handlers.remove(following[0])
+        place = [function.__module__ for function in handlers].index(live.__name__)
+        following = handlers.pop(place)
         try:
             bpy.context.view_layer.update()
             live.update(strip, bpy.context.evaluated_depsgraph_get(), quick=True)
@@ -174,7 +174,7 @@ class TestFollowing:
             assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-5)
             live.update(strip, bpy.context.evaluated_depsgraph_get())
         finally:
-            handlers.append(following[0])
+            handlers.insert(place, following)
         assert binding.written_pose(strip)[1]
         assert_allclose(displacement(strip), settled, atol=1e-5)
 
