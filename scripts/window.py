@@ -306,7 +306,7 @@ class Window:
 
     # Pictures
 
-    def pack(self, picture, target, colors=128):
+    def pack(self, picture, target, colors=256):
         """Write a picture with few colors, as small as documents want it."""
         copy = self.folder / picture.name
         shutil.copy(picture, copy)

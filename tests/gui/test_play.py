@@ -110,13 +110,14 @@ class TestAnalysis:
 class TestJobs:
     """Work that goes on while the window stays alive, and what ends it."""
 
-    @pytest.fixture(params=["Analyze Points", "Smooth Points"])
+    @pytest.fixture
     def job(self, gui, request):
         add_sphere(gui, 20000, 0.005)
         gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'job.blend')")
-        start(gui, request.param)
+        start(gui, getattr(request, "param", "Analyze Points"))
         return gui
 
+    @pytest.mark.parametrize("job", ["Analyze Points", "Smooth Points"], indirect=True)
     def test_escape(self, job):
         job.shot("working")
         job.key("Escape")
