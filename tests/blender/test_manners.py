@@ -32,7 +32,7 @@ def registered():
     return {
         "types": [name for name in dir(bpy.types) if "meshfree" in name.lower()],
         "operators": dir(bpy.ops.meshfree),
-        "handlers": handlers,
+        "handlers": sorted(handlers),
         "entries of menus": entries,
         "keys": [
             f"{keymap.name}: {item.idname}"
