@@ -1,8 +1,8 @@
 """How soon a real Blender window answers while it computes: ``python scripts/play.py benchmarks/window.py [POINTS]``.
 
 Times run from the moment a program is started that presses a key, some ten milliseconds before Blender gets it, to the
-moment that the text of the status bar is set, and to that of its drawing, here without a graphics card. The target for the first text is 0.2 s, that
-for stopping 0.5 s, after Esc at any moment of the work.
+moment that the text of the status bar is set, and to that of its drawing, here without a graphics card. The target for
+the first text is 0.2 s, that for stopping 0.5 s, after Esc at any moment of the work.
 """
 
 import statistics
