@@ -5,6 +5,7 @@ def _modules():
     """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
     from .operators import (
         analyze,
+        bake,
         cache,
         command,
         deform,
@@ -12,6 +13,7 @@ def _modules():
         fields,
         importing,
         job,
+        live,
         minimal,
         segment,
         selecting,
@@ -30,6 +32,7 @@ def _modules():
         range_selection,
         settings,
     )
+    from .ui import deform as deform_panel
 
     return (
         settings,
@@ -41,6 +44,8 @@ def _modules():
         segment,
         fields,
         deform,
+        bake,
+        live,
         minimal,
         selecting,
         importing,
@@ -53,6 +58,7 @@ def _modules():
         panel,
         points,
         applications,
+        deform_panel,
         menus,
         overlay,
     )

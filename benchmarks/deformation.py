@@ -113,12 +113,17 @@ def in_blender(points, quads, held, anchored, target, iterations):
     """Result of Blender's modifier, or why there is none."""
     if not BLENDER.exists():
         return "left out: no Python with bpy"
+    target = np.concatenate([anchored, target])
+    return run_in_blender("bar", points=points, quads=quads, held=held, target=target, iterations=iterations)
+
+
+def run_in_blender(name, **given):
+    """Let a script of this folder compute something from arrays in Blender."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "bar.npz"
-        target = np.concatenate([anchored, target])
-        np.savez(path, points=points, quads=quads, held=held, target=target, iterations=iterations)
-        script = Path(__file__).with_name("bar_in_blender.py")
-        subprocess.run([BLENDER, script, path], check=True, capture_output=True, timeout=300)
+        path = Path(folder) / f"{name}.npz"
+        np.savez(path, **given)
+        script = Path(__file__).with_name(f"{name}_in_blender.py")
+        subprocess.run([BLENDER, script, path], check=True, capture_output=True, timeout=600)
         return np.load(path.with_suffix(".npy"))
 
 
@@ -146,6 +151,29 @@ def cost():
             Goal("one rotation-aware step from the last result, seconds", 0.15, "{:.3f}"),
         ]
         yield from judge(f"sphere, 20,000 random, {neighbors or 'default'} neighbors", goals, measure())
+
+
+def following():
+    """Seconds of an update in Blender, from the move of an empty to the evaluated object, the least of several."""
+    case = "sphere, 20,000 random, in Blender"
+    archives = list((ROOT / "dist").glob("*.zip"))
+    if not BLENDER.exists() or not archives:
+        yield [case, "update", "left out: no Python with bpy, or no zip of the extension (make build)", "", ""]
+        return
+    points = random_sphere(20_000)
+    z = points[:, 2]
+
+    def measure():
+        archive = str(max(archives, key=lambda path: path.stat().st_mtime))
+        *quick, settled = run_in_blender("follow", points=points, handles=z > 0.95, anchors=z < -0.95, archive=archive)
+        yield min(quick)
+        yield settled
+
+    goals = [
+        Goal("update while a handle is dragged, seconds", 0.06, "{:.3f}"),
+        Goal("update settled, as for each frame of a render, seconds", None, "{:.3f}"),
+    ]
+    yield from judge(case, goals, measure())
 
 
 def least(times, work):
@@ -206,4 +234,4 @@ def on_bar():
     yield from bend(laplacian, quads, section)
 
 
-GROUPS = {"bar": on_bar, "scans": scans, "cost": cost}
+GROUPS = {"bar": on_bar, "scans": scans, "cost": cost, "following": following}

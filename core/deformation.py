@@ -175,8 +175,8 @@ class Deformer:
         result = self.points.copy()
         loose = self._row < 0
         result[self._held[loose]] = target[loose]
-        self.steps, self.converged = 0, True
         if not len(self._moving):
+            self.steps, self.converged = 0, True
             return result
         turn, shift = self._fit_parts(target)
         frame = np.einsum("nab,nb->na", turn, self._rest) + shift
@@ -196,17 +196,19 @@ class Deformer:
             now = place(0.0)
         else:
             now = _check_positions(start, len(self.points), "starting points", "point")[self._moving]
+        step, converged = 0, True
         if self.rotation_aware and steps > 0:
             at_rest = np.einsum("nab,nb->na", turn, self._differential)
-            self.converged, mixing, begin = False, _Mixing(), now
-            for self.steps in range(1, int(steps) + 1):
-                report("Deform", self.steps / (steps + 1.0))
+            converged, mixing, begin = False, _Mixing(), now
+            for step in range(1, int(steps) + 1):
+                report("Deform", step / (steps + 1.0))
                 turned = np.einsum("abn,nb->na", self._rotations(begin), self._differential)
                 now = place(self._divergence @ (turned - at_rest))
                 if np.abs(now - begin).max() <= rtol * self._size:
-                    self.converged = True
+                    converged = True
                     break
                 begin = mixing.mix(begin, now)
+        self.steps, self.converged = step, converged  # at once, for solves may run in several threads
         result[self._moving] = now
         return result
 
@@ -223,20 +225,14 @@ class Deformer:
         part = self._part[row]
         rest = self._rest[row]
         count = np.bincount(part, minlength=self._parts)[:, None]
-
-        def mean(values):
-            total = np.zeros((self._parts, 3))
-            np.add.at(total, part, values)
-            return total / count
-
-        before, after = mean(rest), mean(target)
+        total = sparse.csr_array((np.ones(len(part)), (part, np.arange(len(part)))), shape=(self._parts, len(part)))
+        before, after = total @ rest / count, total @ target / count
         turn = np.tile(np.eye(3), (self._parts, 1, 1))
         if self.rotation_aware:
-            products = np.zeros((self._parts, 3, 3))
-            np.add.at(products, part, np.einsum("ka,kb->kab", target - after[part], rest - before[part]))
+            pairs = np.einsum("ka,kb->kab", target - after[part], rest - before[part])
+            products = (total @ pairs.reshape(-1, 9)).reshape(-1, 3, 3)
             # A trace of the identity keeps a part from turning about an axis that all its constraints lie on.
-            spread = np.zeros(self._parts)
-            np.add.at(spread, part, np.sum((rest - before[part]) ** 2, axis=1))
+            spread = total @ np.sum((rest - before[part]) ** 2, axis=1)
             products += 1e-9 * spread[:, None, None] * np.eye(3)
             turn = np.moveaxis(nearest_rotations(np.moveaxis(products, 0, 2)), 2, 0)
         shift = after - np.einsum("pab,pb->pa", turn, before)

@@ -35,11 +35,16 @@ SEGMENT = "lb_segment"
 FIELD = "lb_field"
 DISTANCE = "lb_distance"
 DISPLACEMENT = "lb_displacement"
+REST = "lb_rest"  # positions before the displacement
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT  # of every analysis, as in the panel
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
-_TYPES = {NORMAL: "FLOAT_VECTOR", BOUNDARY: "BOOLEAN", COMPONENT: "INT", SEGMENT: "INT"}  # all others are FLOAT
+_TYPES = {  # all others are FLOAT
+    **dict.fromkeys((NORMAL, DISPLACEMENT, REST), "FLOAT_VECTOR"),
+    **dict.fromkeys((COMPONENT, SEGMENT), "INT"),
+    BOUNDARY: "BOOLEAN",
+}
 STORABLE = tuple(_STORAGE)
 
 

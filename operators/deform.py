@@ -1,251 +1,335 @@
-"""Deform objects by handles: bind once, then update for every move."""
-
-from dataclasses import dataclass, replace
+"""Deform objects by handles: bind once, then move the handles; take the result over, or take it back."""
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
-from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
-from mathutils import Vector
+from bpy.props import BoolProperty
+from mathutils import Matrix, Vector
 
-from ..core import Deformer, PointCloudError
-from .application import ApplicationOperator, operator_reader
-from .attributes import DISPLACEMENT, own_positions, point_count, write_attribute
-from .groups import ANCHOR, HANDLE, chosen_weights, is_chosen, search_group
-from .positions import check_movable, fill_key, target_property, write_positions
-from .reading import Reading, key_positions
+from ..core import PointCloudError
+from . import live
+from .application import ApplicationOperator
+from .attributes import REST, own_positions, point_count, read_attribute, tag_changed
+from .binding import (
+    POSE,
+    WRITES,
+    edited_rows,
+    forget,
+    handle_names,
+    is_bound,
+    is_there,
+    read_constraints,
+    read_pose,
+    record,
+    relative_matrix,
+    renew,
+    stale_reason,
+    write_displacement,
+)
+from .deform_nodes import add_deform, find_deform, is_baked, show_live
+from .groups import HANDLE, assign, check_assignable, has_group
+from .modifiers import get_input
+from .positions import check_movable
+from .reading import key_positions, read_points, shape_keys
+from .ready import ReadyOperator
 from .result import length_text
+from .selecting import SelectionOperator, selected
 
 
-@dataclass
-class Binding:
-    """What an object was bound with.
+class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
+    """Make the selected points one more handle: a group of its own, which Bind gives an empty"""
 
-    Attributes
-    ----------
-    deformer : Deformer
-    reading : Reading
-        The points at rest.
-    target : str
-        Where the deformed points go.
-    key : str
-        Name of the shape key that holds them, if they go to one.
-    controller : int or None
-        The session_uid of the empty that moves the handles; without one they are moved in Edit Mode.
-    start : ndarray, (4, 4), or None
-        Matrix of the controller when it was bound, in the object's space.
-    """
+    bl_idname = "meshfree.handle_add"
+    bl_label = "Add Handle"
 
-    deformer: Deformer
-    reading: Reading
-    target: str
-    key: str = ""
-    controller: int | None = None
-    start: np.ndarray | None = None
+    surface = False
 
+    def prepare(self, context, obj):
+        chosen = selected(obj)
+        base = obj.meshfree.deform.handles or HANDLE
+        names = [base, *(f"{base}.{number:03d}" for number in range(1, 1000))]
+        name = next(name for name in names if not has_group(obj, name))
+        others = handle_names(obj)
+        check_assignable(obj, name, must_exist=False)
+        for other in others:
+            check_assignable(obj, other, must_exist=True)
 
-_bindings = {}  # by the object's session_uid, which undo does not change
+        def change():
+            for other in others:  # a point has one handle
+                assign(obj, other, chosen, "REMOVE", 1.0)
+            assign(obj, name, chosen, "REPLACE", 1.0)
+            return f'{np.count_nonzero(chosen):,} points are in the group "{name}"'
 
-
-def binding(obj):
-    """Return the binding of an object, or None."""
-    bound = _bindings.get(obj.session_uid)
-    return bound if bound is not None and len(bound.reading.points) == point_count(obj.data) else None
-
-
-def attach():
-    """Forget the bindings of a file when another one is opened."""
-    bpy.app.handlers.load_post.append(_forget)
-
-
-def detach():
-    """Give the memory back, and leave no handler behind."""
-    bpy.app.handlers.load_post.remove(_forget)
-    _bindings.clear()
-
-
-@persistent
-def _forget(*_):
-    _bindings.clear()
-
-
-def _find(uid):
-    """Find an object by its session_uid, which neither undo nor another name changes; None if it is gone."""
-    return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
+        return change
 
 
 class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
-    """Prepare the deformation: the points of one group are moved, those of another stay, and all others follow"""
+    """Prepare the deformation: the points of some groups are moved, those of another stay, and all others follow"""
 
     bl_idname = "meshfree.deform_bind"
     bl_label = "Bind"
     only_active = True
-    writes = (DISPLACEMENT,)
-
-    handles: StringProperty(name="Handles", description="Vertex group with the points that are moved", default=HANDLE)
-    anchors: StringProperty(
-        name="Anchors", description="Vertex group with the points that stay; may be missing", default=ANCHOR
-    )
-    rotation_aware: BoolProperty(
-        name="Turn Details", description="Let details turn with the surface, as bending asks for", default=True
-    )
-    soft: BoolProperty(name="Soft", description="Let handles and anchors give way to a smoother surface", default=False)
-    weight: FloatProperty(
-        name="Weight",
-        description="How strongly soft handles and anchors are pulled, in units of the surface's own resistance; the"
-        " weights of their groups multiply it",
-        default=1.0,
-        min=0.0,
-        soft_max=100.0,
-    )
-    controller: BoolProperty(
-        name="Add Controller",
-        description="Add an empty that moves, turns and scales the handles; without it they are moved in Edit Mode",
-        default=True,
-    )
-    target: target_property()
+    asks = False
+    writes = WRITES
 
     def plan(self, context, obj):
-        check_movable(obj, self.target)
-        handles = chosen_weights(obj, self.handles, "Handles")
-        anchors = np.zeros_like(handles)
-        if is_chosen(obj, self.anchors, ANCHOR):
-            anchors = chosen_weights(obj, self.anchors, "Anchors")
-        moved, kept = np.flatnonzero(handles), np.flatnonzero(anchors)
-        weights = self.weight * np.concatenate([handles[moved], anchors[kept]]) if self.soft else None
-        reading, operator = operator_reader(context, obj)
-        aware = self.rotation_aware
-
-        def compute(progress):
-            laplacian = operator(progress)
-            return reading, Deformer(laplacian, moved, kept, aware, weights, progress=progress)
-
-        return compute
+        settings = obj.meshfree.deform
+        constraints = read_constraints(obj)
+        reading = read_points(context, obj)
+        rest = reading.local(reading.points).astype(np.float32)
+        items = settings.handle_items
+        kept = {item.name: item for item in items if item.has_empty and is_there(item.empty)}
+        by_empty = [settings.add_empties or name in kept for name in constraints.names]
+        edited = constraints.moved[~np.array(by_empty)[constraints.owner]]
+        if len(edited) and (shape_keys(obj) is not None or obj.meshfree.use_modifiers):
+            raise PointCloudError(
+                f'The {len(edited)} handles of "{obj.name}" have no empty, and to move them in Edit Mode takes a mesh'
+                " without shape keys whose modifiers are not used. Turn on Add Empties."
+            )
+        if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
+            rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
+        make = live.plan_factors(obj, rest, reading.matrix, constraints)
+        return lambda progress: (make(progress), by_empty)
 
     def write(self, context, obj, result):
-        reading, deformer = result
-        bound = Binding(deformer, reading, self.target)
-        self.warn(deformer.notices)
-        if self.target == "SHAPE_KEY":
-            key = write_positions(obj, reading, reading.points, self.target, "Deform")
-            bound.key = key.name
-            obj.active_shape_key_index = obj.data.shape_keys.key_blocks.find(key.name)
-        if self.controller:
-            empty = _add_controller(context, obj, reading, deformer.handles)
-            bound.controller, bound.start = empty.session_uid, _in_space_of(obj, empty)
-        for uid in _bindings.keys() - {other.session_uid for other in bpy.data.objects}:
-            del _bindings[uid]  # of objects that were deleted
-        _bindings[obj.session_uid] = bound
-        write_attribute(obj.data, DISPLACEMENT, np.zeros(len(reading.points)))
-        way = f'Move "{empty.name}"' if self.controller else "Move the handles in Edit Mode"
-        counts = f"{len(deformer.handles):,} handles and {len(deformer.anchors):,} anchors"
-        return f"{obj.name}: {counts} are bound. {way}, then update"
-
-    def draw_settings(self, context, layout):
-        for name in ("handles", "anchors"):
-            search_group(layout, self, name, context.object)
-        for name in ("rotation_aware", "soft"):
-            layout.prop(self, name)
-        row = layout.row()
-        row.active = self.soft
-        row.prop(self, "weight")
-        for name in ("controller", "target"):
-            layout.prop(self, name)
+        made, by_empty = result
+        items = obj.meshfree.deform.handle_items
+        kept = {item.name: (item.empty, tuple(item.rest)) for item in items if item.has_empty and is_there(item.empty)}
+        empties = []
+        for index, name in enumerate(made.constraints.names):
+            moved_by = kept.get(name)
+            if by_empty[index] and moved_by is None:
+                rows = made.constraints.moved[made.constraints.owner == index]
+                empty = _add_empty(context, obj, name, made.rest, rows)
+                moved_by = empty, relative_matrix(obj, empty)
+            empties.append(moved_by)
+        record(obj, made.rest, made.matrix, made.constraints, empties)
+        add_deform(obj)
+        # Blender crashes when it draws what a render's handlers change, and handles are there to be animated.
+        context.scene.render.use_lock_interface = True
+        live.keep(obj, made)
+        obj.data.pop(POSE, None)
+        write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False)
+        live.update(obj)
+        self.warn(made.deformer.notices)
+        moved, stay = len(made.constraints.moved), len(made.constraints.kept)
+        way = f'Move "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
+        return f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"
 
 
-def _add_controller(context, obj, reading, handles):
-    """Add an empty in the middle of the handles."""
-    points = reading.points
-    empty = bpy.data.objects.new(f"{obj.name} Handle", None)
+def _add_empty(context, obj, name, rest, rows):
+    """Add an empty in the middle of a group of handles, which goes with the object."""
+    points = rest[rows].astype(np.float64)
+    empty = bpy.data.objects.new(f"{obj.name} {name}", None)
     empty.empty_display_type = "SPHERE"
     empty.empty_display_size = max(
-        np.linalg.norm(np.ptp(points[handles], axis=0)), 0.05 * np.linalg.norm(np.ptp(points, axis=0))
+        0.5 * np.linalg.norm(np.ptp(points, axis=0)), 0.03 * np.linalg.norm(np.ptp(rest, axis=0))
     )
-    empty.location = Vector(points[handles].mean(axis=0)) + obj.matrix_world.translation
+    empty.parent = obj
+    empty.location = Vector(points.mean(axis=0))
     for collection in obj.users_collection:
         collection.objects.link(empty)
     context.view_layer.update()
     return empty
 
 
+class BoundOperator(ReadyOperator):
+    """An operator on a bound object."""
+
+    works_stale = False  # whether the handles may have lost their hold
+
+    @classmethod
+    def obstacle(cls, context):
+        return super().obstacle(context) or not_bound(context.object)
+
+    def execute(self, context):
+        obj = context.object
+        try:
+            if not self.works_stale:
+                check_fresh(obj)
+                context.view_layer.update()
+                live.update(obj)  # all steps, should only the first one have been taken
+            message = self.change(context, obj)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, message)
+        return {"FINISHED"}
+
+
+def not_bound(obj) -> str:
+    """Say that an object is not bound, and what to do; empty if it is."""
+    return "" if is_bound(obj) else f'"{obj.name}" is not bound. Bind it to its handles first'
+
+
+def check_fresh(obj):
+    """Refuse an object that no longer follows its handles."""
+    reason = stale_reason(obj)
+    if reason:
+        raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
+
+
 class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
-    """Let all points follow the handles to where they are now"""
+    """Let all points follow the handles to where they are now, which happens by itself when they are moved"""
 
     bl_idname = "meshfree.deform_update"
     bl_label = "Update"
     only_active = True
     asks = False
-    writes = (DISPLACEMENT,)
-
-    steps: IntProperty(
-        name="Steps",
-        description="Most steps in which the turns of details are found; it stops when nothing moves any more",
-        default=30,
-        min=1,
-        soft_max=100,
-    )
+    writes = WRITES
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if binding(context.object) is None:
-            name = context.object.name
-            cls.poll_message_set(
-                f'"{name}" is not bound, or has got or lost points since. Bind it to its handles first'
-            )
-            return False
-        return True
+    def obstacle(cls, context):
+        return super().obstacle(context) or not_bound(context.object)
 
     def plan(self, context, obj):
-        bound = binding(obj)
-        check_movable(obj, bound.target)
-        if bound.key and (obj.data.shape_keys is None or bound.key not in obj.data.shape_keys.key_blocks):
-            raise PointCloudError(f'The shape key "{bound.key}" of "{obj.name}" is gone. Bind the object again.')
-        goal = _handle_goal(obj, bound)
-        steps = self.steps
-        return lambda progress: (bound, bound.deformer.solve(goal, steps=steps, progress=progress))
+        check_fresh(obj)
+        compute, pose = live.plan_settled(obj)
+        return lambda progress: (pose, *compute(progress))
 
     def write(self, context, obj, result):
-        bound, points = result
-        if bound.key:
-            fill_key(obj, obj.data.shape_keys.key_blocks[bound.key], points - bound.reading.points, bound.reading)
-        else:
-            now = replace(bound.reading, points=bound.reading.placed(own_positions(obj.data)))
-            write_positions(obj, now, points, bound.target, "")
-        distance = np.linalg.norm(points - bound.reading.points, axis=1)
-        write_attribute(obj.data, DISPLACEMENT, distance)
-        if not bound.deformer.converged:
-            self.warn(["The turns of details were still changing. Update again with more Steps."])
+        pose, made, points, displacement = result
+        live.keep(obj, made)
+        live.write(obj, made, points, displacement, pose)
+        if not made.deformer.converged:
+            self.warn(["The turns of details were still changing. Raise Steps."])
+        distance = np.linalg.norm(points - made.deformer.points, axis=1)
         return f"{obj.name}: moved at most by {length_text(distance.max())}"
 
 
-def _handle_goal(obj, bound):
-    """Return where the handles are to be: where the controller took them, or where they are in the mesh, (h, 3)."""
-    handles, reading = bound.deformer.handles, bound.reading
-    if bound.controller is not None:
-        empty = _find(bound.controller)
-        if empty is None:
-            raise PointCloudError(f'The controller of "{obj.name}" is gone. Bind the object again.')
-        change = _in_space_of(obj, empty) @ np.linalg.inv(bound.start)
-        local = reading.local(reading.points[handles])
-        return reading.placed(local @ change[:3, :3].T + change[:3, 3])
-    if not bound.key:
-        return reading.placed(own_positions(obj.data)[handles])
-    # By what the key does, not by what is seen, which other keys and the key's value change too.
-    keys = obj.data.shape_keys
-    moved = key_positions(keys.key_blocks[bound.key]) - key_positions(keys.reference_key)
-    return reading.points[handles] + reading.placed(moved[handles])
+class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
+    """Move the points themselves to where the deformation shows them, and go on from there"""
+
+    bl_idname = "meshfree.deform_apply"
+    bl_label = "Apply"
+
+    def change(self, context, obj):
+        check_movable(obj, "IN_PLACE")
+        settings, constraints = obj.meshfree.deform, read_constraints(obj)
+        positions = (read_attribute(obj.data, REST) + shown_displacement(obj)).astype(np.float32)
+        empties = [
+            (item.empty, relative_matrix(obj, item.empty)) if item.has_empty else None for item in settings.handle_items
+        ]
+        _write_own_positions(obj, positions)
+        record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
+        write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
+        return f"{obj.name}: {len(positions):,} points are at rest where they are now"
 
 
-def _in_space_of(obj, empty):
-    """Return the matrix of an empty in the space of an object, (4, 4) float64."""
-    matrix = np.array(obj.matrix_world, dtype=np.float64)
-    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
-        raise PointCloudError(
-            f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
-        )
-    return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
+class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
+    """Keep the deformation as a shape key of value zero, and put the handles back"""
+
+    bl_idname = "meshfree.deform_to_shape_key"
+    bl_label = "To Shape Key"
+
+    @classmethod
+    def obstacle(cls, context):
+        keyless = context.object is not None and context.object.type != "MESH"
+        reason = "Point clouds have no shape keys. Apply the deformation, or bake it" if keyless else ""
+        return super().obstacle(context) or reason
+
+    def change(self, context, obj):
+        check_movable(obj, "SHAPE_KEY")
+        constraints = read_constraints(obj)
+        if edited_rows(obj, constraints).any():
+            raise PointCloudError(
+                f'Handles of "{obj.name}" are moved in Edit Mode, which a mesh with shape keys does not allow. Turn on'
+                " Add Empties and bind again."
+            )
+        moved = shown_displacement(obj)
+        if obj.data.shape_keys is None:
+            obj.shape_key_add(name="Basis", from_mix=False)
+        key = obj.shape_key_add(name="Deform", from_mix=False)
+        positions = key_positions(obj.data.shape_keys.reference_key) + moved
+        key.points.foreach_set("co", positions.astype(np.float32).reshape(-1))
+        key.value = 0.0
+        put_back(context, obj)
+        known = live.find(obj)
+        renew(obj, constraints)
+        if known is not None:
+            live.keep(obj, known)
+        return f'{obj.name}: the deformation is the shape key "{key.name}"'
 
 
-CLASSES = (MESHFREE_OT_deform_bind, MESHFREE_OT_deform_update)
+class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
+    """Put the handles back to where they were bound, and all points to rest"""
+
+    bl_idname = "meshfree.deform_reset"
+    bl_label = "Reset"
+    works_stale = True
+
+    def change(self, context, obj):
+        put_back(context, obj)
+        return f"{obj.name}: handles and points are at rest"
+
+
+class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
+    """Let go of the handles: points go back to rest, and the modifier and its attributes are removed"""
+
+    bl_idname = "meshfree.deform_unbind"
+    bl_label = "Unbind"
+    works_stale = True
+
+    delete_empties: BoolProperty(
+        name="Delete Empties", description="Delete the empties that moved the handles", default=True
+    )
+
+    def change(self, context, obj):
+        empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
+        put_back(context, obj)
+        if is_baked(obj):
+            delete_bake(obj)
+        forget(obj)
+        if self.delete_empties:
+            for empty in empties:
+                if empty.type == "EMPTY":
+                    bpy.data.objects.remove(empty)
+        return f"{obj.name}: is no longer bound"
+
+
+def shown_displacement(obj):
+    """Read the displacements in local space as the modifier shows them, (n, 3)."""
+    return read_attribute(obj.data, WRITES[0]) * get_input(find_deform(obj), "Strength")
+
+
+def put_back(context, obj):
+    """Put handles and points of a bound object to where they were bound, as far as its points are still the same."""
+    settings = obj.meshfree.deform
+    for item in settings.handle_items:
+        if item.has_empty and is_there(item.empty):
+            item.empty.matrix_world = obj.matrix_world @ Matrix(np.reshape(item.rest, (4, 4)).tolist())
+    data = obj.data
+    same = settings.point_count == point_count(data) and all(name in data.attributes for name in WRITES)
+    if same and any(not item.has_empty for item in settings.handle_items):
+        constraints = read_constraints(obj)
+        rows = constraints.moved[edited_rows(obj, constraints)]
+        positions = own_positions(data)
+        positions[rows] = read_attribute(data, REST)[rows]
+        _write_own_positions(obj, positions)
+    context.view_layer.update()
+    if same:
+        write_displacement(obj, np.zeros((point_count(data), 3)), read_pose(obj), settled=True)
+
+
+def _write_own_positions(obj, positions):
+    obj.data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
+    tag_changed(obj.data)
+
+
+def delete_bake(obj):
+    """Let a baked object follow its handles again, and remove what was baked."""
+    modifier = find_deform(obj)
+    cache = get_input(modifier, "Cache")
+    show_live(modifier)
+    if cache is not None:
+        bpy.data.meshes.remove(cache.data)  # and the object that shows it
+
+
+CLASSES = (
+    MESHFREE_OT_handle_add,
+    MESHFREE_OT_deform_bind,
+    MESHFREE_OT_deform_update,
+    MESHFREE_OT_deform_apply,
+    MESHFREE_OT_deform_to_shape_key,
+    MESHFREE_OT_deform_reset,
+    MESHFREE_OT_deform_unbind,
+)

@@ -5,7 +5,8 @@ from bpy.props import EnumProperty
 
 from ..core import PointCloudError
 from .attributes import own_positions, tag_changed
-from .reading import is_display, key_positions, shape_keys
+from .modifiers import is_own
+from .reading import key_positions, shape_keys
 
 TARGETS = (
     ("SHAPE_KEY", "Shape Key", "Add a shape key, whose value mixes the result with the points as they were"),
@@ -25,7 +26,7 @@ def target_property():
 
 def check_movable(obj, target: str):
     """Refuse an object whose points cannot be moved to given places, before anything is computed."""
-    if obj.meshfree.use_modifiers and any(not is_display(item) for item in obj.modifiers):
+    if obj.meshfree.use_modifiers and any(not is_own(item) for item in obj.modifiers):
         raise PointCloudError(
             f'The points of "{obj.name}" were read after its modifiers, and cannot be written back before them. Turn'
             " off Use Modifiers, or apply the modifiers."

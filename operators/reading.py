@@ -12,9 +12,7 @@ from ..core import PointCloudError, check_points
 from ..core.rims import FEWEST
 from .attributes import own_positions, point_count
 from .groups import chosen_members, members
-
-DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
-
+from .modifiers import is_own
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 
@@ -22,11 +20,6 @@ TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 def shape_keys(obj):
     """Return the shape keys of an object, or None; point clouds have none."""
     return obj.data.shape_keys if obj.type == "MESH" else None
-
-
-def is_display(modifier) -> bool:
-    """Whether a modifier is the extension's own display."""
-    return modifier.type == "NODES" and modifier.node_group is not None and DISPLAY_TAG in modifier.node_group
 
 
 def obstacle(obj, modes=("OBJECT",)) -> str:
@@ -126,8 +119,8 @@ def key_positions(key):
 
 
 def _evaluated_positions(context, obj):
-    """Positions after shape keys, and after the modifiers if the settings ask for them; never after our own display."""
-    with _left_out([item for item in obj.modifiers if is_display(item) or not obj.meshfree.use_modifiers]):
+    """Positions after shape keys, and after the modifiers if the settings ask for them; never after our own."""
+    with _left_out([item for item in obj.modifiers if is_own(item) or not obj.meshfree.use_modifiers]):
         evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
         if not evaluated.is_evaluated:
             raise PointCloudError(
@@ -166,14 +159,15 @@ def metric(obj):
     return matrix.T @ matrix
 
 
-def fingerprint(obj, glance=False) -> str:
-    """Checksum of the positions, shape keys and rim group.
+def fingerprint(obj, glance=False, left_out=()) -> str:
+    """Checksum of the positions but those of some points, of shape keys and of the rim group.
 
     A glance is quick enough for a panel, a few milliseconds for 1 million points, and may see a change of the rim
     group some seconds late. Of modifiers, if they are used, both see which ones there are, not their settings.
     """
-    mesh = obj.data
-    checksum = zlib.crc32(own_positions(mesh))
+    positions = own_positions(obj.data)
+    positions[np.asarray(left_out, dtype=int)] = 0.0
+    checksum = zlib.crc32(positions)
     keys = shape_keys(obj)
     if keys is not None:
         state = [keys.use_relative, keys.eval_time, obj.show_only_shape_key and obj.active_shape_key_index]
@@ -182,7 +176,7 @@ def fingerprint(obj, glance=False) -> str:
             checksum = zlib.crc32(key_positions(block), checksum)
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.use_modifiers:
-        state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_display(item)]
+        state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_own(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.rim_group:
         checksum = zlib.crc32(repr(members(obj, obj.meshfree.rim_group, glance).checksum).encode(), checksum)

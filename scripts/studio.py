@@ -207,13 +207,13 @@ def show_shape(obj, normals="", like=None):
     An attribute of normals makes the shading smooth.
     """
     modifier = add_display(obj, CLOSED * part("operators.reading").spacing((like or obj).data))
-    part("ui.display").set_input(modifier, "Material", paint("Clay", CLAY, normals))
+    part("operators.modifiers").set_input(modifier, "Material", paint("Clay", CLAY, normals))
 
 
 def mark(points, color, radius):
     """Add points of one colour to the scene, (n, 3), such as the handles of a deformation."""
     obj = make_object(points, "Marks")
-    part("ui.display").set_input(add_display(obj, radius), "Material", paint("Mark", color))
+    part("operators.modifiers").set_input(add_display(obj, radius), "Material", paint("Mark", color))
     return obj
 
 
@@ -221,7 +221,7 @@ def add_display(obj, radius):
     """Make an object's vertices round points of this radius, and return the modifier."""
     modifier = part("ui.display").find_display(obj) or obj.modifiers.new("Points", "NODES")
     modifier.node_group = part("ui.nodes").display_group()
-    part("ui.display").set_input(modifier, "Radius", radius)
+    part("operators.modifiers").set_input(modifier, "Radius", radius)
     return modifier
 
 
@@ -302,21 +302,24 @@ def group(obj, chosen, role, name="", grown=0.0):
 
 
 def deform(obj, move, turn=(0.0, 0.0, 0.0)):
-    """Deform an object by its groups: move its controller by a way and turn it by angles, in the world."""
+    """Deform an object by its groups: move the empty of its handles by a way and turn it by angles, in the world."""
     activate(obj)
-    before = set(bpy.data.objects)
-    bpy.ops.meshfree.deform_bind(target="IN_PLACE")
-    (controller,) = set(bpy.data.objects) - before
-    controller.location += Vector(move)
-    controller.rotation_euler = turn
+    bpy.ops.meshfree.deform_bind()
+    empty = obj.meshfree.deform.handle_items[0].empty
+    place = empty.matrix_world.translation.copy()
+    turned = Euler(turn).to_matrix().to_4x4() @ Matrix.Translation(-place) @ empty.matrix_world
+    empty.matrix_world = Matrix.Translation(place + Vector(move)) @ turned
     bpy.ops.meshfree.deform_update()
 
 
 def deformed_row(rest, obj, path, view=VIEW, size=(960, 340)):
     """Render an object at rest and deformed, with its handles and anchors, and deformed with its displacement."""
-    colored = obj.copy()
-    colored.data = obj.data.copy()
-    bpy.context.scene.collection.objects.link(colored)
+    displacement = part("operators.attributes").read_attribute(obj.data, "lb_displacement")
+    activate(obj)
+    bpy.ops.meshfree.deform_apply()
+    bpy.ops.meshfree.deform_unbind()
+    colored = make_object(world_points(obj), "Colored")
+    part("operators.attributes").write_attribute(colored.data, "lb_displacement", displacement)
     colored.meshfree.coverage = 100.0
     show(colored, "lb_displacement")
     for shape in (rest, obj):

@@ -42,19 +42,6 @@ class MESHFREE_PT_fields(ReadyPanel, bpy.types.Panel):
         column.operator("meshfree.harmonic_field", text="Harmonic Field...")
 
 
-class MESHFREE_PT_deform(ReadyPanel, bpy.types.Panel):
-    """Deformation by handles"""
-
-    bl_label = "Deform"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context):
-        column = self.layout.column(align=True)
-        column.operator("meshfree.deform_bind", text="Bind...")
-        column.operator_context = "EXEC_DEFAULT"
-        column.operator("meshfree.deform_update")
-
-
 class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
     """Minimal surfaces"""
 
@@ -69,6 +56,5 @@ CLASSES = (
     MESHFREE_PT_shape,
     MESHFREE_PT_segment,
     MESHFREE_PT_fields,
-    MESHFREE_PT_deform,
     MESHFREE_PT_minimal,
 )

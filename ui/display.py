@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..operators.attributes import BOUNDARY, COMPONENT, DISPLACEMENT, DISTANCE, read_attribute
-from ..operators.reading import DISPLAY_TAG, is_display
+from ..operators.modifiers import DISPLAY_TAG, get_input, is_display
 from . import colormaps
 from .nodes import ATTRIBUTE, COLORS, RANGE
 
@@ -112,27 +112,3 @@ def label(name: str) -> str:
         return _TITLES[name]
     words = name.removeprefix("lb_").replace("eigenvector", "mode").split("_")
     return " ".join(word.lstrip("0").title() for word in words)
-
-
-def get_input(modifier, name: str):
-    """Value of an input of the display modifier."""
-    data, path = input_property(modifier, name)
-    return getattr(data, path) if path == "value" else modifier[path[2:-2]]
-
-
-def set_input(modifier, name: str, value):
-    """Set an input of the display modifier."""
-    data, path = input_property(modifier, name)
-    if path == "value":
-        data.value = value
-    else:
-        data[path[2:-2]] = value
-
-
-def input_property(modifier, name: str):
-    """Return data and property path of an input of the display modifier, as `layout.prop` takes them."""
-    sockets = modifier.node_group.interface.items_tree
-    identifier = next(item.identifier for item in sockets if item.name == name and item.in_out == "INPUT")
-    if hasattr(modifier, "properties"):  # Blender 5.2 on
-        return getattr(modifier.properties.inputs, identifier), "value"
-    return modifier, f'["{identifier}"]'

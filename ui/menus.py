@@ -9,7 +9,8 @@ _TOOLS = (
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
     ("geodesic_distance", "harmonic_field"),
-    ("deform_bind", "deform_update"),
+    ("deform_bind", "deform_update", "deform_reset", "deform_apply", "deform_to_shape_key", "deform_unbind"),
+    ("deform_bake", "deform_free"),
     ("minimal_surface",),
     ("stop",),
 )
@@ -39,6 +40,7 @@ class MESHFREE_MT_points(bpy.types.Menu):
             self.layout.operator(f"meshfree.{name}")
         self.layout.separator()
         self.layout.operator_menu_enum("meshfree.group_from_selection", "role")
+        self.layout.operator("meshfree.handle_add")
 
 
 def _draw_object(menu, context):

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..operators.reading import DISPLAY_TAG
+from ..operators.modifiers import DISPLAY_TAG, add_node, new_group
 from . import colormaps
 
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
@@ -18,17 +18,13 @@ def display_group():
     for group in bpy.data.node_groups:
         if DISPLAY_TAG in group and group.library is None:
             return group
-    group = bpy.data.node_groups.new("Mesh-Free Display", "GeometryNodeTree")
-    group[DISPLAY_TAG] = True
-    group.is_modifier = True
+    group = new_group("Mesh-Free Display", DISPLAY_TAG)
     new_socket = group.interface.new_socket
-    new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     radius = new_socket("Radius", in_out="INPUT", socket_type="NodeSocketFloat", description="Size of the points")
     radius.subtype = "DISTANCE"
     radius.default_value = 0.01
     radius.min_value = 0.0
     new_socket("Material", in_out="INPUT", socket_type="NodeSocketMaterial", description="Colors of the points")
-    new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
 
     given = add_node(group, "NodeGroupInput", 0, 0)
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
@@ -229,12 +225,3 @@ def new_tree(material):
         material.use_nodes = True
     material.node_tree.nodes.clear()
     return material.node_tree
-
-
-def add_node(tree, kind, column, y, **properties):
-    """Add a node at a place in the editor, with properties set."""
-    node = tree.nodes.new(kind)
-    node.location = (200 * column, y)
-    for name, value in properties.items():
-        setattr(node, name, value)
-    return node

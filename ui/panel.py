@@ -4,9 +4,11 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..operators.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
+from ..operators.binding import handled_object
 from ..operators.groups import search_group
 from ..operators.job import running
-from ..operators.reading import is_display, obstacle, sharing_objects
+from ..operators.modifiers import is_own
+from ..operators.reading import obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
 from .display import find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
@@ -51,6 +53,8 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         if job is not None:
             _draw_job(layout, job)
         reason = obstacle(obj)
+        if reason and handled_object(obj, context.scene) != obj:
+            return  # the panel of the deformation tells
         if reason:
             column = layout.column(align=True)
             for sentence in reason.split(". "):
@@ -104,7 +108,7 @@ def _draw_summary(layout, obj):
         shown = ", ".join(f"{factor:.4g}" for factor in scale)
         column.label(text=iface_("Object scale ({}) is applied").format(shown), icon="INFO")
         column.label(text="to lengths and areas", icon="BLANK1")
-    modifiers = [modifier for modifier in obj.modifiers if not is_display(modifier)]
+    modifiers = [modifier for modifier in obj.modifiers if not is_own(modifier)]
     if modifiers:
         text = "Modifiers used: {}" if obj.meshfree.use_modifiers else "Modifiers left out: {}"
         column.label(text=iface_(text).format(len(modifiers)), icon="MODIFIER")

@@ -13,7 +13,7 @@ from bpy.props import (
 )
 
 from ..operators.options import DEFAULTS
-from . import show
+from . import deform_settings, show
 
 COLOR_MAPS = (
     (
@@ -287,6 +287,10 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
 
+    deform: PointerProperty(
+        type=deform_settings.MESHFREE_PG_deform, name="Deform", description="How the object follows handles"
+    )
+
     # Results of the last analysis, for the panel and for scripts.
     total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
     point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
@@ -303,7 +307,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     settings_used: StringProperty(name="Settings Used", description="Settings of the last analysis")
 
 
-CLASSES = (MESHFREE_PG_stage, MESHFREE_PG_settings)
+CLASSES = (MESHFREE_PG_stage, *deform_settings.CLASSES, MESHFREE_PG_settings)
 
 
 def attach():

@@ -5,16 +5,15 @@ import math
 import bpy
 
 from ..operators.attributes import MEAN_CURVATURE, read_attribute
-from ..operators.reading import DISPLAY_TAG, fingerprint, spacing
+from ..operators.modifiers import DISPLAY_TAG, get_input, set_input
+from ..operators.reading import fingerprint, spacing
 from . import colormaps, legend
 from .display import (
     NAME,
     component,
     find_display,
     find_material,
-    get_input,
     numbers,
-    set_input,
     shown_attribute,
     without_unreached,
 )

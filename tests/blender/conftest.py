@@ -60,3 +60,9 @@ def extension(installed):
 def core(installed):
     """The installed extension's package of mathematics."""
     return importlib.import_module(f"{MODULE}.core")
+
+
+@pytest.fixture
+def modifiers(extension):
+    """The module that sets inputs of the extension's own modifiers."""
+    return importlib.import_module(f"{extension.__name__}.operators.modifiers")

@@ -1,15 +1,33 @@
-"""Deformation: bound once, updated for every move of a controller or of the handles themselves."""
+"""Deformation: bound once, the points follow their handles by themselves, in this file and when it is opened again."""
 
 import importlib
+import os
+import re
+import subprocess
+import sys
+import textwrap
 
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_group, add_object, attribute, everything, grid_points, local_points
+from tests.blender.test_panel import draw
 from tests.blender.test_smooth import key_points, shown_points
+
+HEIGHTS = (0.0, 0.5, 1.5, -1.0)  # of the animated handle at frames 1 to 4
+
+
+@pytest.fixture
+def live(extension):
+    """The module that lets bound objects follow."""
+    return importlib.import_module(f"{extension.__name__}.operators.live")
+
+
+@pytest.fixture
+def binding(extension):
+    return importlib.import_module(f"{extension.__name__}.operators.binding")
 
 
 @pytest.fixture
@@ -22,178 +40,703 @@ def strip():
     return obj
 
 
-def test_nothing_moves_without_a_move(strip):
-    before = local_points(strip)
+def bind(**settings):
+    """Bind the active object by these settings, and return the empty of its first handles, if there is one."""
+    deform = bpy.context.object.meshfree.deform
+    for name, value in settings.items():
+        setattr(deform, name, value)
     assert bpy.ops.meshfree.deform_bind() == {"FINISHED"}
-    assert bpy.ops.meshfree.deform_update() == {"FINISHED"}
-    assert_allclose(shown_points(strip), before, atol=1e-5)
-    assert attribute(strip, "lb_displacement").max() < 1e-5
+    return deform.handle_items[0].empty
 
 
-def test_the_controller_moves_the_handles(core, strip):
-    before = local_points(strip)
-    strip.location, strip.rotation_euler, strip.scale = (5.0, 1.0, 2.0), (0.4, 0.0, 0.3), (1.0, 1.0, 2.0)
-    bpy.ops.meshfree.deform_bind()
-    empty = bpy.data.objects["Cloud Handle"]
-    empty.location += strip.matrix_world.to_3x3() @ Matrix.Identity(3).col[2]
-    bpy.ops.meshfree.deform_update()
-    after = shown_points(strip)
-    handles, anchors = before[:, 0] > 5.65, before[:, 0] < 0.25
-    assert_allclose(after[handles] - before[handles], np.tile([0.0, 0.0, 1.0], (handles.sum(), 1)), atol=1e-4)
-    assert_allclose(after[anchors], before[anchors], atol=1e-5)
-    height = after[:, 2][np.argsort(before[:, 0], kind="stable")].reshape(60, 12).mean(axis=1)
-    assert (np.diff(height) > -1e-3).all()
-    assert attribute(strip, "lb_displacement")[handles] == pytest.approx(2.0, rel=0.01)  # in the world
-
-
-def test_the_same_as_core(core, strip):
-    bpy.ops.meshfree.deform_bind(controller=False, target="IN_PLACE")
-    before = local_points(strip)
-    handles, anchors = before[:, 0] > 5.65, before[:, 0] < 0.25
-    moved = before.copy()
-    moved[handles] += [-0.5, 0.0, 1.0]
-    strip.data.attributes["position"].data.foreach_set("vector", moved.astype(np.float32).reshape(-1))
-    bpy.ops.meshfree.deform_update()
-    laplacian = core.build_laplacian(before, options=core.LaplacianOptions(orient=True))
-    expected = core.Deformer(laplacian, np.flatnonzero(handles), np.flatnonzero(anchors)).solve(moved[handles])
-    assert_allclose(local_points(strip), expected, atol=1e-4)
-
-
-def test_updating_twice_is_updating_once(strip):
-    bpy.ops.meshfree.deform_bind()
-    bpy.data.objects["Cloud Handle"].location.z += 1.0
-    bpy.ops.meshfree.deform_update()
-    once = key_points(strip, "Deform")
-    bpy.ops.meshfree.deform_update()
-    assert_allclose(key_points(strip, "Deform"), once, atol=1e-6)
-    bpy.data.objects["Cloud Handle"].location.z -= 1.0
-    bpy.ops.meshfree.deform_update()
-    assert_allclose(key_points(strip, "Deform"), key_points(strip, "Basis"), atol=1e-5)
-
-
-def test_handles_moved_in_their_shape_key(strip):
-    bpy.ops.meshfree.deform_bind(controller=False)
-    points = key_points(strip, "Deform")
-    handles = points[:, 0] > 5.65
-    points[handles, 2] += 0.7
-    strip.data.shape_keys.key_blocks["Deform"].points.foreach_set("co", points.astype(np.float32).reshape(-1))
-    bpy.ops.meshfree.deform_update()
-    after = key_points(strip, "Deform")
-    assert_allclose(after[handles, 2], 0.7, atol=1e-5)
-    assert 0.0 < after[~handles, 2].max() < 0.75
-
-
-def test_soft_handles_give_way(strip):
-    bpy.ops.meshfree.deform_bind(soft=True, weight=0.01)
-    bpy.data.objects["Cloud Handle"].location.z += 1.0
-    bpy.ops.meshfree.deform_update()
-    heights = shown_points(strip)[local_points(strip)[:, 0] > 5.65, 2]
-    assert np.abs(heights - 1.0).max() > 1e-3
-
-
-@pytest.mark.parametrize(
-    ("group", "text"), [("Nowhere", 'no vertex group named "Nowhere"'), ("", "no Handles chosen.*Edit Mode")]
-)
-def test_binding_without_handles(strip, group, text):
-    before = everything(strip)
-    with pytest.raises(RuntimeError, match=text):
-        bpy.ops.meshfree.deform_bind(handles=group)
-    assert everything(strip) == before
-
-
-def test_points_in_both_groups(strip):
-    before = everything(strip)
-    with pytest.raises(RuntimeError, match="handles and anchors|both"):
-        bpy.ops.meshfree.deform_bind(anchors="Handle")
-    assert everything(strip) == before
-
-
-def test_updating_what_is_not_bound(strip):
-    before = everything(strip)
-    with pytest.raises(RuntimeError, match="not bound.*Bind it"):
-        bpy.ops.meshfree.deform_update()
-    assert everything(strip) == before
-
-
-def test_a_controller_that_was_deleted(strip):
-    bpy.ops.meshfree.deform_bind()
-    bpy.data.objects.remove(bpy.data.objects["Cloud Handle"])
-    before = everything(strip)
-    with pytest.raises(RuntimeError, match="is gone. Bind"):
-        bpy.ops.meshfree.deform_update()
-    assert everything(strip) == before
-
-
-def test_the_value_of_the_key_does_not_count_for_handles_moved_in_it(strip):
-    bpy.ops.meshfree.deform_bind(controller=False)
-    key = strip.data.shape_keys.key_blocks["Deform"]
-    points = key_points(strip, "Deform")
-    handles = points[:, 0] > 5.65
-    points[handles, 2] += 0.7
-    key.points.foreach_set("co", points.astype(np.float32).reshape(-1))
-    key.value = 0.5
-    other = strip.shape_key_add(name="Other", from_mix=False)
-    other.points.foreach_set("co", (2.0 * local_points(strip)).astype(np.float32).reshape(-1))
-    other.value = 1.0
-    for _ in range(2):
-        bpy.ops.meshfree.deform_update()
-        assert_allclose(key_points(strip, "Deform")[handles], points[handles], atol=1e-5)
-
-
-@pytest.mark.parametrize("target", ["SHAPE_KEY", "IN_PLACE"])
-@pytest.mark.parametrize("controller", [True, False])
-def test_an_object_that_is_scaled_and_moved_after_binding(strip, target, controller):
-    bpy.ops.meshfree.deform_bind(controller=controller, target=target)
-    before = local_points(strip)
-    strip.scale, strip.location = (-1.0, 2.0, 0.5), (3.0, 0.0, 0.0)
-    if controller:
-        empty = bpy.data.objects["Cloud Handle"]
-        empty.matrix_world = Matrix.LocRotScale(strip.location, None, strip.scale) @ empty.matrix_world
-    bpy.ops.meshfree.deform_update()
-    assert_allclose(shown_points(strip), before, atol=1e-5)
-
-
-def test_new_names_and_undo_do_not_loosen_the_controller(strip):
-    bpy.ops.meshfree.deform_bind()
-    bpy.data.objects["Cloud Handle"].name = "Lever"
-    strip.name = "Strip"
-    bpy.ops.ed.undo_push(message="Renamed")
-    bpy.data.objects["Lever"].location.z += 1.0
-    bpy.ops.meshfree.deform_update("EXEC_DEFAULT", True)
-    bpy.ops.ed.undo()
-    bpy.data.objects["Lever"].location.z += 0.5
-    bpy.ops.meshfree.deform_update()
-    strip = bpy.data.objects["Strip"]
-    handles = local_points(strip)[:, 0] > 5.65
-    assert_allclose(key_points(strip, "Deform")[handles, 2], 0.5, atol=1e-5)
-
-
-def test_bindings_end_with_their_object_and_with_the_file(extension, strip):
-    deform = importlib.import_module(f"{extension.__name__}.operators.deform")
-    bpy.ops.meshfree.deform_bind()
-    other = add_object(local_points(strip), "Other")
-    add_group(other, "Handle", range(20))
-    bpy.data.objects.remove(strip)
-    bpy.ops.meshfree.deform_bind()
-    assert list(deform._bindings) == [other.session_uid]
-    bpy.ops.wm.read_homefile(use_empty=True)
-    assert not deform._bindings
-
-
-def test_an_object_scaled_to_nothing(strip):
-    bpy.ops.meshfree.deform_bind()
-    strip.scale.x = 0.0
+def lift(empty, height):
+    """Move an empty up and let Blender see it, as a drag does."""
+    empty.location.z += height
     bpy.context.view_layer.update()
-    before = everything(strip)
-    with pytest.raises(RuntimeError, match="scaled to nothing along an axis"):
-        bpy.ops.meshfree.deform_update()
-    assert everything(strip) == before
 
 
-def test_shape_keys_that_came_after_binding_in_place(strip):
-    bpy.ops.meshfree.deform_bind(target="IN_PLACE")
-    strip.shape_key_add(name="Basis")
-    before = everything(strip)
-    with pytest.raises(RuntimeError, match="has shape keys"):
+def animate(empty):
+    """Let an empty go up and down by `HEIGHTS`."""
+    start = empty.location.z
+    for frame, height in enumerate(HEIGHTS, start=1):
+        empty.location.z = start + height
+        empty.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, len(HEIGHTS)
+
+
+def move_points(obj, chosen, shift):
+    """Move points of the data themselves, as Edit Mode does."""
+    points = local_points(obj)
+    points[chosen] += shift
+    obj.data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).reshape(-1))
+    obj.data.update()
+    bpy.context.view_layer.update()
+
+
+def displacement(obj):
+    return attribute(obj, "lb_displacement")
+
+
+def is_end(points):
+    return points[:, 0] > 5.65
+
+
+class TestFollowing:
+    """The points go where the handles take them."""
+
+    def test_nothing_moves_without_a_move(self, strip):
+        before = local_points(strip)
+        bind()
+        assert bpy.ops.meshfree.deform_update() == {"FINISHED"}
+        assert_allclose(shown_points(strip), before, atol=1e-6)
+        assert not displacement(strip).any()
+
+    def test_an_empty_that_is_moved(self, strip):
+        before = local_points(strip)
+        strip.location, strip.rotation_euler, strip.scale = (5.0, 1.0, 2.0), (0.4, 0.0, 0.3), (1.0, 1.0, 2.0)
+        lift(bind(), 1.0)
+        after = shown_points(strip)
+        handles, anchors = is_end(before), before[:, 0] < 0.25
+        assert_allclose(after[handles] - before[handles], np.tile([0.0, 0.0, 1.0], (handles.sum(), 1)), atol=1e-4)
+        assert_allclose(after[anchors], before[anchors], atol=1e-5)
+        height = after[:, 2][np.argsort(before[:, 0], kind="stable")].reshape(60, 12).mean(axis=1)
+        assert (np.diff(height) > -1e-3).all()
+        assert_allclose(attribute(strip, "position"), before, atol=1e-6)  # the points at rest are kept
+        assert_allclose(attribute(strip, "lb_rest"), before, atol=1e-6)
+
+    def test_the_same_as_core(self, core, strip):
+        before = local_points(strip)
+        lift(bind(), 0.7)
+        handles, anchors = is_end(before), before[:, 0] < 0.25
+        laplacian = core.build_laplacian(before, options=core.LaplacianOptions(orient=True))
+        deformer = core.Deformer(laplacian, np.flatnonzero(handles), np.flatnonzero(anchors))
+        assert_allclose(shown_points(strip), deformer.solve(before[handles] + (0.0, 0.0, 0.7)), atol=1e-4)
+
+    def test_several_handles_each_with_its_empty(self, strip):
+        before = local_points(strip)
+        middle = np.abs(before[:, 0] - 3.0) < 0.25
+        add_group(strip, "Handle.001", middle)
+        bind()
+        empties = {item.name: item.empty for item in strip.meshfree.deform.handle_items}
+        assert empties["Handle.001"].location.x == pytest.approx(before[middle, 0].mean(), abs=1e-4)
+        lift(empties["Handle.001"], 0.4)
+        lift(empties["Handle"], -0.2)
+        assert_allclose(displacement(strip)[middle], np.tile([0.0, 0.0, 0.4], (middle.sum(), 1)), atol=1e-5)
+        assert_allclose(displacement(strip)[is_end(before), 2], -0.2, atol=1e-5)
+
+    def test_handles_without_empties_are_moved_themselves(self, strip):
+        before = local_points(strip)
+        assert bind(add_empties=False) is None
+        move_points(strip, is_end(before), (-0.5, 0.0, 1.0))
+        shown = shown_points(strip)
+        assert_allclose(shown[is_end(before)], before[is_end(before)] + (-0.5, 0.0, 1.0), atol=1e-5)
+        assert 0.1 < shown[np.abs(before[:, 0] - 4.0) < 0.1, 2].mean() < 1.0
+        assert_allclose(attribute(strip, "lb_rest"), before, atol=1e-6)
+
+    def test_handles_that_are_moved_in_edit_mode(self, strip):
+        before = local_points(strip)
+        bind(add_empties=False)
+        strip.data.vertices.foreach_set("select", is_end(before))
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.transform.translate(value=(0.0, 0.0, 0.8))
+        bpy.context.view_layer.update()
+        bpy.ops.object.mode_set(mode="OBJECT")
+        moved = displacement(strip)  # written while the mesh was edited
+        assert_allclose(moved[is_end(before)], np.tile([0.0, 0.0, 0.8], (is_end(before).sum(), 1)), atol=1e-5)
+        assert 0.1 < moved[np.abs(before[:, 0] - 4.0) < 0.1, 2].mean() < 0.8
+        bpy.context.view_layer.update()
+        assert_allclose(shown_points(strip), before + moved, atol=1e-5)
+
+    def test_every_way_to_the_same_place(self, strip):
+        empty = bind()
+        lift(empty, 1.0)
+        once = shown_points(strip)
+        for height in (1.0, -3.0, 2.0):
+            lift(empty, height)
+        assert_allclose(shown_points(strip), once, atol=1e-5)
+        lift(empty, -1.0)
+        assert_allclose(shown_points(strip), local_points(strip), atol=1e-6)
+
+    def test_a_quick_update_is_settled_later(self, strip, live, binding):
+        empty = bind()
+        lift(empty, 1.0)
+        settled = displacement(strip)
+        empty.location.z -= 1.0
+        bpy.context.view_layer.update()
+        empty.location.z += 1.0
+        handlers = bpy.app.handlers.depsgraph_update_post
+        place = [function.__module__ for function in handlers].index(live.__name__)
+        following = handlers.pop(place)
+        try:
+            bpy.context.view_layer.update()
+            live.update(strip, bpy.context.evaluated_depsgraph_get(), quick=True)
+            assert not binding.written_pose(strip)[1]
+            assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-5)
+            live.update(strip, bpy.context.evaluated_depsgraph_get())
+        finally:
+            handlers.insert(place, following)
+        assert binding.written_pose(strip)[1]
+        assert_allclose(displacement(strip), settled, atol=1e-5)
+
+    def test_soft_handles_give_way(self, strip):
+        lift(bind(soft=True, weight=0.01), 1.0)
+        assert np.abs(displacement(strip)[is_end(local_points(strip)), 2] - 1.0).max() > 1e-3
+
+    def test_settings_take_effect_without_binding_again(self, strip):
+        lift(bind(), 2.0)
+        turned = displacement(strip)
+        strip.meshfree.deform.rotation_aware = False
         bpy.ops.meshfree.deform_update()
-    assert everything(strip) == before
+        straight = displacement(strip)
+        assert np.abs(straight - turned).max() > 0.01
+        strip.meshfree.deform.rotation_aware = True
+        bpy.ops.meshfree.deform_update()
+        assert_allclose(displacement(strip), turned, atol=1e-5)
+
+    def test_strength(self, modifiers, strip):
+        before = local_points(strip)
+        lift(bind(), 1.0)
+        full = shown_points(strip)
+        modifiers.set_input(strip.modifiers["Mesh-Free Deform"], "Strength", 0.5)
+        strip.update_tag()
+        bpy.context.view_layer.update()
+        assert_allclose(shown_points(strip), 0.5 * (before + full), atol=1e-5)
+
+    def test_an_object_that_is_moved_takes_its_handles_along(self, strip):
+        lift(bind(), 1.0)
+        moved = displacement(strip)
+        strip.scale, strip.location = (-1.0, 2.0, 0.5), (3.0, 0.0, 0.0)
+        bpy.context.view_layer.update()
+        assert_allclose(displacement(strip), moved, atol=1e-5)
+
+    def test_the_display_comes_after_it_and_shows_lengths(self, extension, strip):
+        display = importlib.import_module(f"{extension.__name__}.ui.display")
+        lift(bind(), 1.0)
+        bpy.ops.meshfree.colormap(attribute="lb_displacement")
+        assert [item.name for item in strip.modifiers] == ["Mesh-Free Deform", "Mesh-Free Display"]
+        assert display.range_node(strip).inputs["From Max"].default_value == pytest.approx(1.0, abs=0.1)
+
+    def test_results_are_those_of_the_points_at_rest(self, strip):
+        bpy.ops.meshfree.analyze(show=False)
+        areas = attribute(strip, "lb_area")
+        lift(bind(), 1.0)
+        bpy.ops.meshfree.analyze(show=False)
+        assert_allclose(attribute(strip, "lb_area"), areas, rtol=1e-5)
+
+
+class TestFrames:
+    """What an animation shows does not depend on the way there."""
+
+    def heights(self, obj, frames):
+        """Heights of the points at some frames, in that order."""
+        found = {}
+        for frame in frames:
+            bpy.context.scene.frame_set(frame)
+            found[frame] = shown_points(obj)[:, 2]
+        return [found[frame] for frame in sorted(found)]
+
+    def test_frames_in_any_order(self, strip):
+        animate(bind())
+        ends = is_end(local_points(strip))
+        forward = self.heights(strip, (1, 2, 3, 4))
+        assert_allclose([height[ends].mean() for height in forward], HEIGHTS, atol=1e-4)
+        assert_allclose(self.heights(strip, (3, 1, 4, 2)), forward, atol=1e-5)
+
+    def test_lock_interface_is_set(self, strip):
+        assert not bpy.context.scene.render.use_lock_interface
+        bind()
+        assert bpy.context.scene.render.use_lock_interface
+
+    def another_process(self, tmp_path, enabled, installed, code):
+        """Open the file in another Blender, with the extension or without it, and run some lines there."""
+        script = textwrap.dedent(f"""
+            import sys
+            import bpy, numpy as np
+            if {enabled}:
+                bpy.ops.preferences.addon_enable(module="bl_ext.user_default.meshfree_laplacian")
+            bpy.ops.wm.open_mainfile(filepath={str(tmp_path / "strip.blend")!r})
+            obj = bpy.data.objects["Cloud"]
+            def shown():
+                mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+                points = np.empty((len(mesh.vertices), 3), np.float32)
+                mesh.vertices.foreach_get("co", points.reshape(-1))
+                return points
+            points = []
+        """)
+        script += textwrap.dedent(code)
+        script += f"\nnp.save({str(tmp_path / 'shown.npy')!r}, points)\n"
+        script += "import addon_utils\n"
+        script += f"if {enabled}: bpy.ops.preferences.addon_disable(module='bl_ext.user_default.meshfree_laplacian')\n"
+        folder = installed if enabled else tmp_path / "nobody"
+        environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder)}
+        command = [sys.executable, "-c", script]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240)
+        assert done.returncode == 0, done.stderr
+        return np.load(tmp_path / "shown.npy")
+
+    FRAMES = """
+        for frame in (3, 1, 2, 4):
+            bpy.context.scene.frame_set(frame)
+            points.append(shown())
+        points = [points[i] for i in (1, 2, 0, 3)]
+    """
+    RENDERED = """
+        scene = bpy.context.scene
+        scene.render.resolution_x = scene.render.resolution_y = 8
+        scene.render.filepath = bpy.app.tempdir
+        seen = {}
+        def look(scene, depsgraph):
+            other = obj.evaluated_get(depsgraph).data
+            found = np.empty((len(other.vertices), 3), np.float32)
+            other.vertices.foreach_get("co", found.reshape(-1))
+            seen[scene.frame_current] = found
+        class Engine(bpy.types.RenderEngine):
+            bl_idname, bl_label = "LOOK", "Look"
+            def update(self, data, depsgraph):
+                look(depsgraph.scene, depsgraph)
+            def render(self, depsgraph):
+                pass
+        bpy.utils.register_class(Engine)
+        scene.render.engine = "LOOK"
+        scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+        scene.collection.objects.link(scene.camera)
+        bpy.ops.render.render(animation=True)
+        bpy.utils.unregister_class(Engine)
+        points = [seen[frame] for frame in (1, 2, 3, 4)]
+    """
+
+    @pytest.fixture
+    def saved(self, strip, tmp_path):
+        """Save the animated strip at its last frame, and return what is seen at each."""
+        animate(bind())
+        frames = []
+        for frame in (1, 2, 3, 4):
+            bpy.context.scene.frame_set(frame)
+            frames.append(shown_points(strip))
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "strip.blend"))
+        return np.array(frames)
+
+    @pytest.mark.parametrize("code", [FRAMES, RENDERED], ids=["frames", "render"])
+    def test_an_opened_file_binds_by_itself(self, saved, tmp_path, installed, code):
+        assert_allclose(self.another_process(tmp_path, True, installed, code), saved, atol=2e-5)
+
+    def test_a_file_without_the_extension_shows_the_last_state(self, saved, tmp_path, installed):
+        shown = self.another_process(tmp_path, False, installed, "points = [shown()]")
+        assert_allclose(shown[0], saved[-1], atol=1e-5)
+
+    def test_a_bake_plays_without_the_extension(self, saved, tmp_path, installed):
+        assert bpy.ops.meshfree.deform_bake() == {"FINISHED"}
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "strip.blend"))
+        shown = self.another_process(tmp_path, False, installed, self.FRAMES)
+        assert_allclose(shown, saved, atol=1e-5)
+
+
+class TestBake:
+    """The animation in the file."""
+
+    def test_between_and_beyond_its_frames(self, strip):
+        animate(bind())
+        assert bpy.ops.meshfree.deform_bake(first=2, last=4) == {"FINISHED"}
+        ends = is_end(local_points(strip))
+        found = {}
+        for frame, subframe in ((1, 0.0), (2, 0.0), (2, 0.5), (3, 0.0), (4, 0.0), (9, 0.0)):
+            bpy.context.scene.frame_set(frame, subframe=subframe)
+            found[frame + subframe] = shown_points(strip)[ends, 2].mean()
+        expected = {1: 0.5, 2: 0.5, 2.5: 1.0, 3: 1.5, 4: -1.0, 9: -1.0}
+        assert found == pytest.approx(expected, abs=1e-4)
+
+    def test_the_frame_on_show_and_the_handles_stay(self, strip):
+        empty = bind()
+        animate(empty)
+        bpy.context.scene.frame_set(3)
+        bpy.ops.meshfree.deform_bake()
+        assert bpy.context.scene.frame_current == 3
+        assert shown_points(strip)[:, 2].max() == pytest.approx(1.5, abs=0.01)
+
+    def test_delete_bake(self, strip):
+        empty = bind()
+        bpy.ops.meshfree.deform_bake(first=1, last=2)
+        with pytest.raises(RuntimeError, match="baked. Delete the bake"):
+            bpy.ops.meshfree.deform_update()
+        lift(empty, 1.0)
+        assert shown_points(strip)[:, 2].max() < 1e-6
+        blocks = len(bpy.data.objects), len(bpy.data.meshes)
+        assert bpy.ops.meshfree.deform_free() == {"FINISHED"}
+        assert (len(bpy.data.objects), len(bpy.data.meshes)) == (blocks[0] - 1, blocks[1] - 1)
+        assert shown_points(strip)[is_end(local_points(strip)), 2] == pytest.approx(1.0, abs=1e-4)
+
+    def test_frames_in_the_wrong_order(self, strip):
+        bind()
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match="The last frame, 2, comes before the first one, 5"):
+            bpy.ops.meshfree.deform_bake(first=5, last=2)
+        assert everything(strip) == before
+
+
+class TestTakingOver:
+    """Apply, To Shape Key, Reset and Unbind."""
+
+    def test_apply(self, strip):
+        empty = bind()
+        lift(empty, 1.0)
+        seen = shown_points(strip)
+        assert bpy.ops.meshfree.deform_apply() == {"FINISHED"}
+        assert_allclose(local_points(strip), seen, atol=1e-6)
+        assert_allclose(attribute(strip, "lb_rest"), seen, atol=1e-6)
+        bpy.context.view_layer.update()
+        assert_allclose(shown_points(strip), seen, atol=1e-6)
+        lift(empty, 0.5)  # from there on
+        assert_allclose(displacement(strip)[is_end(seen), 2], 0.5, atol=1e-4)
+
+    def test_apply_of_handles_moved_themselves(self, strip):
+        ends = is_end(local_points(strip))
+        bind(add_empties=False)
+        move_points(strip, ends, (0.0, 0.0, 1.0))
+        seen = shown_points(strip)
+        bpy.ops.meshfree.deform_apply()
+        assert_allclose(local_points(strip), seen, atol=1e-6)
+        assert not displacement(strip).any()
+
+    def test_to_shape_key(self, strip, binding):
+        before = local_points(strip)
+        empty = bind()
+        lift(empty, 1.0)
+        seen = shown_points(strip)
+        assert bpy.ops.meshfree.deform_to_shape_key() == {"FINISHED"}
+        assert_allclose(key_points(strip, "Deform"), seen, atol=1e-6)
+        assert empty.location.z == pytest.approx(0.0, abs=1e-6)
+        assert_allclose(shown_points(strip), before, atol=1e-6)
+        assert binding.stale_reason(strip) == ""
+        lift(empty, -0.5)
+        assert_allclose(displacement(strip)[is_end(before), 2], -0.5, atol=1e-5)
+        bpy.ops.meshfree.deform_to_shape_key()
+        assert [key.name for key in strip.data.shape_keys.key_blocks] == ["Basis", "Deform", "Deform.001"]
+        strip.data.shape_keys.key_blocks["Deform"].value = 1.0
+        bpy.context.view_layer.update()
+        assert_allclose(shown_points(strip), seen, atol=1e-5)
+
+    def test_a_shape_key_of_handles_moved_themselves(self, strip):
+        bind(add_empties=False)
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match="Add Empties"):
+            bpy.ops.meshfree.deform_to_shape_key()
+        assert everything(strip) == before
+
+    @pytest.mark.parametrize("add_empties", [True, False])
+    def test_reset(self, strip, add_empties):
+        before = local_points(strip)
+        empty = bind(add_empties=add_empties)
+        if add_empties:
+            empty.rotation_euler.x = 0.3
+            lift(empty, 1.0)
+        else:
+            move_points(strip, is_end(before), (0.0, 0.0, 1.0))
+        assert displacement(strip).max() > 0.5
+        assert bpy.ops.meshfree.deform_reset() == {"FINISHED"}
+        bpy.context.view_layer.update()
+        assert_allclose(shown_points(strip), before, atol=1e-6)
+        assert_allclose(local_points(strip), before, atol=1e-6)
+        assert not displacement(strip).any()
+        if add_empties:
+            assert tuple(empty.rotation_euler) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+
+    def test_unbind(self, strip):
+        before = everything(strip)
+        lift(bind(), 1.0)
+        assert bpy.ops.meshfree.deform_unbind() == {"FINISHED"}
+        after = everything(strip)
+        assert after["blocks"].pop("node_groups") == before["blocks"].pop("node_groups") + 1
+        assert after == before
+
+
+class TestHolding:
+    """Whether the binding holds, and why not."""
+
+    def test_it_holds(self, strip, binding):
+        lift(bind(), 1.0)
+        assert binding.stale_reason(strip) == ""
+
+    @pytest.mark.parametrize(
+        ("change", "text"),
+        [
+            (lambda obj: move_points(obj, 100, (0.0, 0.0, 0.01)), "points at rest were moved"),
+            (lambda obj: obj.data.vertices.add(3), "had 720 points and has 723 now"),
+            (lambda obj: obj.vertex_groups["Handle"].remove([719]), "groups of handles or anchors changed"),
+            (lambda obj: add_group(obj, "Handle.001", [330]), "groups of handles or anchors changed"),
+            (lambda obj: setattr(obj.meshfree, "neighbors", 40), "Settings changed"),
+            (lambda obj: bpy.data.objects.remove(bpy.data.objects["Cloud Handle"]), "empty of Handle was deleted"),
+            (lambda obj: obj.modifiers.clear(), "modifier.*was removed"),
+            (lambda obj: obj.data.attributes.remove(obj.data.attributes["lb_rest"]), "attributes.*were removed"),
+        ],
+    )
+    def test_what_lets_go(self, strip, binding, change, text):
+        empty = bind()
+        lift(empty, 0.5)
+        change(strip)
+        bpy.context.view_layer.update()
+        assert re.search(text, binding.stale_reason(strip))
+        kept = None if "lb_displacement" not in strip.data.attributes else displacement(strip)[:720]
+        if "Cloud Handle" in bpy.data.objects:
+            lift(bpy.data.objects["Cloud Handle"], 0.5)  # nothing follows
+            assert_allclose(displacement(strip)[:720], kept)
+        with pytest.raises(RuntimeError, match=f"(?s)not up to date.*{text}"):
+            bpy.ops.meshfree.deform_update()
+        assert bpy.ops.meshfree.deform_bind() == {"FINISHED"}
+        assert binding.stale_reason(strip) == ""
+
+    def test_binding_again_keeps_the_pose(self, strip):
+        empty = bind()
+        lift(empty, 1.0)
+        assert bind() == empty
+        assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-5)
+        assert len([obj for obj in bpy.data.objects if obj.type == "EMPTY"]) == 1
+
+    def test_a_copy_that_shares_the_mesh(self, strip, binding):
+        bind()
+        other = strip.copy()
+        bpy.context.scene.collection.objects.link(other)
+        assert "shares its mesh" in binding.stale_reason(strip)
+        other.data = other.data.copy()
+        assert binding.stale_reason(strip) == ""
+
+    def test_an_object_scaled_to_nothing_is_left_alone(self, strip, live):
+        bind()
+        strip.scale.x = 0.0
+        bpy.context.view_layer.update()
+        assert "scaled to nothing along an axis" in live.trouble(strip)
+        with pytest.raises(RuntimeError, match="scaled to nothing along an axis"):
+            bpy.ops.meshfree.deform_update()
+        strip.scale.x = 1.0
+        bpy.ops.meshfree.deform_update()
+        assert live.trouble(strip) == ""
+
+    def test_new_names_do_not_matter(self, strip):
+        empty = bind()
+        empty.name, strip.name = "Lever", "Strip"
+        lift(empty, 1.0)
+        assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-5)
+
+
+class TestUndo:
+    """Undo and redo give a state that holds."""
+
+    def test_a_move(self, strip, binding):
+        bind()
+        bpy.ops.ed.undo_push(message="Bound")
+        lift(bpy.data.objects["Cloud Handle"], 1.0)
+        bpy.ops.ed.undo_push(message="Moved")
+        lift(bpy.data.objects["Cloud Handle"], 1.0)
+        bpy.ops.ed.undo_push(message="Moved again")
+        for step, height in ((bpy.ops.ed.undo, 1.0), (bpy.ops.ed.undo, 0.0), (bpy.ops.ed.redo, 1.0)):
+            step()
+            strip = bpy.data.objects["Cloud"]
+            assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], height, atol=1e-5)
+            assert binding.stale_reason(strip) == ""
+
+    def test_binding(self, strip):
+        bpy.ops.ed.undo_push(message="Before")
+        bpy.ops.meshfree.deform_bind("EXEC_DEFAULT", True)
+        bpy.ops.ed.undo()
+        strip = bpy.data.objects["Cloud"]
+        assert not strip.meshfree.deform.is_bound
+        assert not strip.modifiers
+        bpy.ops.ed.redo()
+        strip = bpy.data.objects["Cloud"]
+        lift(bpy.data.objects["Cloud Handle"], 1.0)
+        assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-5)
+
+    def test_applying(self, strip):
+        lift(bind(), 1.0)
+        bpy.ops.ed.undo_push(message="Moved")
+        seen = shown_points(strip)
+        bpy.ops.meshfree.deform_apply("EXEC_DEFAULT", True)
+        bpy.ops.ed.undo()
+        strip = bpy.data.objects["Cloud"]
+        bpy.context.view_layer.update()
+        assert_allclose(shown_points(strip), seen, atol=1e-5)
+        assert displacement(strip).max() > 0.5
+
+
+class TestMemory:
+    """What is kept ends with what it is for."""
+
+    def test_factors_end_with_their_binding_and_with_the_file(self, strip, live):
+        bind()
+        bind()
+        assert len(live._lives) == 1
+        bpy.ops.wm.read_homefile(use_empty=True)
+        assert not live._lives
+
+    def test_switching_off_leaves_no_handler(self, extension, strip):
+        name = extension.__name__
+        bind()
+
+        def handlers():
+            lists = [getattr(bpy.app.handlers, event) for event in dir(bpy.app.handlers)]
+            return [item for each in lists if isinstance(each, list) for item in each if name in item.__module__]
+
+        count = len(handlers())
+        assert count >= 7
+        bpy.ops.preferences.addon_disable(module=name)
+        try:
+            assert not handlers()
+        finally:
+            bpy.ops.preferences.addon_enable(module=name)
+        assert len(handlers()) == count
+
+
+class TestBadInput:
+    """What cannot be bound stays as it is."""
+
+    @pytest.mark.parametrize(
+        ("group", "text"), [("Nowhere", 'no vertex group named "Nowhere"'), ("", "no Handles chosen.*Edit Mode")]
+    )
+    def test_without_handles(self, strip, group, text):
+        strip.meshfree.deform.handles = group
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match=text):
+            bpy.ops.meshfree.deform_bind()
+        assert everything(strip) == before
+
+    def test_points_in_both_groups(self, strip):
+        strip.meshfree.deform.anchors = "Handle"
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match="handles and anchors|both"):
+            bpy.ops.meshfree.deform_bind()
+        assert everything(strip) == before
+
+    def test_points_in_two_handles(self, strip):
+        add_group(strip, "Handle.001", [719, 718])
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match="2 points.*more than one of the groups Handle, Handle.001"):
+            bpy.ops.meshfree.deform_bind()
+        assert everything(strip) == before
+
+    def test_handles_without_empties_on_shape_keys(self, strip):
+        strip.shape_key_add(name="Basis")
+        strip.meshfree.deform.add_empties = False
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match="36 handles.*Turn on Add Empties"):
+            bpy.ops.meshfree.deform_bind()
+        assert everything(strip) == before
+
+    @pytest.mark.parametrize("name", ["update", "apply", "reset", "to_shape_key", "unbind", "bake", "free"])
+    def test_what_is_not_bound(self, strip, name):
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match="not bound.*Bind it"):
+            getattr(bpy.ops.meshfree, f"deform_{name}")()
+        assert everything(strip) == before
+
+
+class TestAddHandle:
+    """A group of its own for the selected points."""
+
+    @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+    def test_numbered_groups(self, strip, mode):
+        strip.data.vertices.foreach_set("select", np.arange(720) % 60 == 30)
+        bpy.ops.object.mode_set(mode=mode)
+        assert bpy.ops.meshfree.handle_add() == {"FINISHED"}
+        assert bpy.context.object.mode == mode
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert list(strip.vertex_groups.keys()) == ["Anchor", "Handle", "Handle.001"]
+        bind()
+        assert [item.name for item in strip.meshfree.deform.handle_items] == ["Handle", "Handle.001"]
+
+    def test_a_point_has_one_handle(self, strip):
+        strip.data.vertices.foreach_set("select", np.arange(720) % 60 == 59)
+        bpy.ops.meshfree.handle_add()
+        held = [[item.group for item in strip.data.vertices[index].groups] for index in (719, 718)]
+        assert held == [[2], [1]]
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="needs a conversion to Point Cloud")
+class TestPointCloud:
+    """The same for Point Cloud objects, whose groups are attributes."""
+
+    @pytest.fixture
+    def cloud(self, strip):
+        groups = {group.name: strip.vertex_groups[group.name] for group in strip.vertex_groups}
+        chosen = {
+            name: [any(item.group == group.index for item in vertex.groups) for vertex in strip.data.vertices]
+            for name, group in groups.items()
+        }
+        strip.vertex_groups.clear()
+        strip.select_set(True)
+        bpy.ops.object.convert(target="POINTCLOUD")
+        obj = bpy.context.object
+        assert obj.type == "POINTCLOUD"
+        for name, members in chosen.items():
+            layer = obj.data.attributes.get(name)
+            if layer is not None:
+                obj.data.attributes.remove(layer)
+            obj.data.attributes.new(name, "BOOLEAN", "POINT").data.foreach_set("value", members)
+        return obj
+
+    def shown(self, obj):
+        data = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        points = np.empty((len(data.points), 3), np.float32)
+        data.attributes["position"].data.foreach_get("vector", points.reshape(-1))
+        return points
+
+    def test_following_and_taking_over(self, cloud):
+        before = local_points(cloud)
+        lift(bind(), 1.0)
+        shown = self.shown(cloud)
+        assert_allclose(shown[is_end(before), 2], 1.0, atol=1e-5)
+        assert 0.1 < shown[np.abs(before[:, 0] - 4.0) < 0.1, 2].mean() < 1.0
+        bpy.ops.meshfree.deform_apply()
+        assert_allclose(local_points(cloud), shown, atol=1e-6)
+
+    def test_bake(self, cloud):
+        animate(bind())
+        bpy.ops.meshfree.deform_bake()
+        ends = is_end(local_points(cloud))
+        for frame, height in enumerate(HEIGHTS, start=1):
+            bpy.context.scene.frame_set(frame)
+            assert_allclose(self.shown(cloud)[ends, 2], height, atol=1e-4)
+
+    def test_no_shape_keys(self, cloud):
+        bind()
+        with pytest.raises(RuntimeError, match="no shape keys"):
+            bpy.ops.meshfree.deform_to_shape_key()
+
+
+class TestPanel:
+    """What the panel says, for the object and for its empties."""
+
+    def texts(self):
+        return " ".join(draw())
+
+    def test_before_binding(self, strip):
+        assert "Bind" in draw()
+        assert "Bind Again" not in draw()
+
+    def test_while_it_holds_and_when_it_does_not(self, strip):
+        empty = bind()
+        assert "Bound: follows its handles" in draw()
+        assert "Strength" in draw()
+        bpy.context.view_layer.objects.active = empty
+        assert "Bound: follows its handles" in draw()
+        assert "Moves handles of Cloud" in draw()
+        assert "not a Mesh" not in self.texts()
+        move_points(strip, 100, 1.0)
+        assert "Not up to date. The points at rest were moved. Bind again" in self.texts()
+
+    def test_lock_interface_is_asked_for(self, strip):
+        bind()
+        assert "use_lock_interface" not in draw()
+        bpy.context.scene.render.use_lock_interface = False
+        assert "use_lock_interface" in draw()
+
+    def test_baked(self, strip):
+        bind()
+        assert "Bake" in draw()
+        bpy.ops.meshfree.deform_bake(first=1, last=2)
+        assert "Delete Bake" in draw()
+        assert "Baked." in self.texts()
+
+    def test_in_edit_mode(self, strip):
+        bind(add_empties=False)
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert "Bound: follows its handles" in draw()
+        bpy.ops.object.mode_set(mode="OBJECT")

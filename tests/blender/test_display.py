@@ -80,9 +80,9 @@ def test_points_of_faces_stay_a_surface():
     assert mesh.materials[0].name == f"Mesh-Free Display {obj.name}"
 
 
-def test_second_run_changes_the_display_in_place(display, obj):
+def test_second_run_changes_the_display_in_place(display, modifiers, obj):
     modifier, material = display.find_display(obj).name, display.find_material(obj)
-    display.set_input(display.find_display(obj), "Radius", 0.123)
+    modifiers.set_input(display.find_display(obj), "Radius", 0.123)
     blocks = len(bpy.data.materials), len(bpy.data.node_groups)
     for name in ("lb_eigenvector_003", "lb_normal", "lb_area"):
         bpy.ops.meshfree.colormap(attribute=name)
@@ -90,7 +90,7 @@ def test_second_run_changes_the_display_in_place(display, obj):
     assert [item.name for item in obj.modifiers] == [modifier]
     assert display.find_material(obj) == material
     assert (len(bpy.data.materials), len(bpy.data.node_groups)) == blocks
-    assert display.get_input(display.find_display(obj), "Radius") == pytest.approx(0.123)
+    assert modifiers.get_input(display.find_display(obj), "Radius") == pytest.approx(0.123)
 
 
 def test_without_a_name_the_attribute_on_show_stays(display, obj):
@@ -135,12 +135,12 @@ def test_duplicate_of_an_object_gets_its_own_material(display, obj):
     assert display.shown_attribute(other) == "lb_area"
 
 
-def test_material_of_the_user_is_left_alone(display, obj):
+def test_material_of_the_user_is_left_alone(display, modifiers, obj):
     own = bpy.data.materials.new("Own")
     if own.node_tree is None:
         own.use_nodes = True
     nodes = own.node_tree.nodes.keys()
-    display.set_input(display.find_display(obj), "Material", own)
+    modifiers.set_input(display.find_display(obj), "Material", own)
     assert display.shown_attribute(obj) == ""
     bpy.ops.meshfree.colormap(attribute="lb_area")
     assert own.node_tree.nodes.keys() == nodes

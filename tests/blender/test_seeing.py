@@ -139,10 +139,10 @@ def test_locked_range_stays_for_other_attributes_and_can_be_edited(display, obj)
     assert bounds(display, obj) != (-0.25, 2.5)
 
 
-def test_settings_answer_in_edit_mode(extension, display, obj):
+def test_settings_answer_in_edit_mode(extension, display, modifiers, obj):
     bpy.ops.meshfree.colormap(attribute="lb_area")
     obj.meshfree.range_mode = "DATA"
-    before, radius = bounds(display, obj), display.get_input(display.find_display(obj), "Radius")
+    before, radius = bounds(display, obj), modifiers.get_input(display.find_display(obj), "Radius")
     bpy.ops.object.mode_set(mode="EDIT")
     obj.meshfree.range_mode = "PERCENTILE"
     low, high = bounds(display, obj)
@@ -154,7 +154,7 @@ def test_settings_answer_in_edit_mode(extension, display, obj):
         assert values.dtype == attribute(obj, name).dtype
         bpy.ops.object.mode_set(mode="EDIT")
     obj.meshfree.point_size = 2.0 * obj.meshfree.point_size
-    assert display.get_input(display.find_display(obj), "Radius") == pytest.approx(2.0 * radius)
+    assert modifiers.get_input(display.find_display(obj), "Radius") == pytest.approx(2.0 * radius)
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
@@ -267,24 +267,24 @@ def test_setting_of_a_duplicate_changes_only_its_own_colors(display, obj):
     assert ramp(display, other) != before
 
 
-def radius(display, obj):
-    return display.get_input(display.find_display(obj), "Radius")
+def radius(display, modifiers, obj):
+    return modifiers.get_input(display.find_display(obj), "Radius")
 
 
-def test_point_size_follows_the_spacing_unless_set_by_hand(display, obj):
-    first = radius(display, obj)
+def test_point_size_follows_the_spacing_unless_set_by_hand(display, modifiers, obj):
+    first = radius(display, modifiers, obj)
     assert first == pytest.approx(0.75 * obj.meshfree.spacing)
     obj.data.vertices.foreach_set("co", 3.0 * attribute(obj, "position").reshape(-1))
     bpy.ops.meshfree.analyze()
-    assert radius(display, obj) == pytest.approx(3.0 * first, rel=1e-3)
+    assert radius(display, modifiers, obj) == pytest.approx(3.0 * first, rel=1e-3)
     obj.meshfree.point_size = 1.5
-    assert radius(display, obj) == pytest.approx(6.0 * first, rel=1e-3)
-    display.set_input(display.find_display(obj), "Radius", 0.321)
+    assert radius(display, modifiers, obj) == pytest.approx(6.0 * first, rel=1e-3)
+    modifiers.set_input(display.find_display(obj), "Radius", 0.321)
     obj.data.vertices.foreach_set("co", 2.0 * attribute(obj, "position").reshape(-1))
     bpy.ops.meshfree.analyze()
-    assert radius(display, obj) == pytest.approx(0.321)
+    assert radius(display, modifiers, obj) == pytest.approx(0.321)
     obj.meshfree.point_size = 0.75
-    assert radius(display, obj) == pytest.approx(6.0 * first, rel=1e-3)
+    assert radius(display, modifiers, obj) == pytest.approx(6.0 * first, rel=1e-3)
 
 
 def test_histogram_counts_every_value_near_the_range(plots):
@@ -577,7 +577,7 @@ def test_own_presets_are_files_in_the_users_folder(extension, installed):
 
 
 @pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
-def test_point_clouds_are_seen_as_meshes_are(display, overlay):
+def test_point_clouds_are_seen_as_meshes_are(display, modifiers, overlay):
     obj = add_object(sphere_points())
     obj.select_set(True)
     bpy.ops.object.convert(target="POINTCLOUD")
@@ -587,9 +587,9 @@ def test_point_clouds_are_seen_as_meshes_are(display, overlay):
     bpy.ops.meshfree.colormap(attribute="lb_area", color_map="MAGMA", range_mode="DATA")
     values = attribute(obj, "lb_area")
     assert bounds(display, obj) == pytest.approx((values.min(), values.max()))
-    before = radius(display, obj)
+    before = radius(display, modifiers, obj)
     obj.meshfree.point_size *= 2.0
-    assert radius(display, obj) == pytest.approx(2.0 * before)
+    assert radius(display, modifiers, obj) == pytest.approx(2.0 * before)
     obj.meshfree.histogram = True
     assert len(overlay.pictures(obj, bpy.context.scene)) == 2
     middle = float(np.median(values))

@@ -15,7 +15,7 @@ NO_UNDO = {"export_eigenvalues", "export_operator", "export_points", "stop"}  # 
 UNLOGGED = {"stop"}  # nothing to repeat
 HIDDEN = {"add_preset"}  # a button beside its menu, as with all presets of Blender
 # Numbers that may have any sign and size: values given by the user, the matrix of an object and its eigenvalues.
-ANY_SIZE = re.compile(r"\.(low|high|range_low|range_high|metric)$")
+ANY_SIZE = re.compile(r"\.(low|high|range_low|range_high|metric|matrix|rest)$")
 # Lengths, areas and angles by their name, which Blender shows with a unit.
 WITH_UNIT = re.compile(r"distance|radius|amplitude|wavelength|phase|area$|angle|spacing", re.IGNORECASE)
 OF_BLENDER = {"rna_type"}
