@@ -74,7 +74,7 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=No
     return cloud.scaled.share(areas, NO_AREA)
 
 
-def solve_areas(cloud, distance, options):
+def solve_areas(cloud, distance, options, report=lambda: None):
     """Solve for the areas of the distinct points, in scaled coordinates, by the method the options name.
 
     Parameters
@@ -85,6 +85,8 @@ def solve_areas(cloud, distance, options):
         Distance of each pair: in space, or along the surface.
     options : LaplacianOptions
         Its areas and regularization settings.
+    report : callable
+        Called before each product with the kernel matrix; may raise `Cancelled`.
 
     Returns
     -------
@@ -97,7 +99,7 @@ def solve_areas(cloud, distance, options):
     """
     lengths = cloud.neighborhoods.lengths
     target = kernel_integral(lengths, cloud.gaussian) + image_excess(lengths, cloud.rim)
-    matrix = KernelMatrix(cloud.neighborhoods, distance, cloud.rim)
+    matrix = KernelMatrix(cloud.neighborhoods, distance, cloud.rim, report)
     if options.areas == "fast":
         return fast_areas(matrix, target, cloud.definite)
     if options.areas == "constrained":
@@ -120,7 +122,8 @@ class KernelMatrix:
     Near a rim the image of a point in it counts as a neighbour too.
     """
 
-    def __init__(self, neighborhoods, distance, rim):
+    def __init__(self, neighborhoods, distance, rim, report=lambda: None):
+        self._report = report
         lengths = neighborhoods.mean(neighborhoods.lengths)
         own = neighborhoods.lengths
         values = kernel(distance / lengths) / lengths**2
@@ -132,6 +135,7 @@ class KernelMatrix:
             self._diagonal[rows] += factor * kernel(image / own[rows]) / own[rows] ** 2
 
     def __matmul__(self, values):
+        self._report()
         return self._diagonal * values + self._half @ values + self._half.T @ values
 
 

@@ -130,7 +130,8 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
             "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"
             " 10 % and more. Add points."
         )
-    pairs = Neighborhoods(nearest.points, lengths, *find_pairs(nearest.tree, lengths))
+    found = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3))
+    pairs = Neighborhoods(nearest.points, lengths, *found)
     if normals is None and options.normals != "quadric":
         own = covariance_normals(pairs, weighted=options.normals == "wpca")
         own = orient_normals(nearest, own) if options.orient else own
@@ -138,6 +139,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         own = oriented
     flipped = np.sign(np.einsum("ij,ij->i", own, surface.normals))
     definite = not np.isfinite(rim.distance).any()
+    report("Neighbors", 0.4)
     if options.sheets:
         same_side = np.sign(np.einsum("ij,ij->i", oriented, surface.normals))
         bending = same_side[:, None, None] * surface.bending

@@ -67,6 +67,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
     report = progress or (lambda stage, fraction: None)
     source = _read_source(source, count)
     index, values = read_values(fixed, fixed_values, count)
+    report("Equations", 0.0)
     part = coupled_parts(laplacian)
     known = part >= 0
     is_fixed = np.zeros(count, dtype=bool)
@@ -87,6 +88,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
         matrix, load = _with_fixed_points(laplacian, inside, np.where(is_fixed, result, 0.0), free, report)
     else:
         matrix, load = laplacian.stiffness, np.zeros(count)
+    report("Equations", 0.5)
     free = free[cKDTree(laplacian.points[free]).indices]  # neighbours near in memory make the products faster
     load = load[free] + laplacian.areas[free] * source[free]
     result[free] = conjugate_gradients(matrix[free][:, free], load, result[free], progress=report)
@@ -203,6 +205,7 @@ def _without_mean(areas, source, part, rows):
 
 def _with_fixed_points(laplacian, fixed, values, free, report):
     """Return a stiffness and a load whose rows of free points take account of the fixed ones."""
+    report("Equations", 0.1)
     spacing = mean_spacing(laplacian)
     edge = _edge_distance(laplacian, fixed, spacing)
     thin = fixed & ~_thick(laplacian, fixed)
@@ -210,7 +213,7 @@ def _with_fixed_points(laplacian, fixed, values, free, report):
     thin &= ~laplacian.boundary  # images do the same there
     weights, own, load = _weights(laplacian, fixed, values)
     if thin.any():
-        report("Narrow operator", 0.0)
+        report("Equations", 0.2)
         distance = cKDTree(laplacian.points[thin]).query(laplacian.points, workers=-1)[0]
         ramp = np.clip((distance / laplacian.smoothing_lengths - _NEAR[0]) / (_NEAR[1] - _NEAR[0]), 0.0, 1.0)
         wide = np.maximum(ramp**2 * (3.0 - 2.0 * ramp), _LEAST)

@@ -183,7 +183,9 @@ def chebyshev_filter(laplacian, values, response, fixed_rim=False, raw=False, to
     """
     report = progress or (lambda stage, fraction: None)
     values = check_values(values, len(laplacian.areas))
+    report("Filter", 0.0)
     order, root, multiply = corrected_operator(laplacian, fixed_rim, raw)
+    report("Filter", 0.0)
     top = highest_eigenvalue(multiply, len(order))
     coefficients = _polynomial(response, top, tolerance)
 

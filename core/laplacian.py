@@ -206,7 +206,7 @@ def build_laplacian(
         Distance of every point to the rim along the surface [L], instead of a measured one; infinity where it is far.
         With `boundary`, measured ones stand next to corners, where there are two rims.
     progress : callable, optional
-        Called as ``progress(stage, fraction)`` at the beginning of each stage; may raise `Cancelled`.
+        Called as ``progress(stage, fraction)`` in each stage; may raise `Cancelled`.
 
     Returns
     -------
@@ -234,7 +234,7 @@ def build_laplacian(
 
     report("Areas", 0.5)
     distance = arc_length(pairs, cloud.normals) if options.curvature_correction else pairs.distance
-    solution = solve_areas(cloud, distance, options)
+    solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
     if not solution.converged:
         notices.append(f"The areas stopped after {solution.products} steps, close to their best values.")
 

@@ -48,7 +48,7 @@ class Neighborhoods:
         return sparse.csr_array((values, self.second, start), shape=(count, count))
 
 
-def find_pairs(tree, lengths):
+def find_pairs(tree, lengths, report=lambda: None):
     """Find all pairs nearer than 3 h_ij, with h_ij = (h_i + h_j) / 2.
 
     Parameters
@@ -57,6 +57,8 @@ def find_pairs(tree, lengths):
         Of n distinct points.
     lengths : ndarray, (n,)
         Smoothing lengths.
+    report : callable
+        Called before each block of points; may raise `Cancelled`.
 
     Returns
     -------
@@ -75,6 +77,7 @@ def find_pairs(tree, lengths):
     while len(pending):
         unfinished = []
         for rows in np.array_split(pending, len(pending) * count // _BLOCK + 1):
+            report()
             distance, column = tree.query(tree.data[rows], k=count, workers=-1)
             complete = (distance[:, -1] > radii[rows]) | (count == n)
             unfinished.append(rows[~complete])

@@ -132,6 +132,7 @@ def segment(laplacian, parts, spectrum=None, progress=None):
             f"The spectrum has {len(spectrum.eigenvectors)} points, the operator {n}. Compute it for the same operator."
         )
     report = progress or (lambda stage, fraction: None)
+    report("Parts", 0.0)
     graph = near_graph(laplacian, _NEIGHBORS)
     island, areas = laplacian.component[graph.first], _areas_of_places(laplacian, graph)
     share = _deal(parts, np.bincount(island, areas))

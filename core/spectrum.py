@@ -85,6 +85,7 @@ def lowest_eigenpairs(laplacian, stiffness, count, progress):
     vectors : ndarray, (n, count)
         Orthonormal for the areas.
     """
+    progress("Spectrum", 0.0)
     order, root, matrix = symmetric_form(laplacian, stiffness)
     n = len(order)
     random = np.random.default_rng(0)

@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
-from ..core import PointCloudError, minimal_surface
+from ..core import Cancelled, PointCloudError, minimal_surface
 from . import cache
 from .application import ApplicationOperator
 from .groups import FIXED, chosen_members, group_kind, is_chosen, search_group
@@ -92,7 +92,10 @@ def _shrink(points, rim, tolerance, steps, options, progress):
     def report(stage, fraction):
         progress("Steps", min(1.0, (count + fraction) / steps))
 
-    return minimal_surface(points, rim, tolerance, steps, options, callback=stepped, progress=report)
+    film = minimal_surface(points, rim, tolerance, steps, options, callback=stepped, progress=report)
+    if film.reason == "cancelled":  # nobody waits for it, and it must not be kept
+        raise Cancelled
+    return film
 
 
 CLASSES = (MESHFREE_OT_minimal_surface,)

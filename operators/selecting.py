@@ -40,12 +40,22 @@ class SelectionOperator(JobOperator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
 
+    def complete(self, context, job):
+        obj = job.snapshots[0].find()
+        if obj is None:
+            return super().complete(context, job)
+        with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):
+            return super().complete(context, job)
+
     def finish(self, context, objects, results, seconds):
         """Do it with the selection of now: the operators are kept."""
-        return self.execute(context)
+        return self.change(context, objects)
 
     def execute(self, context):
-        objects, messages = edited_objects(context), []
+        return self.change(context, edited_objects(context))
+
+    def change(self, context, objects):
+        """Compute for all objects, then change all."""
         with object_mode(context, context.object):
             try:
                 objects, changes = self.with_points(objects), []

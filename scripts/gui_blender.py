@@ -9,6 +9,7 @@ a DISPLAY, Xvfb are taken from the machine too.
 import hashlib
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -135,7 +136,8 @@ def _bootstrap(folder):
     command += [f"--aptopt={line}" for line in _network_options()]
     command += [f"--dpkgopt={option}" for option in _DPKG]
     command += [SUITE, SYSTEM, *[f"deb {archive} {SUITE} main" for archive in _archives()]]
-    _run(command, LIMIT)
+    tools = str(Path(mmdebstrap).parent)  # its other programs are called by name
+    _run(command, LIMIT, env={**os.environ, "PATH": os.pathsep.join([tools, *os.get_exec_path()])})
 
 
 def _fetch_mmdebstrap(folder):
@@ -167,22 +169,26 @@ def _archives():
 def _run(command, seconds, **options):
     """Run a program of Debian's and return what it prints; failing is a reason to leave the window out."""
     name = Path(command[0]).name
-    try:
-        return subprocess.run(
-            [str(word) for word in command],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=seconds,
-            check=True,
-            **options,
-        ).stdout
-    except subprocess.TimeoutExpired:
-        raise LeftOutError(f"the Blender with a window was not made, since {name} took over {seconds} s") from None
-    except subprocess.CalledProcessError as error:
-        last = (error.stdout.strip().splitlines() or ["no word"])[-1]
-        raise LeftOutError(f"the Blender with a window was not made, since {name} failed with: {last}") from None
+    with subprocess.Popen(
+        [str(word) for word in command],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        **options,
+    ) as process:
+        try:
+            output, _ = process.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGTERM)  # with what it has started; it takes its mounts away then
+            process.wait()
+            raise LeftOutError(f"the Blender with a window was not made, since {name} took over {seconds} s") from None
+    if process.returncode:
+        lines = output.strip().splitlines() or ["no word"]
+        reason = next((line for line in lines if line.startswith("E:")), lines[-1])
+        raise LeftOutError(f"the Blender with a window was not made, since {name} failed with: {reason}")
+    return output
 
 
 def main():

@@ -53,25 +53,28 @@ class Window:
     """
 
     def __init__(self, place, archive=None, pictures=PICTURES):
-        self.place = place
-        self.folder = place.make_folder()  # files here are seen from both sides
-        self.pictures = pictures
-        self.log = self.folder / "blender.log"
+        self.place, self.archive, self.pictures = place, archive, pictures
         self._screen = self._blender = None
+        self.open()
+
+    def open(self):
+        """Open the screen, install the extension and start Blender."""
+        self.folder = self.place.make_folder()  # files here are seen from both sides
+        self.log = self.folder / "blender.log"
         self._variables = {
-            "HOME": str(place.inside(self.folder)),
-            "TMPDIR": str(place.inside(self.folder)),
-            "BLENDER_USER_RESOURCES": str(place.inside(self.folder / "resources")),
+            "HOME": str(self.place.inside(self.folder)),
+            "TMPDIR": str(self.place.inside(self.folder)),
+            "BLENDER_USER_RESOURCES": str(self.place.inside(self.folder / "resources")),
             "LIBGL_ALWAYS_SOFTWARE": "1",
-            "MESA_SHADER_CACHE_DIR": str(place.cache),  # what is compiled once need not be compiled in every session
+            "MESA_SHADER_CACHE_DIR": str(self.place.cache),  # what is compiled once serves later sessions too
             "OPENBLAS_NUM_THREADS": "1",
             "PYTHONNOUSERSITE": "1",
         }
         try:
             self._open_screen()
-            if archive is not None:
-                self._install(archive)
-            self.start()
+            if self.archive is not None:
+                self._install(self.archive)
+            self._start()
         except BaseException:
             self.close()
             raise
@@ -88,6 +91,7 @@ class Window:
         """Start a screen that nobody sees, on the first free number."""
         size = f"{SIZE[0]}x{SIZE[1]}x24"
         command = ["Xvfb", "-displayfd", "1", "-screen", "0", size, "-nolisten", "tcp", "-ac"]
+        command += ["-terminate"]  # with Blender, which ends with this program, however that ends
         with (self.folder / "screen.log").open("w") as log:
             self._screen = self._popen(command, stdout=subprocess.PIPE, stderr=log)
         if not select.select([self._screen.stdout], [], [], START)[0]:
@@ -105,7 +109,7 @@ class Window:
         """Run a program beside Blender, on the same screen, and return what it prints."""
         command = self.place.command(words, **self._variables)
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds)
-        if done.returncode:
+        if done.returncode or (words[0] == "xdotool" and done.stderr):  # it goes on after names that are no keys
             raise WindowError(f"{words[0]} failed: {(done.stderr or done.stdout).decode()[-2000:]}")
         return done.stdout
 
@@ -120,8 +124,7 @@ class Window:
         self.run(self.place.blender, *words, seconds=300)
         (self.folder / archive.name).unlink()
 
-    def start(self):
-        """Start Blender, again if it was ended."""
+    def _start(self):
         driver = Path(shutil.copy(Path(__file__).with_name("window_driver.py"), self.folder))
         requests_read, self._requests = os.pipe()
         self._answers, answers_write = os.pipe()
@@ -142,17 +145,13 @@ class Window:
         self.python("bpy.context.preferences.view.smooth_view = 0")
         self.key("Escape")  # the splash screen, if it was faster
 
-    def stop(self):
-        """End Blender."""
+    def close(self):
+        """End all, and remove the folder."""
         if self._blender is not None:
             _end(self._blender)
             os.close(self._requests)
             os.close(self._answers)
             self._blender = None
-
-    def close(self):
-        """End all, and remove the folder."""
-        self.stop()
         if self._screen is not None:
             _end(self._screen)
             self._screen.stdout.close()
@@ -171,7 +170,7 @@ class Window:
 
     # Asking Blender
 
-    def python(self, code, seconds=60):
+    def python(self, code, seconds=DRAWING):
         """Run code in Blender and return the value of its last line, as JSON can carry it."""
         os.write(self._requests, json.dumps(code).encode() + b"\n")
         until = time.monotonic() + seconds
@@ -274,6 +273,10 @@ class Window:
             self.click(x + width - 10, y)
         raise WindowError(f"The sidebar has no tab {name}")
 
+    def open_panels(self, *names):
+        """Let these panels of the extension, such as "MESHFREE_PT_deform", be open in the next file, and no others."""
+        self.python(f"open_panels({set(names)!r})")
+
     def search(self, text):
         """Carry out an operator by the F3 search."""
         self.point_at_view()
@@ -282,13 +285,17 @@ class Window:
         self.key("Return")
 
     def find_button(self, operator, region="UI"):
-        """Find the button of an operator, such as "meshfree.analyze", and leave the mouse on it."""
+        """Find the button of an operator, such as "meshfree.analyze", and leave the mouse on it.
+
+        Of several buttons of an operator one is found by its settings: "meshfree.group_from_selection(role='ANCHOR'".
+        """
+        wanted = f"bpy.ops.{operator}" if "(" in operator else f"bpy.ops.{operator}("
         x, top, width, height = self.region(region)
         seen = []
         for y in range(top + 8, top + height, 9):
             self.move(x + width * 0.35, y)
             found = self.python(f"button_under_mouse({region!r})")
-            if found.startswith(f"bpy.ops.{operator}("):
+            if found.startswith(wanted):
                 return x + width * 0.35, y
             seen += [found] if found and found not in seen else []
         raise WindowError(f"No button of {operator} is seen, only {seen}")
@@ -298,6 +305,13 @@ class Window:
         self.click(*self.find_button(operator, region))
 
     # Pictures
+
+    def pack(self, picture, target, colors=256):
+        """Write a picture with few colors, as small as documents want it."""
+        copy = self.folder / picture.name
+        shutil.copy(picture, copy)
+        words = ("convert", self.place.inside(copy), "+dither", "-colors", str(colors), "png8:-")
+        target.write_bytes(self.run(*words))
 
     def shot(self, name, crop=None):
         """Keep a picture of the screen; crop is x, y, width, height."""

@@ -7,6 +7,7 @@ Requests and answers are lines of JSON. The code of a request runs in one namesp
 import ast
 import json
 import os
+import sys
 import time
 import traceback
 
@@ -67,6 +68,20 @@ def button_under_mouse(region_type="UI"):
     return bpy.context.window_manager.clipboard
 
 
+def open_panels(names):
+    """Register the extension's panels again, so that these are open in the next file and no others."""
+    root = next(name for name in bpy.context.preferences.addons.keys() if name.endswith(".meshfree_laplacian"))
+    classes = [cls for module in sys.modules[root]._modules() for cls in getattr(module, "CLASSES", ())]
+    panels = [cls for cls in classes if issubclass(cls, bpy.types.Panel)]
+    for cls in reversed(panels):
+        bpy.utils.unregister_class(cls)
+    for cls in panels:
+        if getattr(cls, "bl_parent_id", ""):
+            others = set(getattr(cls, "bl_options", ())) - {"DEFAULT_CLOSED"}
+            cls.bl_options = others if cls.__name__ in names else others | {"DEFAULT_CLOSED"}
+        bpy.utils.register_class(cls)
+
+
 def attribute(obj, name):
     """Values of an attribute of the points, as the object has it now."""
     data = obj.data
@@ -83,7 +98,8 @@ def attribute(obj, name):
 
 
 _namespace = {
-    function.__name__: function for function in (main_window, areas, view3d, on_screen, button_under_mouse, attribute)
+    function.__name__: function
+    for function in (main_window, areas, view3d, on_screen, button_under_mouse, open_panels, attribute)
 }
 _namespace.update({"bpy": bpy, "np": np, "time": time})
 

@@ -77,7 +77,7 @@ class MESHFREE_FH_points(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def _entries():
+def entries():
     """Menus and what is added to them; point clouds have an Edit Mode from Blender 4.5 on."""
     yield bpy.types.VIEW3D_MT_object, _draw_object
     yield bpy.types.VIEW3D_MT_edit_mesh, _draw_points
@@ -89,13 +89,13 @@ def _entries():
 
 def attach():
     """Add the entries to Blender's menus."""
-    for menu, draw in _entries():
+    for menu, draw in entries():
         menu.append(draw)
 
 
 def detach():
     """Take the entries away again."""
-    for menu, draw in _entries():
+    for menu, draw in entries():
         menu.remove(draw)
 
 

@@ -122,6 +122,19 @@ def test_a_field_between_other_values_is_solved_once(cache, calls, core):
     assert calls == []
 
 
+def test_a_film_that_was_stopped_is_not_kept(cache, core):
+    minimal = importlib.import_module(cache.__name__.replace("cache", "minimal"))
+    points = wave()
+    rim = core.build_laplacian(points).boundary
+
+    def stop_later(stage, fraction):
+        if fraction > 0.5:
+            raise core.Cancelled
+
+    with pytest.raises(core.Cancelled):
+        minimal._shrink(points, rim, 0.0, 4, options(cache), stop_later)
+
+
 def test_modes_of_another_rim_are_others(cache):
     built = cache.build(wave(), options(cache), None, silent)
     free = cache.lowest_modes(built.laplacian, 6, silent)

@@ -58,6 +58,9 @@ def operator(jobs, monkeypatch):
                 modal_handler_add=modal.append,
                 event_timer_add=bpy.context.window_manager.event_timer_add,
                 event_timer_remove=bpy.context.window_manager.event_timer_remove,
+                progress_begin=lambda low, high: None,
+                progress_update=lambda value: None,
+                progress_end=lambda: None,
                 windows=bpy.context.window_manager.windows,
             )
 
@@ -275,6 +278,33 @@ def test_disabling_the_extension_ends_it(operator, jobs, obj):
     jobs.attach()
     assert jobs.running() is None
     assert not any(handler.__module__ == jobs.__name__ for handler in handlers)
+
+
+def test_growing_a_selection_in_edit_mode(operator, extension, obj):
+    selecting = importlib.import_module(f"{extension.__name__}.operators.selecting")
+    obj.data.vertices.foreach_set("select", np.arange(200) < 3)
+    obj.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+
+    class Grow(selecting.SelectionOperator, operator):
+        bl_label = "Grow"
+        distance = 0.5
+        prepare = selecting.MESHFREE_OT_select_grow.prepare
+        finish = selecting.SelectionOperator.finish
+
+        def __init__(self):
+            self.reports = []
+            with selecting.object_mode(bpy.context, obj):
+                _, compute = selecting.operator_reader(bpy.context, obj)
+                super().__init__([obj], compute)
+
+    started = Grow()
+    assert obj.mode == "EDIT"
+    assert started.end() == {"FINISHED"}
+    assert obj.mode == "EDIT"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert started.reports[0][0] == "INFO"
+    assert 3 < sum(vertex.select for vertex in obj.data.vertices) < 50
 
 
 def test_several_objects_are_computed_one_after_the_other(extension):

@@ -5,43 +5,36 @@ import importlib
 import bpy
 import pytest
 
-NOT_IN_MENUS = {  # of the panel, where they have the name of a group or a preset
-    "meshfree.select_group",
-    "meshfree.add_preset",
-    "meshfree.apply_preset",
-}
+NOT_IN_MENUS = {"select_group", "apply_preset", "add_preset"}  # they have the name of a group, or a menu of their own
 
 
-class Layout:
-    """Writes down which operators a menu draws."""
+class Menu:
+    """Stands for a menu and its layout, and writes down which operators and menus are drawn."""
 
     def __init__(self):
-        self.operators = []
+        self.layout, self.operators, self.menus = self, set(), []
 
-    def operator(self, name, text=""):
-        self.operators.append(name)
+    def operator(self, name, **_):
+        self.operators.add(name)
 
     def operator_menu_enum(self, name, _):
-        self.operators.append(name)
+        self.operators.add(name)
+
+    def menu(self, name):
+        self.menus.append(name)
 
     def separator(self):
         pass
 
 
-class Menu:
-    def __init__(self):
-        self.layout = Layout()
-
-
 def test_menus_hold_every_operator(extension):
     menus = importlib.import_module(f"{extension.__name__}.ui.menus")
     menu = Menu()
-    for cls in (menus.MESHFREE_MT_object, menus.MESHFREE_MT_points):
-        cls.draw(menu, bpy.context)
-    menus._draw_import(menu, bpy.context)
-    menus._draw_export(menu, bpy.context)
-    operators = {f"meshfree.{name}" for name in dir(bpy.ops.meshfree)}
-    assert sorted(menu.layout.operators) == sorted(operators - NOT_IN_MENUS)
+    for _, draw in menus.entries():
+        draw(menu, bpy.context)
+    for name in menu.menus:
+        getattr(bpy.types, name).draw(menu, bpy.context)
+    assert menu.operators == {f"meshfree.{name}" for name in set(dir(bpy.ops.meshfree)) - NOT_IN_MENUS}
 
 
 @pytest.mark.parametrize("name", ["VIEW3D_MT_object", "VIEW3D_MT_edit_mesh"])

@@ -83,6 +83,10 @@ class Layout:
         self.texts.append(text if text is not None else kind.name)
         return SimpleNamespace(**dict.fromkeys(item.identifier for item in kind.properties))
 
+    def progress(self, text, factor):
+        assert 0.0 <= factor <= 1.0
+        self.texts.append(text)
+
     def operator_menu_enum(self, idname, path):
         assert path in self.operator(idname).__dict__
 
@@ -233,17 +237,30 @@ def test_dialogs_show_every_setting(name):
 
 
 @pytest.mark.parametrize("name", OPERATORS)
-def test_adjust_last_operation_shows_what_takes_no_time(name):
+def test_adjust_last_operation_offers_what_is_quick(name):
     operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
-    if not isinstance(getattr(operator, "adjustable", None), tuple):
+    if not hasattr(operator, "adjustable"):
         return
-    texts = []
-    settings = Settings(layout=Layout(texts), is_repeated=lambda context: True, adjustable=operator.adjustable)
-    for setting in operator.adjustable:
-        assert setting in getattr(bpy.ops.meshfree, name).get_rna_type().properties
-        setattr(settings, setting, None)
-    operator.draw(settings, bpy.context)
-    assert texts == list(operator.adjustable)
+    properties = getattr(bpy.ops.meshfree, name).get_rna_type().properties
+    values = {item.identifier: item.default for item in properties if item.type != "POINTER"}
+    for variant in ({}, {"keep": "AREA"}, {"source": "x"}):
+        settings = Settings(**values | {key: value for key, value in variant.items() if key in values})
+        quick = operator.adjustable
+        quick = quick.fget(settings) if isinstance(quick, property) else quick
+        texts = []
+        settings.layout, settings.adjustable, settings.is_repeated = Layout(texts), quick, lambda context: True
+        operator.draw(settings, bpy.context)
+        assert texts == list(quick)
+        assert not {"method", "modes", "parts", "wavelength", "handles", "tolerance"} & set(quick)
+
+
+def test_panel_while_something_runs(extension, monkeypatch):
+    add_object(sphere_points())
+    panel = importlib.import_module(f"{extension.__name__}.ui.panel")
+    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(label="Smooth Points", stage="Filter", fraction=0.25))
+    texts = draw()
+    assert "Smooth Points (Esc to Stop)" in texts
+    assert "Filter: 25%" in texts
 
 
 def test_every_option_of_core_is_a_setting_with_its_default(extension, core):

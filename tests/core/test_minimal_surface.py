@@ -234,8 +234,8 @@ class TestEnding:
         builds = []
 
         def progress(stage, fraction):
-            builds.append(stage)
-            if builds.count("Areas") == 4:  # of the given points twice, then of each step
+            builds.append((stage, fraction))
+            if builds.count(("Areas", 0.5)) == 4:  # of the given points twice, then of each step
                 raise core.Cancelled
 
         film = core.minimal_surface(points, fixed, progress=progress)

@@ -30,6 +30,9 @@ def window():
 @pytest.fixture
 def gui(window, request):
     """Give the window with an empty file; keep a picture of the end, and let no error in Python pass unseen."""
+    if not window.running:  # it went down in the test before
+        window.close()
+        window.open()
     window.new_file()
     window.python(CLOUDS)
     known = len(window.complaints)

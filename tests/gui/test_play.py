@@ -16,6 +16,28 @@ for vertex in bpy.context.object.data.vertices:
 [(min(members[name]), max(members[name])) for name in ("Handle", "Anchor")]
 """
 MOVED = "np.linalg.norm(attribute(bpy.data.objects['Cloud'], 'lb_displacement'), axis=1).max().round(3)"
+RENDERING = """
+bpy.context.view_layer.objects.active = bpy.data.objects["Cloud"]
+bpy.ops.meshfree.colormap(attribute="lb_displacement", switch_shading=False)
+scene = bpy.context.scene
+scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 1, False
+scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 320, 240, 100
+scene.view_settings.view_transform = "Standard"
+scene.world = scene.world or bpy.data.worlds.new("World")
+bpy.context.preferences.view.render_display_type = "AREA"
+data = bpy.data.cameras.new("Camera")
+data.type, data.ortho_scale = "ORTHO", 6.0
+scene.camera = bpy.data.objects.new("Camera", data)
+scene.collection.objects.link(scene.camera)
+scene.camera.location, scene.camera.rotation_euler = (0.0, -10.0, 0.0), (np.pi / 2, 0.0, 0.0)
+rendered = []
+bpy.app.handlers.render_complete.append(lambda *_: rendered.append(True))
+"""
+COLORED_COLUMNS = """
+image = bpy.data.images.load(bpy.app.tempdir + "bent.png")
+pixels = np.array(image.pixels).reshape(240, 320, 4)[:, :, :3]
+(np.ptp(pixels, axis=2) > 0.15).sum(axis=0)
+"""
 
 
 def add_sphere(gui, count=3000, noise=0.0):
@@ -88,13 +110,14 @@ class TestAnalysis:
 class TestJobs:
     """Work that goes on while the window stays alive, and what ends it."""
 
-    @pytest.fixture(params=["Analyze Points", "Smooth Points"])
+    @pytest.fixture
     def job(self, gui, request):
         add_sphere(gui, 20000, 0.005)
         gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'job.blend')")
-        start(gui, request.param)
+        start(gui, getattr(request, "param", "Analyze Points"))
         return gui
 
+    @pytest.mark.parametrize("job", ["Analyze Points", "Smooth Points"], indirect=True)
     def test_escape(self, job):
         job.shot("working")
         job.key("Escape")
@@ -175,7 +198,7 @@ class TestDeformation:
         gui.wait_until(f"{MOVED} > 0.9")
 
         gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'bent.blend')")
-        gui.key("r", "y", "30", "Return")
+        gui.key("r", "y", "3", "0", "Return")
         bent = "attribute(bpy.data.objects['Cloud'], 'lb_displacement').round(3)"
         gui.wait_until("bpy.data.is_dirty")
         gui.settle()
@@ -191,3 +214,14 @@ class TestDeformation:
         gui.click(*gui.python("on_screen(bpy.data.objects['Cloud Handle'].matrix_world.translation)"))
         gui.key("g", "x", "1", "Return")
         gui.wait_until(f"{MOVED} > 1.8", 60)
+
+        gui.python(RENDERING)
+        gui.settle()
+        gui.point_at_view()
+        gui.key("F12")
+        gui.wait_until("rendered", 90)
+        gui.shot("rendered")
+        gui.python("bpy.data.images['Render Result'].save_render(bpy.app.tempdir + 'bent.png')")
+        columns = gui.python(COLORED_COLUMNS)
+        assert sum(columns) > 2000
+        assert np.average(np.arange(320), weights=columns) > 180  # to the right, where the handle went

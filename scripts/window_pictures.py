@@ -1,0 +1,111 @@
+"""Renew the pictures of the window in docs/pictures/: python scripts/play.py scripts/window_pictures.py [NAME ...]."""
+
+import sys
+
+from environments import ROOT
+
+PICTURES = ROOT / "docs" / "pictures"
+POINTS = 20000
+CORAL = """
+from mathutils import Euler
+points = Coral().sample({count})
+mesh = bpy.data.meshes.new("Coral")
+mesh.vertices.add(len(points))
+mesh.vertices.foreach_set("co", points.astype(np.float32).reshape(-1))
+mesh.update()
+thing = bpy.data.objects.new("Coral", mesh)
+bpy.context.scene.collection.objects.link(thing)
+bpy.context.view_layer.objects.active = thing
+thing.select_set(True)
+bpy.ops.ed.undo_push(message="Coral")
+view = view3d()[0].spaces.active
+view.region_3d.view_rotation = Euler((1.25, 0.0, 0.45)).to_quaternion()
+view.region_3d.view_distance, view.region_3d.view_location = 8.0, (0.75, 0.0, 0.0)
+view.shading.use_scene_world = False
+"""
+FRONT = """
+view.region_3d.view_rotation = Euler((np.pi / 2, 0.0, 0.0)).to_quaternion()
+view.region_3d.view_perspective = "ORTHO"
+"""
+WORKING = "len(main_window().modal_operators)"
+
+
+def begin(gui, *panels, count=POINTS):
+    """Start with the shape and with these panels open."""
+    gui.open_panels(*panels)
+    gui.new_file()
+    gui.python((ROOT / "scripts" / "coral.py").read_text(encoding="utf-8"))
+    gui.python(CORAL.format(count=count))
+    gui.open_tab()
+
+
+def box(gui, low, high):
+    """Select the points between two heights."""
+    corners = [gui.python(f"on_screen(({x}, 0.0, {z}))") for x, z in ((-1.9, low), (1.9, high))]
+    gui.point_at_view()
+    gui.key("alt+a", "b")
+    gui.drag(*corners)
+
+
+def working(gui):
+    """An analysis that runs."""
+    begin(gui, "MESHFREE_PT_spectrum", count=60000)
+    gui.press("meshfree.analyze")
+    gui.wait_until(WORKING)
+    gui.point_at_view()
+
+
+def analyzed(gui):
+    """The points in colors."""
+    begin(gui, "MESHFREE_PT_spectrum", "MESHFREE_PT_display")
+    gui.press("meshfree.analyze")
+    gui.wait_until("'lb_area' in bpy.context.object.data.attributes", 180)
+    gui.settle()
+    gui.python("bpy.ops.meshfree.colormap(attribute='lb_eigenvector_008')")
+    gui.python("bpy.context.object.select_set(False)")
+
+
+def groups(gui):
+    """Points chosen in Edit Mode, for the groups that the panel makes."""
+    begin(gui, "MESHFREE_PT_points", count=6000)
+    gui.python(FRONT)
+    gui.point_at_view()
+    gui.key("Tab")
+    box(gui, -2.0, -1.0)
+    gui.press("meshfree.group_from_selection(role='ANCHOR'")
+    box(gui, 1.1, 2.0)
+    gui.press("meshfree.group_from_selection(role='HANDLE'")
+
+
+def deform(gui):
+    """A handle on its way."""
+    begin(gui, "MESHFREE_PT_deform", count=6000)
+    gui.python(FRONT)
+    gui.point_at_view()
+    gui.key("Tab")
+    box(gui, -2.0, -1.0)
+    gui.search("Mesh-Free Anchor")
+    box(gui, 1.1, 2.0)
+    gui.search("Mesh-Free Handle")
+    gui.key("Tab")
+    gui.press("meshfree.deform_bind")
+    gui.wait_until("'Coral Handle' in bpy.data.objects", 60)
+    gui.python("bpy.data.objects['Coral Handle'].location.x += 0.7")
+    gui.python("bpy.data.objects['Coral Handle'].rotation_euler.y = 0.7")
+
+
+TAKES = (working, analyzed, groups, deform)
+
+
+def main(gui, names):
+    """Take the pictures of these names, or all."""
+    for take in TAKES:
+        if not names or take.__name__ in names:
+            take(gui)
+            path = PICTURES / f"window_{take.__name__}.png"
+            gui.pack(gui.shot(path.stem), path)
+            print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1e3:.0f} kB")
+
+
+if __name__ == "__main__":
+    main(gui, sys.argv[1:])  # noqa: F821, scripts/play.py gives the window
