@@ -98,11 +98,11 @@ def read_constraints(obj) -> Constraints:
     return Constraints(names, moved, owner, kept, np.concatenate([weights.max(axis=0)[moved], anchors[kept]]))
 
 
-def _glance(obj, glance):
+def _glance(obj, glance, trusting):
     """Return the constraints, or None, and text that differs where they do; a glance may miss a change for seconds."""
     key = (tuple(handle_names(obj)), obj.meshfree.deform.anchors, point_count(obj.data))
     known = _glances.get(obj.session_uid)
-    if not glance or known is None or known[0] != key or perf_counter() > known[1]:
+    if not glance or known is None or known[0] != key or (perf_counter() > known[1] and not trusting):
         began = perf_counter()
         try:
             constraints = read_constraints(obj)
@@ -155,10 +155,11 @@ def settings_text(obj) -> str:
     return repr((settings_values(obj.meshfree), obj.meshfree.rim_group, obj.meshfree.use_modifiers))
 
 
-def stale_reason(obj, glance=False) -> str:
+def stale_reason(obj, glance=False, trusting=False) -> str:
     """Say why a bound object no longer follows its handles, and what to do; empty if it does.
 
-    A glance is quick enough for a panel; see `fingerprint`.
+    A glance is quick enough for a panel; see `fingerprint`. One that trusts is quick enough for a drag: it takes the
+    groups as they were seen last.
     """
     settings = obj.meshfree.deform
     count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
@@ -180,7 +181,7 @@ def stale_reason(obj, glance=False) -> str:
         return ""
     if any(obj.data.attributes.get(name) is None for name in WRITES):
         return f"The attributes {' and '.join(WRITES)} were removed. Bind again"
-    constraints, groups = _glance(obj, glance)
+    constraints, groups = _glance(obj, glance, trusting)
     if settings.groups_used != groups:
         return "The groups of handles or anchors changed. Bind again"
     if settings.fingerprint != rest_fingerprint(obj, constraints, glance):

@@ -183,7 +183,7 @@ def update(obj, depsgraph=None, quick=False):
     quick : bool
         Take one step only and leave the rest to the timer; if factors have to be made, all of it.
     """
-    if binding.stale_reason(obj, glance=quick):
+    if binding.stale_reason(obj, glance=quick, trusting=quick):
         return
     pose = binding.read_pose(obj, depsgraph)
     written, settled = binding.written_pose(obj)
