@@ -254,7 +254,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     point_size: FloatProperty(
         name="Point Size",
         description="Radius of the points as a multiple of their spacing, which it follows when they change",
-        default=0.75,
+        default=1.1,
         min=0.01,
         soft_max=3.0,
         max=100.0,

@@ -273,7 +273,7 @@ def radius(display, modifiers, obj):
 
 def test_point_size_follows_the_spacing_unless_set_by_hand(display, modifiers, obj):
     first = radius(display, modifiers, obj)
-    assert first == pytest.approx(0.75 * obj.meshfree.spacing)
+    assert first == pytest.approx(1.1 * obj.meshfree.spacing)
     obj.data.vertices.foreach_set("co", 3.0 * attribute(obj, "position").reshape(-1))
     bpy.ops.meshfree.analyze()
     assert radius(display, modifiers, obj) == pytest.approx(3.0 * first, rel=1e-3)
@@ -283,7 +283,7 @@ def test_point_size_follows_the_spacing_unless_set_by_hand(display, modifiers, o
     obj.data.vertices.foreach_set("co", 2.0 * attribute(obj, "position").reshape(-1))
     bpy.ops.meshfree.analyze()
     assert radius(display, modifiers, obj) == pytest.approx(0.321)
-    obj.meshfree.point_size = 0.75
+    obj.meshfree.point_size = 1.1
     assert radius(display, modifiers, obj) == pytest.approx(6.0 * first, rel=1e-3)
 
 
