@@ -277,7 +277,7 @@ def test_point_size_follows_the_spacing_unless_set_by_hand(display, modifiers, o
     obj.data.vertices.foreach_set("co", 3.0 * attribute(obj, "position").reshape(-1))
     bpy.ops.meshfree.analyze()
     assert radius(display, modifiers, obj) == pytest.approx(3.0 * first, rel=1e-3)
-    obj.meshfree.point_size = 1.5
+    obj.meshfree.point_size = 2.2
     assert radius(display, modifiers, obj) == pytest.approx(6.0 * first, rel=1e-3)
     modifiers.set_input(display.find_display(obj), "Radius", 0.321)
     obj.data.vertices.foreach_set("co", 2.0 * attribute(obj, "position").reshape(-1))
