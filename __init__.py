@@ -8,6 +8,7 @@ def _modules():
         bake,
         cache,
         command,
+        counting,
         deform,
         exporting,
         fields,
@@ -31,12 +32,14 @@ def _modules():
         presets,
         range_selection,
         settings,
+        swatches,
     )
     from .ui import deform as deform_panel
 
     return (
         settings,
         cache,
+        counting,
         job,
         analyze,
         spectrum,
@@ -56,6 +59,7 @@ def _modules():
         range_selection,
         presets,
         panel,
+        swatches,
         points,
         applications,
         deform_panel,

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 from ..core import PointCloudError, check_points
 from ..core.rims import FEWEST
 from .attributes import own_positions, point_count
-from .groups import chosen_members, members
+from .counting import members
+from .groups import chosen_members
 from .modifiers import is_own
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
@@ -162,8 +163,9 @@ def metric(obj):
 def fingerprint(obj, glance=False, left_out=()) -> str:
     """Checksum of the positions but those of some points, of shape keys and of the rim group.
 
-    A glance is quick enough for a panel, a few milliseconds for 1 million points, and may see a change of the rim
-    group some seconds late. Of modifiers, if they are used, both see which ones there are, not their settings.
+    A glance is quick enough for a panel, some milliseconds for 1 million points, may see a change of the rim group
+    some seconds late, and is empty while that has not been counted yet. Of modifiers, if they are used, both see which
+    ones there are, not their settings.
     """
     positions = own_positions(obj.data)
     positions[np.asarray(left_out, dtype=int)] = 0.0
@@ -179,7 +181,10 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
         state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_own(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.rim_group:
-        checksum = zlib.crc32(repr(members(obj, obj.meshfree.rim_group, glance).checksum).encode(), checksum)
+        rim = members(obj, obj.meshfree.rim_group, glance)
+        if rim is None:
+            return ""
+        checksum = zlib.crc32(repr(rim.checksum).encode(), checksum)
     return f"{checksum:08x}"
 
 
@@ -195,12 +200,11 @@ def find_object(uid):
     return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
 
 
-def spacing(data) -> float:
-    """Typical distance between neighbouring points in local lengths, from 10,000 of them at most; 0 if unknown.
+def spacing(positions) -> float:
+    """Typical distance between neighbouring points, (n, 3), from 10,000 of them at most; 0 if unknown.
 
     The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8.
     """
-    positions = own_positions(data)
     positions = positions[np.isfinite(positions).all(axis=1)]
     if len(positions) < 9:
         return 0.0

@@ -3,7 +3,7 @@
 import bpy
 
 from ..operators import live
-from ..operators.binding import handle_names, handled_object, is_bound, stale_reason
+from ..operators.binding import copied_from, handle_names, handled_object, is_bound, stale_reason
 from ..operators.deform_nodes import find_deform, is_baked
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property
@@ -72,7 +72,8 @@ def _draw_state(layout, obj):
     """Draw whether the points follow the handles, and what to do if not."""
     reason, working = stale_reason(obj, glance=True) or live.trouble(obj), live.preparing(obj)
     if reason:
-        lines, icon = _wrapped(f"{'Baked' if is_baked(obj) else 'Not up to date'}. {reason}"), "ERROR"
+        state = "Baked" if is_baked(obj) else "Copy" if copied_from(obj) is not None else "Not up to date"
+        lines, icon = _wrapped(f"{state}. {reason}"), "ERROR"
     elif working is not None:
         lines, icon = [f"Preparing: {working[0]}, {working[1]:.0%}"], "SORTTIME"
     else:
