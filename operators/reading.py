@@ -16,6 +16,7 @@ from .groups import chosen_members
 from .modifiers import is_own
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
+_CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
 
 
 def shape_keys(obj):
@@ -27,9 +28,16 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
     """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
     if obj is None:
         return "No active object. Select a mesh with the points of a surface"
+    if obj.type == "EMPTY" and obj.instance_collection is not None:
+        return (
+            f'"{obj.name}" shows the collection "{obj.instance_collection.name}". Select an object of that, or use'
+            " Object > Apply > Make Instances Real"
+        )
     if obj.type not in TYPES:
         kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
-        return f'"{obj.name}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
+        article = "an" if kind[0] in "AE" else "a"
+        turned = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
+        return f'"{obj.name}" is {article} {kind}, not a Mesh. {turned} a mesh'
     if not obj.is_editable or not obj.data.is_editable:
         return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
     edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
@@ -37,6 +45,11 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
     if not point_count(obj.data):
         kind = "vertices" if obj.type == "MESH" else "points"
+        if obj.meshfree.point_count:  # it had some: Convert takes what modifiers show, and ours shows points
+            return (
+                f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under Points and'
+                " Groups"
+            )
         return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
 
@@ -135,8 +148,8 @@ def _evaluated_positions(context, obj):
             positions = own_positions(evaluated.data)
     if len(positions) != point_count(obj.data):
         raise PointCloudError(
-            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)}, so results'
-            " have no place. Apply these modifiers, or turn off Use Modifiers."
+            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)}, instances'
+            " not counted, so results have no place. Apply these modifiers, or turn off Use Modifiers."
         )
     return positions
 
