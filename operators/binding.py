@@ -129,9 +129,26 @@ def handled_object(obj, scene):
     if obj is None or obj.type in TYPES:
         return obj
     for other in scene.objects:
-        if other.type in TYPES and any(item.empty == obj for item in other.meshfree.deform.handle_items):
+        moved = other.type in TYPES and any(item.empty == obj for item in other.meshfree.deform.handle_items)
+        if moved and copied_from(other) is None:
             return other
     return obj
+
+
+def copied_from(obj):
+    """Return the bound object whose empties a copy of it still names, since they were not copied too; None for others.
+
+    Empties go with the object that they are children of, so that a copy stays as it is when it is moved.
+    """
+    empties = [item.empty for item in obj.meshfree.deform.handle_items if item.has_empty and is_there(item.empty)]
+    parents = [empty.parent for empty in empties]
+    if not is_bound(obj) or obj in parents:
+        return None
+    for parent in parents:
+        bound = parent is not None and parent.type in TYPES and is_bound(parent)
+        if bound and any(item.empty in empties for item in parent.meshfree.deform.handle_items):
+            return parent
+    return None
 
 
 def edited_rows(obj, constraints):
@@ -165,6 +182,11 @@ def stale_reason(obj, glance=False, trusting=False) -> str:
     count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
     if is_baked(obj):
         return "Its animation is baked. Delete the bake to let it follow the handles again"
+    original = copied_from(obj)
+    if original is not None and original.data == obj.data:
+        return f'It shares its mesh with "{original.name}", whose handles move both'
+    if original is not None:
+        return f'It has no handles of its own, "{original.name}" has them. Bind again to get copies of them'
     if count != settings.point_count:
         return f"It had {settings.point_count:,} points and has {count:,} now. Bind again"
     gone = [item.name for item in settings.handle_items if item.has_empty and not is_there(item.empty)]
@@ -174,7 +196,7 @@ def stale_reason(obj, glance=False, trusting=False) -> str:
         return 'The modifier "Mesh-Free Deform" was removed. Bind again'
     if settings.settings_used != settings_text(obj):
         return "Settings changed. Bind again"
-    others = [other.name for other in sharing_objects(obj) if is_bound(other)]
+    others = [other.name for other in sharing_objects(obj) if is_bound(other) and copied_from(other) != obj]
     if others:
         return f'It shares its mesh with "{others[0]}", which is bound, too. Make it a single user'
     if in_edit_mesh(obj):  # groups and positions are only known to be right when one leaves it
@@ -184,7 +206,8 @@ def stale_reason(obj, glance=False, trusting=False) -> str:
     constraints, groups = _glance(obj, glance, trusting)
     if settings.groups_used != groups:
         return "The groups of handles or anchors changed. Bind again"
-    if settings.fingerprint != rest_fingerprint(obj, constraints, glance):
+    known = rest_fingerprint(obj, constraints, glance)
+    if known and settings.fingerprint != known:
         return "The points at rest were moved. Bind again"
     return ""
 

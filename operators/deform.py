@@ -12,6 +12,7 @@ from .attributes import REST, own_positions, point_count, read_attribute, tag_ch
 from .binding import (
     POSE,
     WRITES,
+    copied_from,
     edited_rows,
     forget,
     handle_names,
@@ -32,7 +33,7 @@ from .positions import check_movable
 from .reading import key_positions, read_points, shape_keys
 from .ready import ReadyOperator
 from .result import length_text
-from .selecting import SelectionOperator, selected
+from .selecting import SelectionOperator, groups_changed, selected
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -57,6 +58,7 @@ class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
             for other in others:  # a point has one handle
                 assign(obj, other, chosen, "REMOVE", 1.0)
             assign(obj, name, chosen, "REPLACE", 1.0)
+            groups_changed(obj)
             return f'{np.count_nonzero(chosen):,} points are in the group "{name}"'
 
         return change
@@ -94,6 +96,8 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
         made, by_empty = result
         items = obj.meshfree.deform.handle_items
         kept = {item.name: (item.empty, tuple(item.rest)) for item in items if item.has_empty and is_there(item.empty)}
+        if copied_from(obj) is not None:
+            kept = {name: (_copy_empty(obj, empty), rest) for name, (empty, rest) in kept.items()}
         empties = []
         for index, name in enumerate(made.constraints.names):
             moved_by = kept.get(name)
@@ -130,6 +134,15 @@ def _add_empty(context, obj, name, rest, rows):
         collection.objects.link(empty)
     context.view_layer.update()
     return empty
+
+
+def _copy_empty(obj, empty):
+    """Give a copied object an empty of its own, as its original has it, animation included."""
+    copy = empty.copy()
+    copy.parent = obj
+    for collection in obj.users_collection:
+        collection.objects.link(copy)
+    return copy
 
 
 class BoundOperator(ReadyOperator):
@@ -274,6 +287,8 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
     )
 
     def change(self, context, obj):
+        others = [other for other in bpy.data.objects if other != obj and is_bound(other) and copied_from(other) != obj]
+        used = {item.empty for other in others for item in other.meshfree.deform.handle_items}
         empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
         put_back(context, obj)
         if is_baked(obj):
@@ -281,7 +296,7 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
         forget(obj)
         if self.delete_empties:
             for empty in empties:
-                if empty.type == "EMPTY":
+                if empty.type == "EMPTY" and empty not in used:
                     bpy.data.objects.remove(empty)
         return f"{obj.name}: is no longer bound"
 
@@ -292,10 +307,14 @@ def shown_displacement(obj):
 
 
 def put_back(context, obj):
-    """Put handles and points of a bound object to where they were bound, as far as its points are still the same."""
+    """Put handles and points of a bound object to where they were bound, as far as its points are still the same.
+
+    Handles of the object that it is a copy of stay where they are.
+    """
     settings = obj.meshfree.deform
+    own = copied_from(obj) is None
     for item in settings.handle_items:
-        if item.has_empty and is_there(item.empty):
+        if own and item.has_empty and is_there(item.empty):
             item.empty.matrix_world = obj.matrix_world @ Matrix(np.reshape(item.rest, (4, 4)).tolist())
     data = obj.data
     same = settings.point_count == point_count(data) and all(name in data.attributes for name in WRITES)

@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from ..core import PointCloudError, grow
 from .application import compute_all, naming, operator_reader
 from .attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
+from .counting import renew_counts
 from .groups import HANDLE, assign, check_assignable, chosen_members
 from .job import JobOperator
 from .reading import obstacle
@@ -139,6 +140,12 @@ def select(context, obj, chosen) -> str:
         write_attribute(obj.data, SELECTION, shown, "BOOLEAN")
     tag_changed(obj.data)
     return f"{np.count_nonzero(shown):,} of {len(shown):,} points are selected"
+
+
+def groups_changed(obj):
+    """Let the panel count the groups of an object again, and the display color them, if it does."""
+    renew_counts(obj)
+    obj.meshfree.show_groups = obj.meshfree.show_groups
 
 
 def analyzed(context, obj):
@@ -277,6 +284,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
 
         def change():
             assign(obj, name, chosen, self.action, self.weight)
+            groups_changed(obj)
             if self.role == "RIM" and self.action != "REMOVE":
                 obj.meshfree.rim_group = name
             verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]

@@ -4,7 +4,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..operators import live
-from ..operators.binding import handle_names, handled_object, is_bound, stale_reason
+from ..operators.binding import copied_from, handle_names, handled_object, is_bound, stale_reason
 from ..operators.deform_nodes import find_deform, is_baked
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property
@@ -72,10 +72,10 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
 def _draw_state(layout, obj):
     """Draw whether the points follow the handles, and what to do if not."""
     reason, working = stale_reason(obj, glance=True) or live.trouble(obj), live.preparing(obj)
-    if is_baked(obj):
-        text, icon = iface_("Baked. {}").format(reason), "INFO"
-    elif reason:
-        text, icon = iface_("Not up to date. {}").format(reason), "ERROR"
+    if reason:
+        state = iface_("Baked. {}") if is_baked(obj) else iface_("Copy. {}") if copied_from(obj) is not None else ""
+        text = (state or iface_("Not up to date. {}")).format(reason)
+        icon = "INFO" if is_baked(obj) else "ERROR"
     elif working is not None:
         stage, fraction = working
         text, icon = iface_("Preparing: {}, {:.0%}").format(iface_(stage), fraction), "SORTTIME"

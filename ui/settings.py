@@ -55,6 +55,12 @@ def _resize(settings, context):
     show.resize(settings.id_data)
 
 
+def _show_groups(settings, context):
+    show.show_groups(settings.id_data)
+    if settings.show_groups:
+        show.use_material_preview(context)
+
+
 def _redraw(settings, context):
     show.redraw()
 
@@ -260,6 +266,12 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         max=100.0,
         step=5,
         update=_resize,
+    )
+    show_groups: BoolProperty(
+        name="Group Colors",
+        description="Color the points of the groups below, over what is on show",
+        default=False,
+        update=_show_groups,
     )
     legend: BoolProperty(
         name="Legend", description="Draw the colors with their values over the 3D view", default=True, update=_redraw

@@ -491,8 +491,9 @@ class TestHolding:
         assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-5)
         assert len([obj for obj in bpy.data.objects if obj.type == "EMPTY"]) == 1
 
-    def test_a_copy_that_shares_the_mesh(self, strip, binding):
-        bind()
+    def test_two_that_share_the_mesh_and_have_the_same_free_empty(self, strip, binding):
+        empty = bind()
+        empty.parent = None  # so that it is not told which one is the copy
         other = strip.copy()
         bpy.context.scene.collection.objects.link(other)
         assert "shares its mesh" in binding.stale_reason(strip)
