@@ -148,6 +148,10 @@ class Job(StageTimes):
         _redraw_panels(context)
 
 
+def _busy():
+    return f"{running().label} is running. Wait for it, or press Esc to stop it"
+
+
 def _redraw_panels(context):
     for window in context.window_manager.windows:
         for area in window.screen.areas:
@@ -162,23 +166,19 @@ class JobOperator(ReadyOperator):
     other keys go to Blender.
     """
 
-    _attended = False  # somebody at the window waits for it
+    _job = None
 
     @classmethod
     def poll(cls, context):
-        job = running()
-        if job is not None:
-            cls.poll_message_set(f"{job.label} is running. Wait for it, or press Esc to stop it")
+        if running() is not None:
+            cls.poll_message_set(_busy())
             return False
         return super().poll(context)
 
-    def takes_window(self):
-        """Tell whether to work beside the window, once for each time that somebody started it there."""
-        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
-        return attended and not bpy.app.background
-
     def start(self, context, objects, compute):
         """Begin to work for some objects."""
+        if running() is not None:  # since a file browser opened
+            raise PointCloudError(f"{_busy()}.")
         self._job = Job(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
         self._job.open(context)
         context.window_manager.modal_handler_add(self)
@@ -200,9 +200,10 @@ class JobOperator(ReadyOperator):
         return {"PASS_THROUGH"}
 
     def cancel(self, context):
-        """End the work with the window that shows it."""
-        self._job.stop()
-        self._job.close(context)
+        """End the work, if it has begun, with its dialog or the window that shows it."""
+        if self._job is not None:
+            self._job.stop()
+            self._job.close(context)
 
     def complete(self, context, job):
         """Find the objects again, and let `finish` use what was computed for them, if they are as they were."""
