@@ -15,6 +15,7 @@ from .binding import (
     edited_rows,
     forget,
     handle_names,
+    handled_object,
     is_bound,
     is_there,
     read_constraints,
@@ -133,16 +134,20 @@ def _add_empty(context, obj, name, rest, rows):
 
 
 class BoundOperator(ReadyOperator):
-    """An operator on a bound object."""
+    """An operator on a bound object, or on the one that the active empty moves."""
 
     works_stale = False  # whether the handles may have lost their hold
 
     @classmethod
+    def subject(cls, context):
+        return handled_object(context.object, context.scene)
+
+    @classmethod
     def obstacle(cls, context):
-        return super().obstacle(context) or not_bound(context.object)
+        return super().obstacle(context) or not_bound(cls.subject(context))
 
     def execute(self, context):
-        obj = context.object
+        obj = self.subject(context)
         try:
             if not self.works_stale:
                 check_fresh(obj)
@@ -223,9 +228,8 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        keyless = context.object is not None and context.object.type != "MESH"
-        reason = "Point clouds have no shape keys. Apply the deformation, or bake it" if keyless else ""
-        return super().obstacle(context) or reason
+        keyless = "Point clouds have no shape keys. Apply the deformation, or bake it"
+        return super().obstacle(context) or ("" if cls.subject(context).type == "MESH" else keyless)
 
     def change(self, context, obj):
         check_movable(obj, "SHAPE_KEY")
@@ -280,8 +284,9 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
             delete_bake(obj)
         forget(obj)
         if self.delete_empties:
+            used = {item.empty for other in bpy.data.objects for item in other.meshfree.deform.handle_items}
             for empty in empties:
-                if empty.type == "EMPTY":
+                if empty.type == "EMPTY" and empty not in used:  # by a copy of the object
                     bpy.data.objects.remove(empty)
         return f"{obj.name}: is no longer bound"
 
@@ -320,7 +325,7 @@ def delete_bake(obj):
     modifier = find_deform(obj)
     cache = get_input(modifier, "Cache")
     show_live(modifier)
-    if cache is not None:
+    if cache is not None and not cache.users:  # a copy of the object may show it, too
         bpy.data.meshes.remove(cache.data)  # and the object that shows it
 
 

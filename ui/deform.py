@@ -1,6 +1,7 @@
 """The panel of the deformation by handles."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..operators import live
 from ..operators.binding import handle_names, handled_object, is_bound, stale_reason
@@ -27,7 +28,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, obj = self.layout, handled_object(context.object, context.scene)
         if obj != context.object:
-            layout.label(text=f"Moves handles of {obj.name}", icon="EMPTY_DATA")
+            layout.label(text=iface_("Moves handles of {}").format(obj.name), icon="EMPTY_DATA")
             layout.context_pointer_set("object", obj)  # for which the buttons are
         settings = obj.meshfree.deform
         layout.use_property_split = True
@@ -37,7 +38,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         search_group(column, settings, "anchors", obj)
         names = handle_names(obj)
         if len(names) > 1:
-            column.label(text=f"{len(names)} groups of handles", icon="INFO")
+            column.label(text=iface_("{} groups of handles").format(len(names)), icon="INFO")
         layout.operator("meshfree.handle_add")
         column = layout.column(align=True)
         column.prop(settings, "add_empties")
