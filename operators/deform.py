@@ -8,7 +8,7 @@ from mathutils import Matrix, Vector
 from ..core import PointCloudError
 from . import live
 from .application import ApplicationOperator
-from .attributes import REST, own_positions, point_count, read_attribute, tag_changed
+from .attributes import REST, own_positions, point_count, read_attribute, write_own_positions
 from .binding import (
     POSE,
     WRITES,
@@ -29,8 +29,8 @@ from .binding import (
 from .deform_nodes import add_deform, find_deform, is_baked, show_live
 from .groups import HANDLE, assign, check_assignable, has_group
 from .modifiers import get_input
-from .positions import check_movable
-from .reading import key_positions, read_points, shape_keys
+from .positions import add_key, check_movable
+from .reading import read_points, shape_keys
 from .ready import ReadyOperator
 from .result import length_text
 from .selecting import SelectionOperator, selected
@@ -214,7 +214,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         empties = [
             (item.empty, relative_matrix(obj, item.empty)) if item.has_empty else None for item in settings.handle_items
         ]
-        _write_own_positions(obj, positions)
+        write_own_positions(obj.data, positions)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
         write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"
@@ -239,13 +239,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
                 f'Handles of "{obj.name}" are moved in Edit Mode, which a mesh with shape keys does not allow. Turn on'
                 " Add Empties and bind again."
             )
-        moved = shown_displacement(obj)
-        if obj.data.shape_keys is None:
-            obj.shape_key_add(name="Basis", from_mix=False)
-        key = obj.shape_key_add(name="Deform", from_mix=False)
-        positions = key_positions(obj.data.shape_keys.reference_key) + moved
-        key.points.foreach_set("co", positions.astype(np.float32).reshape(-1))
-        key.value = 0.0
+        key = add_key(obj, "Deform", shown_displacement(obj))
         put_back(context, obj)
         known = live.find(obj)
         renew(obj, constraints)
@@ -309,15 +303,10 @@ def put_back(context, obj):
         rows = constraints.moved[edited_rows(obj, constraints)]
         positions = own_positions(data)
         positions[rows] = read_attribute(data, REST)[rows]
-        _write_own_positions(obj, positions)
+        write_own_positions(obj.data, positions)
     context.view_layer.update()
     if same:
         write_displacement(obj, np.zeros((point_count(data), 3)), read_pose(obj), settled=True)
-
-
-def _write_own_positions(obj, positions):
-    obj.data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
-    tag_changed(obj.data)
 
 
 def delete_bake(obj):

@@ -51,7 +51,7 @@ class Snapshot:
         if reason:
             raise PointCloudError(reason)
         if _state(context, obj) != self._state or not same_lengths(self._metric, metric(obj)):
-            raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile')
+            raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile. Start it again')
         return obj
 
 
@@ -129,7 +129,7 @@ class Job(StageTimes):
         if text != self._shown:
             self._shown = text
             context.workspace.status_text_set(text)
-            _redraw_panels(context)
+            redraw_panels(context.window_manager)
 
     def open(self, context):
         """Begin to show it in the window and to look at it there again and again."""
@@ -145,15 +145,16 @@ class Job(StageTimes):
         context.window_manager.event_timer_remove(self._timer)
         for workspace in bpy.data.workspaces:  # another one may be open now than when it was shown
             workspace.status_text_set(None)
-        _redraw_panels(context)
+        redraw_panels(context.window_manager)
 
 
 def _busy():
     return f"{running().label} is running. Wait for it, or press Esc to stop it"
 
 
-def _redraw_panels(context):
-    for window in context.window_manager.windows:
+def redraw_panels(window_manager):
+    """Draw the sidebars of all 3D views again, for what they tell of a job."""
+    for window in window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 next(region for region in area.regions if region.type == "UI").tag_redraw()

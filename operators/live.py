@@ -17,7 +17,7 @@ from bpy.app.handlers import persistent
 
 from ..core import Cancelled, Deformer, PointCloudError
 from . import binding, cache
-from .job import Job
+from .job import Job, redraw_panels
 from .options import laplacian_options
 from .reading import TYPES, rim_points
 
@@ -265,7 +265,7 @@ def _tick():
     with _guarded():
         waiting = [_attend(obj, depsgraph) for obj, depsgraph in shown.values()]
     if any(waiting):
-        _redraw_panels()
+        redraw_panels(bpy.context.window_manager)
     return _TICK if any(waiting) else None
 
 
@@ -315,13 +315,6 @@ def _take(obj, job, key, pose):
         keep(obj, live)
         if binding.same_pose(job.pose, pose):
             write(obj, live, points, displacement, pose)
-
-
-def _redraw_panels():
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
 
 
 def _is_playing():

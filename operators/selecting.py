@@ -42,7 +42,7 @@ class SelectionOperator(JobOperator):
 
     def complete(self, context, job):
         obj = job.snapshots[0].find()
-        if obj is None:
+        if job.reason or obj is None:
             return super().complete(context, job)
         with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):
             return super().complete(context, job)
