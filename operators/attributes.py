@@ -90,6 +90,12 @@ def own_positions(data):
     return positions
 
 
+def write_own_positions(data, positions):
+    """Move the points of a mesh or a point cloud to these positions, (n, 3)."""
+    data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
+    tag_changed(data)
+
+
 def tag_changed(data):
     """Tell Blender that the data of a mesh or a point cloud changed."""
     if isinstance(data, bpy.types.Mesh):

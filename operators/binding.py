@@ -218,8 +218,8 @@ def is_there(empty) -> bool:
 
 
 def in_edit_mesh(obj) -> bool:
-    """Whether an object is a mesh in Edit Mode, whose data are out of reach as arrays."""
-    return obj.type == "MESH" and obj.mode == "EDIT"
+    """Whether a mesh is in Edit Mode, by this object or another one, so that its data are out of reach as arrays."""
+    return obj.type == "MESH" and obj.data.is_editmode
 
 
 def relative_matrix(obj, empty, depsgraph=None):

@@ -8,7 +8,7 @@ from mathutils import Matrix, Vector
 from ..core import PointCloudError
 from . import live
 from .application import ApplicationOperator
-from .attributes import REST, own_positions, point_count, read_attribute, tag_changed
+from .attributes import REST, own_positions, point_count, read_attribute, write_own_positions
 from .binding import (
     POSE,
     WRITES,
@@ -16,6 +16,7 @@ from .binding import (
     edited_rows,
     forget,
     handle_names,
+    handled_object,
     is_bound,
     is_there,
     read_constraints,
@@ -29,8 +30,8 @@ from .binding import (
 from .deform_nodes import add_deform, find_deform, is_baked, show_live
 from .groups import HANDLE, assign, check_assignable, has_group
 from .modifiers import get_input
-from .positions import check_movable
-from .reading import key_positions, read_points, shape_keys
+from .positions import add_key, check_movable
+from .reading import read_points, shape_keys
 from .ready import ReadyOperator
 from .result import length_text
 from .selecting import SelectionOperator, groups_changed, selected
@@ -146,16 +147,20 @@ def _copy_empty(obj, empty):
 
 
 class BoundOperator(ReadyOperator):
-    """An operator on a bound object."""
+    """An operator on a bound object, or on the one that the active empty moves."""
 
     works_stale = False  # whether the handles may have lost their hold
 
     @classmethod
+    def subject(cls, context):
+        return handled_object(context.object, context.scene)
+
+    @classmethod
     def obstacle(cls, context):
-        return super().obstacle(context) or not_bound(context.object)
+        return super().obstacle(context) or not_bound(cls.subject(context))
 
     def execute(self, context):
-        obj = context.object
+        obj = self.subject(context)
         try:
             if not self.works_stale:
                 check_fresh(obj)
@@ -222,7 +227,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         empties = [
             (item.empty, relative_matrix(obj, item.empty)) if item.has_empty else None for item in settings.handle_items
         ]
-        _write_own_positions(obj, positions)
+        write_own_positions(obj.data, positions)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
         write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"
@@ -236,9 +241,8 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        keyless = context.object is not None and context.object.type != "MESH"
-        reason = "Point clouds have no shape keys. Apply the deformation, or bake it" if keyless else ""
-        return super().obstacle(context) or reason
+        keyless = "Point clouds have no shape keys. Apply the deformation, or bake it"
+        return super().obstacle(context) or ("" if cls.subject(context).type == "MESH" else keyless)
 
     def change(self, context, obj):
         check_movable(obj, "SHAPE_KEY")
@@ -248,13 +252,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
                 f'Handles of "{obj.name}" are moved in Edit Mode, which a mesh with shape keys does not allow. Turn on'
                 " Add Empties and bind again."
             )
-        moved = shown_displacement(obj)
-        if obj.data.shape_keys is None:
-            obj.shape_key_add(name="Basis", from_mix=False)
-        key = obj.shape_key_add(name="Deform", from_mix=False)
-        positions = key_positions(obj.data.shape_keys.reference_key) + moved
-        key.points.foreach_set("co", positions.astype(np.float32).reshape(-1))
-        key.value = 0.0
+        key = add_key(obj, "Deform", shown_displacement(obj))
         put_back(context, obj)
         known = live.find(obj)
         renew(obj, constraints)
@@ -323,15 +321,10 @@ def put_back(context, obj):
         rows = constraints.moved[edited_rows(obj, constraints)]
         positions = own_positions(data)
         positions[rows] = read_attribute(data, REST)[rows]
-        _write_own_positions(obj, positions)
+        write_own_positions(obj.data, positions)
     context.view_layer.update()
     if same:
         write_displacement(obj, np.zeros((point_count(data), 3)), read_pose(obj), settled=True)
-
-
-def _write_own_positions(obj, positions):
-    obj.data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
-    tag_changed(obj.data)
 
 
 def delete_bake(obj):
@@ -339,7 +332,7 @@ def delete_bake(obj):
     modifier = find_deform(obj)
     cache = get_input(modifier, "Cache")
     show_live(modifier)
-    if cache is not None:
+    if cache is not None and not cache.users:  # a copy of the object may show it, too
         bpy.data.meshes.remove(cache.data)  # and the object that shows it
 
 

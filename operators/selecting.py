@@ -43,7 +43,7 @@ class SelectionOperator(JobOperator):
 
     def complete(self, context, job):
         obj = job.snapshots[0].find()
-        if obj is None:
+        if job.reason or obj is None:
             return super().complete(context, job)
         with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):
             return super().complete(context, job)
@@ -136,6 +136,8 @@ def select(context, obj, chosen) -> str:
         shown = chosen & ~hidden
         context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
         obj.data.vertices.foreach_set("select", shown)
+        for parts in (obj.data.edges, obj.data.polygons):  # Edit Mode takes the vertices of selected ones, too
+            parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
     else:
         write_attribute(obj.data, SELECTION, shown, "BOOLEAN")
     tag_changed(obj.data)
