@@ -8,6 +8,8 @@ def _modules():
         bake,
         cache,
         command,
+        convert,
+        counting,
         deform,
         exporting,
         fields,
@@ -31,12 +33,14 @@ def _modules():
         presets,
         range_selection,
         settings,
+        swatches,
     )
     from .ui import deform as deform_panel
 
     return (
         settings,
         cache,
+        counting,
         job,
         analyze,
         spectrum,
@@ -48,6 +52,7 @@ def _modules():
         live,
         minimal,
         selecting,
+        convert,
         importing,
         exporting,
         command,
@@ -56,6 +61,7 @@ def _modules():
         range_selection,
         presets,
         panel,
+        swatches,
         points,
         applications,
         deform_panel,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy
 import scipy
 
-from . import accuracy, applications, responsiveness, speed, targets
+from . import accuracy, applications, interaction, responsiveness, speed, targets
 
 TABLES = {
     "figure3": accuracy.paper_figure_3,
@@ -19,6 +19,8 @@ TABLES = {
     "applications": applications.applications,
     "areas": speed.areas_against_algorithm_1,
     "responsiveness": responsiveness.responsiveness,
+    "second_runs": interaction.second_runs,
+    "window": interaction.window,
     "stages": speed.stages_and_memory,
 }
 

@@ -179,7 +179,7 @@ class Deformer:
             self.steps, self.converged = 0, True
             return result
         turn, shift = self._fit_parts(target)
-        frame = np.einsum("nab,nb->na", turn, self._rest) + shift
+        frame = self._turned(turn, self._rest) + shift[self._part]
         inside = ~loose
         wanted = np.zeros_like(frame)
         wanted[self._row[inside]] = target[inside] - frame[self._row[inside]]
@@ -198,7 +198,7 @@ class Deformer:
             now = _check_positions(start, len(self.points), "starting points", "point")[self._moving]
         step, converged = 0, True
         if self.rotation_aware and steps > 0:
-            at_rest = np.einsum("nab,nb->na", turn, self._differential)
+            at_rest = self._turned(turn, self._differential)
             converged, mixing, begin = False, _Mixing(), now
             for step in range(1, int(steps) + 1):
                 report("Deform", step / (steps + 1.0))
@@ -219,7 +219,7 @@ class Deformer:
         return nearest_rotations(np.ascontiguousarray(products.transpose(2, 0, 1)))
 
     def _fit_parts(self, target):
-        """Return for each moving point the turn (3, 3) of its part, identity in the linear mode, and its new centre."""
+        """Return the turn of each part, (parts, 3, 3), identity in the linear mode, and its new centre, (parts, 3)."""
         inside = self._row >= 0
         row, target = self._row[inside], target[inside]
         part = self._part[row]
@@ -236,7 +236,13 @@ class Deformer:
             products += 1e-9 * spread[:, None, None] * np.eye(3)
             turn = np.moveaxis(nearest_rotations(np.moveaxis(products, 0, 2)), 2, 0)
         shift = after - np.einsum("pab,pb->pa", turn, before)
-        return turn[self._part], shift[self._part]
+        return turn, shift
+
+    def _turned(self, turn, vectors):
+        """Turn vectors at the moving points with their parts."""
+        if self._parts == 1:
+            return vectors @ turn[0].T
+        return np.einsum("nab,nb->na", turn[self._part], vectors)
 
     def _check_sets(self, held):
         if not len(self.handles):

@@ -90,6 +90,12 @@ def own_positions(data):
     return positions
 
 
+def write_own_positions(data, positions):
+    """Move the points of a mesh or a point cloud to these positions, (n, 3)."""
+    data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
+    tag_changed(data)
+
+
 def tag_changed(data):
     """Tell Blender that the data of a mesh or a point cloud changed."""
     if isinstance(data, bpy.types.Mesh):
@@ -149,10 +155,24 @@ def read_attribute(data, name: str):
 
 def _edited_values(mesh, name, data_type):
     """Read an attribute of a mesh in Edit Mode, where only its vertices know it, one by one."""
-    vertices = bmesh.from_edit_mesh(mesh).verts
-    layer = getattr(vertices.layers, _LAYERS[data_type])[name]
-    storage = _STORAGE[data_type]
-    return np.array([vertex[layer] for vertex in vertices], storage.dtype).reshape(-1, storage.components)
+    edited, storage = bmesh.from_edit_mesh(mesh), _STORAGE[data_type]
+    layers = getattr(edited.verts.layers, _LAYERS[data_type], None)
+    if layers is None:  # truth values in Blender 4.2
+        return _copied_values(edited, name, storage)
+    layer = layers[name]
+    return np.array([vertex[layer] for vertex in edited.verts], storage.dtype).reshape(-1, storage.components)
+
+
+def _copied_values(edited, name, storage):
+    """Read an attribute of a mesh in Edit Mode from a copy."""
+    copy = bpy.data.meshes.new(name)
+    try:
+        edited.to_mesh(copy)
+        values = np.empty((len(copy.vertices), storage.components), storage.dtype)
+        copy.attributes[name].data.foreach_get(storage.key, values.reshape(-1))
+    finally:
+        bpy.data.meshes.remove(copy)
+    return values
 
 
 def remove_numbered(data, prefix: str, beyond: int):

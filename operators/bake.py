@@ -30,12 +30,15 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
     )
     last: IntProperty(name="Last Frame", description="Last frame to bake", default=0, min=0, max=_LAST)
 
+    _timer = None
+
     def invoke(self, context, event):
+        self._attended = True
         self.first, self.last = context.scene.frame_start, context.scene.frame_end
         return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context):
-        obj, scene = context.object, context.scene
+        obj, scene, attended = self.subject(context), context.scene, self.takes_window()
         if not self.first and not self.last:
             self.first, self.last = scene.frame_start, scene.frame_end
         try:
@@ -48,7 +51,7 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self._uid, self._frames, self._kept = obj.session_uid, [], (scene.frame_current, scene.frame_subframe)
-        if context.window is not None and self.options.is_invoke:
+        if attended:
             self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
             context.window_manager.modal_handler_add(self)
             return {"RUNNING_MODAL"}
@@ -73,6 +76,13 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
         context.workspace.status_text_set(f"{self.bl_label}: {at}    Esc to stop")
         return {"RUNNING_MODAL"}
 
+    def cancel(self, context):
+        """Leave nothing in the window, should it be closed; also called when the dialog is."""
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            context.workspace.status_text_set(None)
+            self._timer = None
+
     def _find(self, context):
         return next((obj for obj in context.scene.objects if obj.session_uid == self._uid), None)
 
@@ -94,9 +104,7 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
 
     def _finish(self, context, problem, kind="ERROR"):
         """Go back to the frame that was shown, and write what was baked, or report why there is nothing."""
-        if hasattr(self, "_timer"):
-            context.window_manager.event_timer_remove(self._timer)
-            context.workspace.status_text_set(None)
+        self.cancel(context)
         frame, subframe = self._kept
         context.scene.frame_set(frame, subframe=subframe)
         if problem:
@@ -124,7 +132,8 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
     @classmethod
     def obstacle(cls, context):
         reason = super().obstacle(context)
-        return reason or ("" if is_baked(context.object) else f'Nothing of "{context.object.name}" is baked')
+        obj = cls.subject(context)
+        return reason or ("" if is_baked(obj) else f'Nothing of "{obj.name}" is baked')
 
     def change(self, context, obj):
         delete_bake(obj)

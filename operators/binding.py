@@ -98,11 +98,11 @@ def read_constraints(obj) -> Constraints:
     return Constraints(names, moved, owner, kept, np.concatenate([weights.max(axis=0)[moved], anchors[kept]]))
 
 
-def _glance(obj, glance):
+def _glance(obj, glance, trusting):
     """Return the constraints, or None, and text that differs where they do; a glance may miss a change for seconds."""
     key = (tuple(handle_names(obj)), obj.meshfree.deform.anchors, point_count(obj.data))
     known = _glances.get(obj.session_uid)
-    if not glance or known is None or known[0] != key or perf_counter() > known[1]:
+    if not glance or known is None or known[0] != key or (perf_counter() > known[1] and not trusting):
         began = perf_counter()
         try:
             constraints = read_constraints(obj)
@@ -129,9 +129,26 @@ def handled_object(obj, scene):
     if obj is None or obj.type in TYPES:
         return obj
     for other in scene.objects:
-        if other.type in TYPES and any(item.empty == obj for item in other.meshfree.deform.handle_items):
+        moved = other.type in TYPES and any(item.empty == obj for item in other.meshfree.deform.handle_items)
+        if moved and copied_from(other) is None:
             return other
     return obj
+
+
+def copied_from(obj):
+    """Return the bound object whose empties a copy of it still names, since they were not copied too; None for others.
+
+    Empties go with the object that they are children of, so that a copy stays as it is when it is moved.
+    """
+    empties = [item.empty for item in obj.meshfree.deform.handle_items if item.has_empty and is_there(item.empty)]
+    parents = [empty.parent for empty in empties]
+    if not is_bound(obj) or obj in parents:
+        return None
+    for parent in parents:
+        bound = parent is not None and parent.type in TYPES and is_bound(parent)
+        if bound and any(item.empty in empties for item in parent.meshfree.deform.handle_items):
+            return parent
+    return None
 
 
 def edited_rows(obj, constraints):
@@ -155,15 +172,21 @@ def settings_text(obj) -> str:
     return repr((settings_values(obj.meshfree), obj.meshfree.rim_group, obj.meshfree.use_modifiers))
 
 
-def stale_reason(obj, glance=False) -> str:
+def stale_reason(obj, glance=False, trusting=False) -> str:
     """Say why a bound object no longer follows its handles, and what to do; empty if it does.
 
-    A glance is quick enough for a panel; see `fingerprint`.
+    A glance is quick enough for a panel; see `fingerprint`. One that trusts is quick enough for a drag: it takes the
+    groups as they were seen last.
     """
     settings = obj.meshfree.deform
     count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
     if is_baked(obj):
         return "Its animation is baked. Delete the bake to let it follow the handles again"
+    original = copied_from(obj)
+    if original is not None and original.data == obj.data:
+        return f'It shares its mesh with "{original.name}", whose handles move both'
+    if original is not None:
+        return f'It has no handles of its own, "{original.name}" has them. Bind again to get copies of them'
     if count != settings.point_count:
         return f"It had {settings.point_count:,} points and has {count:,} now. Bind again"
     gone = [item.name for item in settings.handle_items if item.has_empty and not is_there(item.empty)]
@@ -173,17 +196,18 @@ def stale_reason(obj, glance=False) -> str:
         return 'The modifier "Mesh-Free Deform" was removed. Bind again'
     if settings.settings_used != settings_text(obj):
         return "Settings changed. Bind again"
-    others = [other.name for other in sharing_objects(obj) if is_bound(other)]
+    others = [other.name for other in sharing_objects(obj) if is_bound(other) and copied_from(other) != obj]
     if others:
         return f'It shares its mesh with "{others[0]}", which is bound, too. Make it a single user'
     if in_edit_mesh(obj):  # groups and positions are only known to be right when one leaves it
         return ""
     if any(obj.data.attributes.get(name) is None for name in WRITES):
         return f"The attributes {' and '.join(WRITES)} were removed. Bind again"
-    constraints, groups = _glance(obj, glance)
+    constraints, groups = _glance(obj, glance, trusting)
     if settings.groups_used != groups:
         return "The groups of handles or anchors changed. Bind again"
-    if settings.fingerprint != rest_fingerprint(obj, constraints, glance):
+    known = rest_fingerprint(obj, constraints, glance)
+    if known and settings.fingerprint != known:
         return "The points at rest were moved. Bind again"
     return ""
 
@@ -194,8 +218,8 @@ def is_there(empty) -> bool:
 
 
 def in_edit_mesh(obj) -> bool:
-    """Whether an object is a mesh in Edit Mode, whose data are out of reach as arrays."""
-    return obj.type == "MESH" and obj.mode == "EDIT"
+    """Whether a mesh is in Edit Mode, by this object or another one, so that its data are out of reach as arrays."""
+    return obj.type == "MESH" and obj.data.is_editmode
 
 
 def relative_matrix(obj, empty, depsgraph=None):

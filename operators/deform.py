@@ -8,13 +8,15 @@ from mathutils import Matrix, Vector
 from ..core import PointCloudError
 from . import live
 from .application import ApplicationOperator
-from .attributes import REST, own_positions, point_count, read_attribute, tag_changed
+from .attributes import REST, own_positions, point_count, read_attribute, write_own_positions
 from .binding import (
     POSE,
     WRITES,
+    copied_from,
     edited_rows,
     forget,
     handle_names,
+    handled_object,
     is_bound,
     is_there,
     read_constraints,
@@ -28,11 +30,11 @@ from .binding import (
 from .deform_nodes import add_deform, find_deform, is_baked, show_live
 from .groups import HANDLE, assign, check_assignable, has_group
 from .modifiers import get_input
-from .positions import check_movable
-from .reading import key_positions, read_points, shape_keys
+from .positions import add_key, check_movable
+from .reading import read_points, shape_keys
 from .ready import ReadyOperator
 from .result import length_text
-from .selecting import SelectionOperator, selected
+from .selecting import SelectionOperator, groups_changed, selected
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -57,6 +59,7 @@ class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
             for other in others:  # a point has one handle
                 assign(obj, other, chosen, "REMOVE", 1.0)
             assign(obj, name, chosen, "REPLACE", 1.0)
+            groups_changed(obj)
             return f'{np.count_nonzero(chosen):,} points are in the group "{name}"'
 
         return change
@@ -94,6 +97,8 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
         made, by_empty = result
         items = obj.meshfree.deform.handle_items
         kept = {item.name: (item.empty, tuple(item.rest)) for item in items if item.has_empty and is_there(item.empty)}
+        if copied_from(obj) is not None:
+            kept = {name: (_copy_empty(obj, empty), rest) for name, (empty, rest) in kept.items()}
         empties = []
         for index, name in enumerate(made.constraints.names):
             moved_by = kept.get(name)
@@ -132,17 +137,30 @@ def _add_empty(context, obj, name, rest, rows):
     return empty
 
 
+def _copy_empty(obj, empty):
+    """Give a copied object an empty of its own, as its original has it, animation included."""
+    copy = empty.copy()
+    copy.parent = obj
+    for collection in obj.users_collection:
+        collection.objects.link(copy)
+    return copy
+
+
 class BoundOperator(ReadyOperator):
-    """An operator on a bound object."""
+    """An operator on a bound object, or on the one that the active empty moves."""
 
     works_stale = False  # whether the handles may have lost their hold
 
     @classmethod
+    def subject(cls, context):
+        return handled_object(context.object, context.scene)
+
+    @classmethod
     def obstacle(cls, context):
-        return super().obstacle(context) or not_bound(context.object)
+        return super().obstacle(context) or not_bound(cls.subject(context))
 
     def execute(self, context):
-        obj = context.object
+        obj = self.subject(context)
         try:
             if not self.works_stale:
                 check_fresh(obj)
@@ -209,7 +227,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         empties = [
             (item.empty, relative_matrix(obj, item.empty)) if item.has_empty else None for item in settings.handle_items
         ]
-        _write_own_positions(obj, positions)
+        write_own_positions(obj.data, positions)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
         write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"
@@ -223,9 +241,8 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        keyless = context.object is not None and context.object.type != "MESH"
-        reason = "Point clouds have no shape keys. Apply the deformation, or bake it" if keyless else ""
-        return super().obstacle(context) or reason
+        keyless = "Point clouds have no shape keys. Apply the deformation, or bake it"
+        return super().obstacle(context) or ("" if cls.subject(context).type == "MESH" else keyless)
 
     def change(self, context, obj):
         check_movable(obj, "SHAPE_KEY")
@@ -235,13 +252,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
                 f'Handles of "{obj.name}" are moved in Edit Mode, which a mesh with shape keys does not allow. Turn on'
                 " Add Empties and bind again."
             )
-        moved = shown_displacement(obj)
-        if obj.data.shape_keys is None:
-            obj.shape_key_add(name="Basis", from_mix=False)
-        key = obj.shape_key_add(name="Deform", from_mix=False)
-        positions = key_positions(obj.data.shape_keys.reference_key) + moved
-        key.points.foreach_set("co", positions.astype(np.float32).reshape(-1))
-        key.value = 0.0
+        key = add_key(obj, "Deform", shown_displacement(obj))
         put_back(context, obj)
         known = live.find(obj)
         renew(obj, constraints)
@@ -274,6 +285,8 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
     )
 
     def change(self, context, obj):
+        others = [other for other in bpy.data.objects if other != obj and is_bound(other) and copied_from(other) != obj]
+        used = {item.empty for other in others for item in other.meshfree.deform.handle_items}
         empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
         put_back(context, obj)
         if is_baked(obj):
@@ -281,7 +294,7 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
         forget(obj)
         if self.delete_empties:
             for empty in empties:
-                if empty.type == "EMPTY":
+                if empty.type == "EMPTY" and empty not in used:
                     bpy.data.objects.remove(empty)
         return f"{obj.name}: is no longer bound"
 
@@ -292,10 +305,14 @@ def shown_displacement(obj):
 
 
 def put_back(context, obj):
-    """Put handles and points of a bound object to where they were bound, as far as its points are still the same."""
+    """Put handles and points of a bound object to where they were bound, as far as its points are still the same.
+
+    Handles of the object that it is a copy of stay where they are.
+    """
     settings = obj.meshfree.deform
+    own = copied_from(obj) is None
     for item in settings.handle_items:
-        if item.has_empty and is_there(item.empty):
+        if own and item.has_empty and is_there(item.empty):
             item.empty.matrix_world = obj.matrix_world @ Matrix(np.reshape(item.rest, (4, 4)).tolist())
     data = obj.data
     same = settings.point_count == point_count(data) and all(name in data.attributes for name in WRITES)
@@ -304,15 +321,10 @@ def put_back(context, obj):
         rows = constraints.moved[edited_rows(obj, constraints)]
         positions = own_positions(data)
         positions[rows] = read_attribute(data, REST)[rows]
-        _write_own_positions(obj, positions)
+        write_own_positions(obj.data, positions)
     context.view_layer.update()
     if same:
         write_displacement(obj, np.zeros((point_count(data), 3)), read_pose(obj), settled=True)
-
-
-def _write_own_positions(obj, positions):
-    obj.data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
-    tag_changed(obj.data)
 
 
 def delete_bake(obj):
@@ -320,7 +332,7 @@ def delete_bake(obj):
     modifier = find_deform(obj)
     cache = get_input(modifier, "Cache")
     show_live(modifier)
-    if cache is not None:
+    if cache is not None and not cache.users:  # a copy of the object may show it, too
         bpy.data.meshes.remove(cache.data)  # and the object that shows it
 
 

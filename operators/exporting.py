@@ -45,9 +45,12 @@ class ExportOperator(JobOperator, ExportHelper):
 
     def execute(self, context):
         attended = self.takes_window()
-        self._name, self._path = context.object.name, Path(bpy.path.abspath(self.filepath))
-        path = self._path
+        self._path = path = Path(bpy.path.abspath(self.filepath))
         try:
+            reason = self.obstacle(context)
+            if reason:  # since the file browser opened
+                raise PointCloudError(f"{reason}.")
+            self._name = context.object.name
             write = self.plan(context, context.object)
             if attended:
                 return self.start(context, [], lambda progress: write(path, progress))
@@ -161,13 +164,11 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if EIGENVALUES not in context.object:
-            cls.poll_message_set(f'"{context.object.name}" has no eigenvalues. Press Compute Modes first')
-            return False
-        return True
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason or EIGENVALUES in context.object:
+            return reason
+        return f'"{context.object.name}" has no eigenvalues. Press Compute Modes first'
 
     def plan(self, context, obj):
         values = np.array(obj[EIGENVALUES])

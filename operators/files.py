@@ -82,7 +82,7 @@ def _add_attribute(mesh, name, values):
     """Add a column of a file as an attribute; our own by the types that they have."""
     if values.ndim == 2:
         kind = "FLOAT_VECTOR"
-    elif name.startswith(PREFIX):
+    elif name.startswith(PREFIX) and type_of(name) != "FLOAT_VECTOR":
         kind = type_of(name)
     else:
         kind = "INT" if np.can_cast(values.dtype, np.int32) and values.dtype != bool else "FLOAT"
@@ -119,9 +119,10 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
         names = [name for name in names if name.startswith(PREFIX)]
     for name in names:
         table.attributes[name] = read_attribute(data, name)
-    normals = table.attributes.pop(NORMAL, table.attributes.pop(FILE_NORMAL, None))
-    if normals is not None:
-        table.attributes = {FILE_NORMAL: _world_normals(normals, matrix), **table.attributes}
+    vectors = [name for name in (NORMAL, FILE_NORMAL) if np.ndim(table.attributes.get(name)) == 2]
+    normals = [table.attributes.pop(name) for name in vectors]
+    if normals:
+        table.attributes[FILE_NORMAL] = _world_normals(normals[0], matrix)
     if with_colors:
         table.colors = _read_colors(data)
     return table

@@ -1,27 +1,12 @@
 """Groups of points: vertex groups of meshes; on point clouds, which have none, attributes of truth or weight."""
 
-import zlib
-from time import perf_counter
-from typing import NamedTuple
-
 import numpy as np
 
 from ..core import PointCloudError
 from .attributes import point_count, read_attribute, tag_changed, write_attribute
 
 HANDLE, ANCHOR, FIXED, SOURCE, VALUE, RIM = ROLES = "Handle", "Anchor", "Fixed", "Source", "Value", "Rim"
-_PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
-
-
-class Members(NamedTuple):
-    """How many points a group holds, and a checksum of which."""
-
-    count: int
-    checksum: int
-
-
-_seen = {}  # Members and until when they are trusted, by object and group
 
 
 def group_kind(obj) -> str:
@@ -58,26 +43,6 @@ def group_weights(obj, name: str, outside=0.0):
         next((item.weight for item in vertex.groups if item.group == index), outside) for vertex in obj.data.vertices
     )
     return np.fromiter(held, np.float64, count=point_count(obj.data))
-
-
-def members(obj, name: str, glance=False) -> Members:
-    """Count the points to which a group gives a weight above zero.
-
-    To read them takes Blender 80 ms for 100,000 points, too much for a panel: a glance may miss a change for some
-    seconds.
-    """
-    if not has_group(obj, name):
-        return Members(0, 0)
-    key = obj.session_uid, name, point_count(obj.data)
-    known, until = _seen.get(key, (None, 0.0))
-    began = perf_counter()
-    if not glance or known is None or began > until:
-        inside = group_weights(obj, name) > 0.0
-        known = Members(int(np.count_nonzero(inside)), zlib.crc32(inside))
-        if len(_seen) > 100:
-            _seen.clear()
-        _seen[key] = known, perf_counter() + _PATIENCE * (perf_counter() - began)
-    return known
 
 
 def is_chosen(obj, name: str, default: str) -> bool:
@@ -182,4 +147,3 @@ def assign(obj, name: str, chosen, action: str, weight: float):
         plain = np.isin(weights, (0.0, 1.0)).all() and not weighted
         write_attribute(obj.data, name, weights, "BOOLEAN" if plain else "FLOAT")
         tag_changed(obj.data)
-    members(obj, name)  # for the panel's count

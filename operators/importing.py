@@ -88,7 +88,8 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         attended = self.takes_window()
         self._framed = False
         names = [item.name for item in self.files if item.name]
-        self._paths = paths = [Path(self.directory, name) for name in names] or [Path(self.filepath)]
+        folder = Path(bpy.path.abspath(self.directory))
+        self._paths = paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
         try:
             if attended:
                 self._framed = self.frame

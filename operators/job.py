@@ -51,7 +51,7 @@ class Snapshot:
         if reason:
             raise PointCloudError(reason)
         if _state(context, obj) != self._state or not same_lengths(self._metric, metric(obj)):
-            raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile')
+            raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile. Start it again')
         return obj
 
 
@@ -129,7 +129,7 @@ class Job(StageTimes):
         if text != self._shown:
             self._shown = text
             context.workspace.status_text_set(text)
-            _redraw_panels(context)
+            redraw_panels(context.window_manager)
 
     def open(self, context):
         """Begin to show it in the window and to look at it there again and again."""
@@ -145,11 +145,16 @@ class Job(StageTimes):
         context.window_manager.event_timer_remove(self._timer)
         for workspace in bpy.data.workspaces:  # another one may be open now than when it was shown
             workspace.status_text_set(None)
-        _redraw_panels(context)
+        redraw_panels(context.window_manager)
 
 
-def _redraw_panels(context):
-    for window in context.window_manager.windows:
+def _busy():
+    return f"{running().label} is running. Wait for it, or press Esc to stop it"
+
+
+def redraw_panels(window_manager):
+    """Draw the sidebars of all 3D views again, for what they tell of a job."""
+    for window in window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 next(region for region in area.regions if region.type == "UI").tag_redraw()
@@ -162,23 +167,19 @@ class JobOperator(ReadyOperator):
     other keys go to Blender.
     """
 
-    _attended = False  # somebody at the window waits for it
+    _job = None
 
     @classmethod
     def poll(cls, context):
-        job = running()
-        if job is not None:
-            cls.poll_message_set(f"{job.label} is running. Wait for it, or press Esc to stop it")
+        if running() is not None:
+            cls.poll_message_set(_busy())
             return False
         return super().poll(context)
 
-    def takes_window(self):
-        """Tell whether to work beside the window, once for each time that somebody started it there."""
-        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
-        return attended and not bpy.app.background
-
     def start(self, context, objects, compute):
         """Begin to work for some objects."""
+        if running() is not None:  # since a file browser opened
+            raise PointCloudError(f"{_busy()}.")
         self._job = Job(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
         self._job.open(context)
         context.window_manager.modal_handler_add(self)
@@ -200,9 +201,10 @@ class JobOperator(ReadyOperator):
         return {"PASS_THROUGH"}
 
     def cancel(self, context):
-        """End the work with the window that shows it."""
-        self._job.stop()
-        self._job.close(context)
+        """End the work, if it has begun, with its dialog or the window that shows it."""
+        if self._job is not None:
+            self._job.stop()
+            self._job.close(context)
 
     def complete(self, context, job):
         """Find the objects again, and let `finish` use what was computed for them, if they are as they were."""

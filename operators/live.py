@@ -17,7 +17,7 @@ from bpy.app.handlers import persistent
 
 from ..core import Cancelled, Deformer, PointCloudError
 from . import binding, cache
-from .job import Job
+from .job import Job, redraw_panels
 from .options import laplacian_options
 from .reading import TYPES, rim_points
 
@@ -183,11 +183,13 @@ def update(obj, depsgraph=None, quick=False):
     quick : bool
         Take one step only and leave the rest to the timer; if factors have to be made, all of it.
     """
-    if binding.stale_reason(obj, glance=quick):
+    if binding.stale_reason(obj, glance=quick, trusting=quick):
         return
     pose = binding.read_pose(obj, depsgraph)
     written, settled = binding.written_pose(obj)
     if binding.same_pose(written, pose) and (settled or quick):
+        if settled:
+            _troubles.pop(obj.session_uid, None)  # it was at another pose
         return
     if not quick:
         live, points, displacement = plan_settled(obj, depsgraph)[0](lambda stage, fraction: None)
@@ -253,14 +255,17 @@ def _tick():
     """Take what threads have computed, and settle what has come to rest; a timer of the window."""
     if bpy.app.is_job_running("RENDER"):
         return _IDLE
-    scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
-    objects = {obj.session_uid: obj for obj in _bound_objects(scene)}
-    for uid in _jobs.keys() - objects.keys():
+    shown = {}  # each window has a scene of its own
+    for window in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=window):
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+        shown.update((obj.session_uid, (obj, depsgraph)) for obj in _bound_objects(window.scene))
+    for uid in _jobs.keys() - shown.keys():
         _jobs.pop(uid).work.stop()
     with _guarded():
-        waiting = [_attend(obj, depsgraph) for obj in objects.values()]
+        waiting = [_attend(obj, depsgraph) for obj, depsgraph in shown.values()]
     if any(waiting):
-        _redraw_panels()
+        redraw_panels(bpy.context.window_manager)
     return _TICK if any(waiting) else None
 
 
@@ -283,6 +288,7 @@ def _attend(obj, depsgraph) -> bool:
             job.work.stop()
     except PointCloudError as error:
         _troubles[uid] = str(error), None if job is None else job.pose
+        return job is not None  # else wait for another pose, not to go wrong again at once
     return True
 
 
@@ -309,13 +315,6 @@ def _take(obj, job, key, pose):
         keep(obj, live)
         if binding.same_pose(job.pose, pose):
             write(obj, live, points, displacement, pose)
-
-
-def _redraw_panels():
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
 
 
 def _is_playing():

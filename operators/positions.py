@@ -4,7 +4,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..core import PointCloudError
-from .attributes import own_positions, tag_changed
+from .attributes import own_positions, write_own_positions
 from .modifiers import is_own
 from .reading import key_positions, shape_keys
 
@@ -67,23 +67,22 @@ def write_positions(obj, reading, points, target: str, name: str):
     -------
     bpy.types.ShapeKey or None
     """
-    data = obj.data
-    key = None
+    moved = reading.local(points - reading.points)
     if target == "IN_PLACE" or obj.type != "MESH":
-        positions = own_positions(data) + reading.local(points - reading.points)
-        data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
-        tag_changed(data)
-    else:
-        if data.shape_keys is None:
-            obj.shape_key_add(name="Basis", from_mix=False)
-        key = obj.shape_key_add(name=name, from_mix=False)
-        key.value = 1.0
-        fill_key(obj, key, points - reading.points, reading)
+        write_own_positions(obj.data, own_positions(obj.data) + moved)
+        return None
+    key = add_key(obj, name, moved)
+    key.value = 1.0
     return key
 
 
-def fill_key(obj, key, moved, reading):
-    """Let a shape key move the points by so much, (n, 3), beside what the other keys do."""
-    positions = key_positions(obj.data.shape_keys.reference_key) + reading.local(moved)
+def add_key(obj, name: str, moved):
+    """Add a shape key of value 0 that moves the points by so much, (n, 3), beside what the other keys do."""
+    if obj.data.shape_keys is None:
+        obj.shape_key_add(name="Basis", from_mix=False)
+    key = obj.shape_key_add(name=name, from_mix=False)
+    key.value = 0.0
+    positions = key_positions(obj.data.shape_keys.reference_key) + moved
     key.points.foreach_set("co", positions.astype(np.float32).reshape(-1))
     obj.data.update()
+    return key

@@ -11,10 +11,12 @@ from scipy.spatial import cKDTree
 from ..core import PointCloudError, check_points
 from ..core.rims import FEWEST
 from .attributes import own_positions, point_count
-from .groups import chosen_members, members
+from .counting import members
+from .groups import chosen_members
 from .modifiers import is_own
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
+_CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
 
 
 def shape_keys(obj):
@@ -26,9 +28,16 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
     """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
     if obj is None:
         return "No active object. Select a mesh with the points of a surface"
+    if obj.type == "EMPTY" and obj.instance_collection is not None:
+        return (
+            f'"{obj.name}" shows the collection "{obj.instance_collection.name}". Select an object of that, or use'
+            " Object > Apply > Make Instances Real"
+        )
     if obj.type not in TYPES:
         kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
-        return f'"{obj.name}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
+        article = "an" if kind[0] in "AE" else "a"
+        turned = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
+        return f'"{obj.name}" is {article} {kind}, not a Mesh. {turned} a mesh'
     if not obj.is_editable or not obj.data.is_editable:
         return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
     edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
@@ -36,6 +45,11 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
     if not point_count(obj.data):
         kind = "vertices" if obj.type == "MESH" else "points"
+        if obj.meshfree.point_count:  # it had some: Convert takes what modifiers show, and ours shows points
+            return (
+                f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under Points and'
+                " Groups"
+            )
         return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
 
@@ -134,8 +148,8 @@ def _evaluated_positions(context, obj):
             positions = own_positions(evaluated.data)
     if len(positions) != point_count(obj.data):
         raise PointCloudError(
-            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)}, so results'
-            " have no place. Apply these modifiers, or turn off Use Modifiers."
+            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)}, instances'
+            " not counted, so results have no place. Apply these modifiers, or turn off Use Modifiers."
         )
     return positions
 
@@ -162,8 +176,9 @@ def metric(obj):
 def fingerprint(obj, glance=False, left_out=()) -> str:
     """Checksum of the positions but those of some points, of shape keys and of the rim group.
 
-    A glance is quick enough for a panel, a few milliseconds for 1 million points, and may see a change of the rim
-    group some seconds late. Of modifiers, if they are used, both see which ones there are, not their settings.
+    A glance is quick enough for a panel, some milliseconds for 1 million points, may see a change of the rim group
+    some seconds late, and is empty while that has not been counted yet. Of modifiers, if they are used, both see which
+    ones there are, not their settings.
     """
     positions = own_positions(obj.data)
     positions[np.asarray(left_out, dtype=int)] = 0.0
@@ -179,7 +194,10 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
         state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_own(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.rim_group:
-        checksum = zlib.crc32(repr(members(obj, obj.meshfree.rim_group, glance).checksum).encode(), checksum)
+        rim = members(obj, obj.meshfree.rim_group, glance)
+        if rim is None:
+            return ""
+        checksum = zlib.crc32(repr(rim.checksum).encode(), checksum)
     return f"{checksum:08x}"
 
 
@@ -195,12 +213,11 @@ def find_object(uid):
     return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
 
 
-def spacing(data) -> float:
-    """Typical distance between neighbouring points in local lengths, from 10,000 of them at most; 0 if unknown.
+def spacing(positions) -> float:
+    """Typical distance between neighbouring points, (n, 3), from 10,000 of them at most; 0 if unknown.
 
     The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8.
     """
-    positions = own_positions(data)
     positions = positions[np.isfinite(positions).all(axis=1)]
     if len(positions) < 9:
         return 0.0

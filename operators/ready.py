@@ -1,5 +1,7 @@
 """What all operators have in common: they run on objects that can be read and written, and can be undone."""
 
+import bpy
+
 from .reading import obstacle
 
 
@@ -8,11 +10,17 @@ class ReadyOperator:
 
     bl_options = {"REGISTER", "UNDO"}
     works_in = ("OBJECT",)  # modes of the object
+    _attended = False  # somebody at the window waits for it
+
+    @classmethod
+    def subject(cls, context):
+        """Return the object to work on, or None."""
+        return context.object
 
     @classmethod
     def obstacle(cls, context) -> str:
         """Return what keeps the operator from running, and what to do; empty if nothing does."""
-        return obstacle(context.object, cls.works_in)
+        return obstacle(cls.subject(context), cls.works_in)
 
     @classmethod
     def poll(cls, context):
@@ -20,3 +28,8 @@ class ReadyOperator:
         if reason:
             cls.poll_message_set(reason)
         return not reason
+
+    def takes_window(self):
+        """Tell whether to work beside the window, once for each time that somebody started it there."""
+        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
+        return attended and not bpy.app.background

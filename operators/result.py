@@ -111,7 +111,8 @@ def is_stale(obj, glance=False) -> bool:
     A glance is quick enough for a panel; see `fingerprint`.
     """
     kept = obj.meshfree
-    if kept.fingerprint != fingerprint(obj, glance) or kept.settings_used != repr(settings_values(kept)):
+    known = fingerprint(obj, glance)
+    if (known and kept.fingerprint != known) or kept.settings_used != repr(settings_values(kept)):
         return True
     return not same_lengths(np.reshape(kept.metric, (3, 3)), metric(obj))
 

@@ -134,13 +134,11 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
     asks = False
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if SEGMENT not in context.object.data.attributes:
-            cls.poll_message_set(f'"{context.object.name}" has no parts. Segment it first')
-            return False
-        return True
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason or SEGMENT in context.object.data.attributes:
+            return reason
+        return f'"{context.object.name}" has no parts. Segment it first'
 
     def plan(self, context, obj):
         leaving = [other for other in context.selected_objects if other.meshfree.make_single_user]

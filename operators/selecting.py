@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from ..core import PointCloudError, grow
 from .application import compute_all, naming, operator_reader
 from .attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
+from .counting import renew_counts
 from .groups import HANDLE, assign, check_assignable, chosen_members
 from .job import JobOperator
 from .reading import obstacle
@@ -42,7 +43,7 @@ class SelectionOperator(JobOperator):
 
     def complete(self, context, job):
         obj = job.snapshots[0].find()
-        if obj is None:
+        if job.reason or obj is None:
             return super().complete(context, job)
         with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):
             return super().complete(context, job)
@@ -135,10 +136,18 @@ def select(context, obj, chosen) -> str:
         shown = chosen & ~hidden
         context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
         obj.data.vertices.foreach_set("select", shown)
+        for parts in (obj.data.edges, obj.data.polygons):  # Edit Mode takes the vertices of selected ones, too
+            parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
     else:
         write_attribute(obj.data, SELECTION, shown, "BOOLEAN")
     tag_changed(obj.data)
     return f"{np.count_nonzero(shown):,} of {len(shown):,} points are selected"
+
+
+def groups_changed(obj):
+    """Let the panel count the groups of an object again, and the display color them, if it does."""
+    renew_counts(obj)
+    obj.meshfree.show_groups = obj.meshfree.show_groups
 
 
 def analyzed(context, obj):
@@ -277,6 +286,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
 
         def change():
             assign(obj, name, chosen, self.action, self.weight)
+            groups_changed(obj)
             if self.role == "RIM" and self.action != "REMOVE":
                 obj.meshfree.rim_group = name
             verb = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]

@@ -295,7 +295,7 @@ def activate(obj):
 def group(obj, chosen, role, name="", grown=0.0):
     """Put points of an object, (n,) bool, and those within a distance of them, into a vertex group."""
     activate(obj)
-    part("operators.selecting").select(obj, chosen)
+    part("operators.selecting").select(bpy.context, obj, chosen)
     if grown:
         bpy.ops.meshfree.select_grow(distance=grown)
     bpy.ops.meshfree.group_from_selection(role=role, name=name)

@@ -35,7 +35,7 @@ scene.cycles.use_denoising = False  # Debian's Blender cannot
 scene.render.resolution_x, scene.render.resolution_y = 960, 600
 bpy.context.preferences.view.render_display_type = "AREA"
 view = view3d()[0].spaces.active.region_3d
-view.view_perspective, view.view_distance = "PERSP", 1.4 * view.view_distance
+view.view_perspective, view.view_distance = "PERSP", 1.8 * view.view_distance
 view.view_rotation = Euler((1.25, 0.0, 0.3)).to_quaternion()
 rendered = []
 bpy.app.handlers.render_complete.append(lambda *_: rendered.append(True))
@@ -106,10 +106,12 @@ def choose(gui):
     gui.press("meshfree.group_from_selection(role='ANCHOR'")
     box(gui, (-2.0, -1.3), (-1.3, 0.0))
     gui.press("meshfree.group_from_selection(role='HANDLE'")
+    gui.python(f"{CORAL}.meshfree.show_groups = True")
     keep(gui, "groups")
     gui.point_at_view()
     gui.key("Tab")
     gui.wait_until(f"{CORAL}.mode == 'OBJECT'")
+    gui.python(f"{CORAL}.meshfree.show_groups = False")
 
 
 def scroll(gui, steps):
@@ -142,7 +144,6 @@ def color(gui):
     gui.wait_until("bpy.context.object.name == 'coral'")
     scroll(gui, 40)
     gui.press('meshfree.colormap(attribute="lb_displacement"')
-    gui.python(f"{CORAL}.meshfree.point_size = 1.2")
     gui.point_at_view()
     keep(gui, "display")
     scroll(gui, -15)

@@ -72,7 +72,6 @@ def seeing(gui):
     gui.press("meshfree.spectrum")
     gui.wait_until("'lb_eigenvalues' in bpy.context.object", 180)
     gui.settle()
-    gui.python("bpy.context.object.meshfree.point_size = 1.2")
     gui.python("bpy.context.object.meshfree.histogram = bpy.context.object.meshfree.plot_eigenvalues = True")
     gui.python("bpy.ops.meshfree.colormap(attribute='lb_eigenvector_020')")
     gui.python("bpy.context.object.select_set(False)")

@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from ..core import PointCloudError
 from ..operators.ready import ReadyOperator
 from .settings import COLOR_MAPS, RANGE_MODES
-from .show import show_attribute
+from .show import show_attribute, use_material_preview
 
 _SETTINGS = ("color_map", "reverse", "range_mode", "coverage")  # of the object, which keep what they are unless given
 
@@ -72,9 +72,8 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
                 setattr(self, name, getattr(obj.meshfree, name))
             elif getattr(self, name) != getattr(obj.meshfree, name):
                 setattr(obj.meshfree, name, getattr(self, name))  # which colors the points again
-        space = context.space_data
-        if self.switch_shading and space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
-            space.shading.type = "MATERIAL"
+        if self.switch_shading:
+            use_material_preview(context)
         return {"FINISHED"}
 
 

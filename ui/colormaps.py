@@ -25,6 +25,15 @@ _MAPS = {"VIRIDIS": _VIRIDIS, "MAGMA": _MAGMA, "COOL_WARM": _COOL_WARM, "CYCLIC"
 _NONE, *_CLASSES = ("555555", "0072b2", "e69f00", "009e73", "d55e00", "56b4e9", "cc79a7", "f0e442")
 CLASSES = len(_CLASSES)  # whole numbers from 0 with a colour of their own; they repeat from there
 _TRUTH = ("bdbdbd", "d55e00")
+# The same for groups of points, by the names of `operators.groups`.
+_GROUPS = {
+    "Handle": "d55e00",
+    "Anchor": "0072b2",
+    "Fixed": "009e73",
+    "Source": "f0e442",
+    "Value": "cc79a7",
+    "Rim": "56b4e9",
+}
 STEPPED = ("TRUTH", "CATEGORICAL")  # maps with a colour for each whole number
 
 
@@ -100,6 +109,11 @@ def colors(name: str, reverse: bool = False) -> list:
     else:
         codes = _MAPS[name].split()
     return [_color(code) for code in (*first, *(reversed(codes) if reverse else codes))]
+
+
+def group_color(role: str):
+    """Colour of the points of a group by what they are for, as linear (r, g, b, 1)."""
+    return _color(_GROUPS[role])
 
 
 def to_display(color):

@@ -1,9 +1,10 @@
 """The panel of the deformation by handles."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..operators import live
-from ..operators.binding import handle_names, handled_object, is_bound, stale_reason
+from ..operators.binding import copied_from, handle_names, handled_object, is_bound, stale_reason
 from ..operators.deform_nodes import find_deform, is_baked
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property
@@ -27,7 +28,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, obj = self.layout, handled_object(context.object, context.scene)
         if obj != context.object:
-            layout.label(text=f"Moves handles of {obj.name}", icon="EMPTY_DATA")
+            layout.label(text=iface_("Moves handles of {}").format(obj.name), icon="EMPTY_DATA")
             layout.context_pointer_set("object", obj)  # for which the buttons are
         settings = obj.meshfree.deform
         layout.use_property_split = True
@@ -37,7 +38,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         search_group(column, settings, "anchors", obj)
         names = handle_names(obj)
         if len(names) > 1:
-            column.label(text=f"{len(names)} groups of handles", icon="INFO")
+            column.label(text=iface_("{} groups of handles").format(len(names)), icon="INFO")
         layout.operator("meshfree.handle_add")
         column = layout.column(align=True)
         column.prop(settings, "add_empties")
@@ -72,13 +73,16 @@ def _draw_state(layout, obj):
     """Draw whether the points follow the handles, and what to do if not."""
     reason, working = stale_reason(obj, glance=True) or live.trouble(obj), live.preparing(obj)
     if reason:
-        lines, icon = _wrapped(f"{'Baked' if is_baked(obj) else 'Not up to date'}. {reason}"), "ERROR"
+        state = iface_("Baked. {}") if is_baked(obj) else iface_("Copy. {}") if copied_from(obj) is not None else ""
+        text = (state or iface_("Not up to date. {}")).format(reason)
+        icon = "INFO" if is_baked(obj) else "ERROR"
     elif working is not None:
-        lines, icon = [f"Preparing: {working[0]}, {working[1]:.0%}"], "SORTTIME"
+        stage, fraction = working
+        text, icon = iface_("Preparing: {}, {:.0%}").format(iface_(stage), fraction), "SORTTIME"
     else:
-        lines, icon = ["Bound: follows its handles"], "CHECKMARK"
+        text, icon = iface_("Bound: follows its handles"), "CHECKMARK"
     column = layout.column(align=True)
-    for line in lines:
+    for line in _wrapped(text):
         column.label(text=line, icon=icon)
         icon = "BLANK1"
 

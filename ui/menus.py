@@ -28,6 +28,7 @@ class MESHFREE_MT_object(bpy.types.Menu):
                 self.layout.separator()
             for name in names:
                 self.layout.operator(f"meshfree.{name}")
+        self.layout.operator_menu_enum("meshfree.convert", "target")
 
 
 class MESHFREE_MT_points(bpy.types.Menu):

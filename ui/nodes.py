@@ -10,6 +10,7 @@ LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such th
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
+_PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but groups
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
 
@@ -58,14 +59,29 @@ def display_group():
     return group
 
 
-def color_by_direction(material, name):
-    """Let a material show the directions of an attribute of vectors."""
-    if _begin(material, name, "DIRECTION"):
+def color_plain(material, groups):
+    """Let a material show nothing but groups, see `color_by_number`."""
+    kind = f"{_PLAIN} {groups}"
+    if material.get(_KIND) != kind or material.node_tree is None:
+        gray = add_node(new_tree(material), "ShaderNodeRGB", 0, 0)
+        gray.outputs[0].default_value = _GRAY
+        _shine(material.node_tree, gray.outputs[0], groups)
+        material[_KIND] = kind
+
+
+def is_plain(material) -> bool:
+    """Whether a material shows nothing but groups."""
+    return material.get(_KIND, "").startswith(_PLAIN)
+
+
+def color_by_direction(material, name, groups):
+    """Let a material show the directions of an attribute of vectors, and groups as in `color_by_number`."""
+    if _begin(material, name, f"DIRECTION {groups}"):
         tree = material.node_tree
-        _shine(tree, _direction_color(tree, tree.nodes[ATTRIBUTE].outputs["Vector"]), hidden=None)
+        _shine(tree, _direction_color(tree, tree.nodes[ATTRIBUTE].outputs["Vector"]), groups)
 
 
-def color_by_number(material, name, component, color_map, low, high, settings):
+def color_by_number(material, name, component, color_map, low, high, settings, groups):
     """Let a material show numbers as colours; only values of its nodes change where it did so before.
 
     Parameters
@@ -81,11 +97,13 @@ def color_by_number(material, name, component, color_map, low, high, settings):
         Range of the numbers.
     settings : MESHFREE_PG_settings
         Reverse, iso lines, and what becomes of numbers beyond the range.
+    groups : dict of str to tuple
+        Names of groups, whose points have these colours instead; (r, g, b, 1), linear.
     """
     stepped = color_map in colormaps.STEPPED
     repeated, hiding = color_map == "CATEGORICAL", settings.outside == "HIDE"
-    if _begin(material, name, f"{component} {repeated} {hiding}"):
-        _build_number_tree(material.node_tree, component, repeated, hiding)
+    if _begin(material, name, f"{component} {repeated} {hiding} {groups}"):
+        _build_number_tree(material.node_tree, component, repeated, hiding, groups)
     nodes = material.node_tree.nodes
     colors = colormaps.colors(color_map, settings.reverse)
     # Of a stepped map each number is in the middle of its colour, and the last one as wide as the others.
@@ -113,7 +131,7 @@ def _begin(material, name, kind):
     return not fits
 
 
-def _build_number_tree(tree, component, repeated, hiding):
+def _build_number_tree(tree, component, repeated, hiding, groups):
     """Add the nodes from a number to its colour: range, map, iso lines, and what lies beyond the range."""
     number = tree.nodes[ATTRIBUTE].outputs["Fac"]
     if component == "LENGTH":
@@ -140,28 +158,35 @@ def _build_number_tree(tree, component, repeated, hiding):
     above = _math(tree, 4, -800, "GREATER_THAN", number, name=ABOVE)
     beyond = _math(tree, 5, -600, "ADD", below, above)
     if hiding:
-        _shine(tree, color, hidden=beyond)
+        _shine(tree, color, groups, hidden=beyond)
     else:
-        _shine(tree, _mix(tree, 8, _math(tree, 6, -600, "MULTIPLY", beyond, name=GRAY), color, _BEYOND), hidden=None)
+        _shine(tree, _mix(tree, 8, _math(tree, 6, -600, "MULTIPLY", beyond, name=GRAY), color, _BEYOND), groups)
 
 
-def _shine(tree, color, hidden):
-    """Give the surface a colour; nothing is seen of it where a number, if there is one, is 1.
+def _shine(tree, color, groups, hidden=None):
+    """Give the surface a colour, and points of groups theirs; nothing is seen where a number, if there is one, is 1.
 
     Mostly emission, so that colours read as in the legend; some diffuse light, so that shapes show.
     """
-    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", 9, 100)
-    emission = add_node(tree, "ShaderNodeEmission", 9, -100)
-    mixed = add_node(tree, "ShaderNodeMixShader", 10, 0)
+    column = 9
+    for name, group_color in groups.items():
+        weight = add_node(tree, "ShaderNodeAttribute", column, -600, attribute_name=name, name=f"Group {name}")
+        inside = _math(tree, column + 1, -600, "GREATER_THAN", weight.outputs["Fac"], 0.0)
+        color = _mix(tree, column + 2, inside, color, group_color)
+        column += 1
+    column += 2 if groups else 0
+    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", column, 100)
+    emission = add_node(tree, "ShaderNodeEmission", column, -100)
+    mixed = add_node(tree, "ShaderNodeMixShader", column + 1, 0)
     mixed.inputs[0].default_value = 0.6
-    output = add_node(tree, "ShaderNodeOutputMaterial", 12, 0)
+    output = add_node(tree, "ShaderNodeOutputMaterial", column + 3, 0)
     tree.links.new(color, diffuse.inputs["Color"])
     tree.links.new(color, emission.inputs["Color"])
     tree.links.new(diffuse.outputs[0], mixed.inputs[1])
     tree.links.new(emission.outputs[0], mixed.inputs[2])
     if hidden is not None:
-        nothing = add_node(tree, "ShaderNodeBsdfTransparent", 10, -200)
-        shown, mixed = mixed, add_node(tree, "ShaderNodeMixShader", 11, 0)
+        nothing = add_node(tree, "ShaderNodeBsdfTransparent", column + 1, -200)
+        shown, mixed = mixed, add_node(tree, "ShaderNodeMixShader", column + 2, 0)
         tree.links.new(hidden, mixed.inputs[0])
         tree.links.new(shown.outputs[0], mixed.inputs[1])
         tree.links.new(nothing.outputs[0], mixed.inputs[2])

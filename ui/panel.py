@@ -59,7 +59,8 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             column = layout.column(align=True)
             for sentence in reason.split(". "):
                 column.label(text=sentence)
-            layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
+            if context.mode == "OBJECT":
+                layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
         _draw_summary(layout, obj)
         row = layout.row(align=True)

@@ -3,9 +3,12 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..operators.groups import ANCHOR, FIXED, HANDLE, RIM, SOURCE, VALUE, has_group, members
+from ..operators.convert import MESHFREE_OT_convert
+from ..operators.counting import members
+from ..operators.groups import ANCHOR, FIXED, HANDLE, RIM, SOURCE, VALUE, has_group
 from ..operators.reading import TYPES
 from .panel import SidebarPanel
+from .swatches import swatch
 
 _TITLES = {HANDLE: "Handles", ANCHOR: "Anchors", FIXED: "Fixed", SOURCE: "Sources", VALUE: "Values", RIM: "Rim"}
 
@@ -26,16 +29,22 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         for name in ("grow", "component", "front", "rim"):
             column.operator(f"meshfree.select_{name}")
+        layout.prop(obj.meshfree, "show_groups")
         column = layout.column(align=True)
         for role, title in _TITLES.items():
-            row = column.row(align=True)
-            row.operator(
-                "meshfree.group_from_selection", text=iface_("Assign to {}").format(iface_(title))
-            ).role = role.upper()
-            count = members(obj, role, glance=True).count
+            row = column.split(factor=0.66, align=True)
+            icon = {"icon_value": swatch(role)} if obj.meshfree.show_groups else {}
+            text = iface_("Assign to {}").format(iface_(title))
+            row.operator("meshfree.group_from_selection", text=text, **icon).role = role.upper()
+            found = members(obj, role, glance=True)
+            text = "..." if found is None else f"{found.count:,}"
             selecting = row.row(align=True)
             selecting.enabled = has_group(obj, role)
-            selecting.operator("meshfree.select_group", text=f"{count:,}", icon="RESTRICT_SELECT_OFF").name = role
+            selecting.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = role
+        if bpy.app.version >= MESHFREE_OT_convert.since:
+            to_mesh = obj.type != "MESH"
+            text = "Convert to Mesh" if to_mesh else "Convert to Point Cloud"
+            layout.operator("meshfree.convert", text=text).target = "MESH" if to_mesh else "POINTCLOUD"
 
 
 CLASSES = (MESHFREE_PT_points,)

@@ -55,6 +55,12 @@ def _resize(settings, context):
     show.resize(settings.id_data)
 
 
+def _show_groups(settings, context):
+    show.show_groups(settings.id_data)
+    if settings.show_groups:
+        show.use_material_preview(context)
+
+
 def _redraw(settings, context):
     show.redraw()
 
@@ -254,12 +260,18 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     point_size: FloatProperty(
         name="Point Size",
         description="Radius of the points as a multiple of their spacing, which it follows when they change",
-        default=0.75,
+        default=1.1,
         min=0.01,
         soft_max=3.0,
         max=100.0,
         step=5,
         update=_resize,
+    )
+    show_groups: BoolProperty(
+        name="Group Colors",
+        description="Color the points of the groups below, over what is on show",
+        default=False,
+        update=_show_groups,
     )
     legend: BoolProperty(
         name="Legend", description="Draw the colors with their values over the 3D view", default=True, update=_redraw

@@ -4,9 +4,11 @@ import math
 
 import bpy
 
-from ..operators.attributes import MEAN_CURVATURE, read_attribute
+from ..operators.attributes import MEAN_CURVATURE, own_positions, read_attribute
+from ..operators.binding import handle_names, positions_now
+from ..operators.groups import ANCHOR, HANDLE, RIM, ROLES
 from ..operators.modifiers import DISPLAY_TAG, get_input, set_input
-from ..operators.reading import fingerprint, spacing
+from ..operators.reading import TYPES, fingerprint, spacing
 from . import colormaps, legend
 from .display import (
     NAME,
@@ -17,8 +19,9 @@ from .display import (
     shown_attribute,
     without_unreached,
 )
-from .nodes import color_by_direction, color_by_number, display_group
+from .nodes import color_by_direction, color_by_number, color_plain, display_group, is_plain
 
+_MOST_HANDLES = 6  # that have colors
 _NO_SPACING = 0.01  # stands in where points are too few to have one
 
 
@@ -44,6 +47,16 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
         if name not in obj.data.attributes:
             name = MEAN_CURVATURE
     values = read_attribute(obj.data, name)
+    modifier, new = _add_display(obj)
+    if radius:
+        set_input(modifier, "Radius", radius)
+    elif new or not _sized_by_hand(obj):
+        resize(obj)
+    _color(obj, name, values)
+
+
+def _add_display(obj):
+    """Return the display modifier of an object, as its last one, and whether it is new."""
     modifier = find_display(obj)
     new = modifier is None
     if new:
@@ -51,11 +64,7 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
         modifier.node_group = display_group()
     modifier.use_pin_to_last = True
     obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
-    if radius:
-        set_input(modifier, "Radius", radius)
-    elif new or not _sized_by_hand(obj):
-        resize(obj)
-    _color(obj, name, values)
+    return modifier, new
 
 
 def recolor(obj):
@@ -64,6 +73,33 @@ def recolor(obj):
     if not name or name not in obj.data.attributes:
         return
     _color(obj, name, read_attribute(obj.data, name))
+
+
+def show_groups(obj):
+    """Follow the setting Group Colors: over what is on show, or on plain points, which it makes and takes away."""
+    if obj.type not in TYPES:
+        return
+    modifier, material = find_display(obj), find_material(obj)
+    plain = material is not None and is_plain(material)
+    if plain and not obj.meshfree.show_groups:
+        obj.modifiers.remove(modifier)
+        if not material.users - material.use_fake_user:
+            bpy.data.materials.remove(material)
+    elif modifier is None and obj.meshfree.show_groups:
+        _add_display(obj)
+        resize(obj)
+        plain = True
+    if plain and obj.meshfree.show_groups:
+        color_plain(_own_material(obj), _group_colors(obj))
+        obj.update_tag()
+    recolor(obj)
+
+
+def use_material_preview(context):
+    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
+    space = context.space_data
+    if space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
+        space.shading.type = "MATERIAL"
 
 
 def resize(obj):
@@ -75,7 +111,9 @@ def resize(obj):
     if obj.mode != "EDIT":
         points = fingerprint(obj, glance=True)
         if kept.spacing_of != points:
-            kept.spacing_of, kept.spacing = points, spacing(obj.data)
+            kept.spacing_of, kept.spacing = points, spacing(own_positions(obj.data))
+    elif not kept.spacing:
+        kept.spacing = spacing(positions_now(obj))
     set_input(modifier, "Radius", _radius(kept))
     obj.update_tag()
 
@@ -98,16 +136,11 @@ def _sized_by_hand(obj):
 
 
 def _color(obj, name, values):
-    settings = obj.meshfree
-    material = find_material(obj)
-    if material is None or material.users - material.use_fake_user > 1:  # a duplicate of an object gets its own
-        material = bpy.data.materials.new(f"{NAME} {obj.name}")
-        material[DISPLAY_TAG] = True
-        set_input(find_display(obj), "Material", material)
+    settings, material, groups = obj.meshfree, _own_material(obj), _group_colors(obj)
     part = component(name, settings)
     shown = numbers(values, part)
     if shown is None:
-        color_by_direction(material, name)
+        color_by_direction(material, name, groups)
     else:
         locked = settings.range_low, settings.range_high
         color_map, low, high = colormaps.fit(
@@ -115,7 +148,35 @@ def _color(obj, name, values):
         )
         if settings.range_mode != "LOCKED":
             settings.range_low, settings.range_high = low, high
-        color_by_number(material, name, part if values.ndim > 1 else "", color_map, low, high, settings)
+        component_shown = part if values.ndim > 1 else ""
+        color_by_number(material, name, component_shown, color_map, low, high, settings, groups)
     obj.update_tag()
     legend.renew(obj)
     redraw()
+
+
+def _own_material(obj):
+    """Return the material of an object's points; a new one if there is none, or if a duplicate shares it."""
+    material = find_material(obj)
+    if material is None or material.users - material.use_fake_user > 1:
+        material = bpy.data.materials.new(f"{NAME} {obj.name}")
+        material[DISPLAY_TAG] = True
+        set_input(find_display(obj), "Material", material)
+    return material
+
+
+def _group_colors(obj) -> dict:
+    """Return the colours of groups by their names: none if they are not shown.
+
+    Blender's shaders take 15 attributes at most, so not all of very many handles.
+    """
+    settings = obj.meshfree
+    if not settings.show_groups:
+        return {}
+    names = {role: role for role in ROLES}
+    if settings.rim_group:
+        names[settings.rim_group] = RIM
+    names[settings.deform.anchors or ANCHOR] = ANCHOR
+    for name in handle_names(obj)[:_MOST_HANDLES]:
+        names[name] = HANDLE
+    return {name: colormaps.group_color(role) for name, role in names.items()}

@@ -17,7 +17,7 @@ def _read_array(path) -> PointTable:
     """Read an array (n, 3) of numpy, or the one named points among several."""
     try:
         loaded = np.load(path, allow_pickle=False)
-        if path.suffix.lower() == ".npz":
+        if not isinstance(loaded, np.ndarray):  # several, whatever the file is called
             with loaded:
                 loaded = loaded["points"]
     except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile) as error:

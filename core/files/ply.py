@@ -83,7 +83,7 @@ def _read_header(file, path):
         raise InvalidPointsError(f"{path} is no PLY file: its first line is not 'ply'. Export it again.")
     order, elements = "", []
     for number in range(2, _LONGEST):
-        line = file.readline(_LONGEST).decode("ascii", errors="replace").strip()
+        line = file.readline(_LONGEST).decode(errors="replace").strip()
         match line.split():
             case ["end_header"]:
                 if order == "":

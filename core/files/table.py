@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, field
+from itertools import chain, count
 
 import numpy as np
 
@@ -100,17 +101,23 @@ def to_columns(table) -> dict:
     """Return the columns of a table by the names of files, numbers as they are; the reverse of `from_columns`."""
     columns = dict(zip(_AXES, table.points.T, strict=True))
     attributes = dict(table.attributes)
-    if NORMAL in attributes:
+    if np.ndim(attributes.get(NORMAL)) == 2:
         columns.update(zip(_NORMALS, attributes.pop(NORMAL).T, strict=True))
     if table.colors is not None:
         values = np.round(255.0 * table.colors).astype(np.uint8)
         columns.update(zip(("red", "green", "blue", "alpha"), values.T, strict=True))
     for name, values in attributes.items():
-        if values.ndim == 1:
-            columns[name] = values
-        else:
-            columns.update((f"{name}_{axis}", part) for axis, part in zip(_AXES, values.T, strict=True))
+        parts = {name: values}
+        if values.ndim == 2:
+            parts = {f"{name}_{axis}": part for axis, part in zip(_AXES, values.T, strict=True)}
+        columns.update((_free_name(part, columns), numbers) for part, numbers in parts.items())
     return columns
+
+
+def _free_name(name, columns):
+    """Return a name for one more column, with a number if it is taken: an attribute may be called x."""
+    numbered = (f"{name}_{number}" for number in count(2))
+    return next(free for free in chain([name], numbered) if free not in columns)
 
 
 def check_table(table, path):

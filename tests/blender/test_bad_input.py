@@ -57,8 +57,15 @@ def test_no_active_object():
         bpy.ops.meshfree.analyze()
 
 
-@pytest.mark.parametrize(("kind", "name"), [("LIGHT", "Light"), ("EMPTY", "Empty"), ("FONT", "Text")])
-def test_object_of_another_type(kind, name):
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        ("LIGHT", "a Light, not a Mesh. Select a mesh"),
+        ("EMPTY", "an Empty, not a Mesh. Select a mesh"),
+        ("FONT", "a Text, not a Mesh. Convert it"),
+    ],
+)
+def test_object_of_another_type(kind, text):
     data = {
         "LIGHT": lambda: bpy.data.lights.new("Other", "POINT"),
         "EMPTY": lambda: None,
@@ -67,7 +74,7 @@ def test_object_of_another_type(kind, name):
     obj = bpy.data.objects.new("Other", data)
     bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.objects.active = obj
-    with pytest.raises(RuntimeError, match=f'"Other" is a {name}, not a Mesh. Convert it'):
+    with pytest.raises(RuntimeError, match=f'"Other" is {text}'):
         bpy.ops.meshfree.analyze()
 
 

@@ -491,8 +491,9 @@ class TestHolding:
         assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-5)
         assert len([obj for obj in bpy.data.objects if obj.type == "EMPTY"]) == 1
 
-    def test_a_copy_that_shares_the_mesh(self, strip, binding):
-        bind()
+    def test_two_that_share_the_mesh_and_have_the_same_free_empty(self, strip, binding):
+        empty = bind()
+        empty.parent = None  # so that it is not told which one is the copy
         other = strip.copy()
         bpy.context.scene.collection.objects.link(other)
         assert "shares its mesh" in binding.stale_reason(strip)
@@ -507,8 +508,37 @@ class TestHolding:
         with pytest.raises(RuntimeError, match="scaled to nothing along an axis"):
             bpy.ops.meshfree.deform_update()
         strip.scale.x = 1.0
-        bpy.ops.meshfree.deform_update()
+        bpy.context.view_layer.update()
         assert live.trouble(strip) == ""
+
+    def test_a_mesh_that_another_object_edits(self, strip):
+        bind(add_empties=False)
+        other = strip.copy()
+        other.meshfree.deform.is_bound = False
+        bpy.context.scene.collection.objects.link(other)
+        strip.data.vertices.foreach_set("select", is_end(local_points(strip)))
+        bpy.context.view_layer.objects.active = other
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.transform.translate(value=(0.0, 0.0, 0.8))
+        bpy.context.view_layer.update()
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 0.8, atol=1e-5)
+
+    def test_a_copy_keeps_what_it_shares(self, strip):
+        animate(bind())
+        bpy.ops.meshfree.deform_bake()
+        copy = strip.copy()
+        copy.data = strip.data.copy()
+        bpy.context.scene.collection.objects.link(copy)
+        assert bpy.ops.meshfree.deform_free() == {"FINISHED"}
+        bpy.context.scene.frame_set(3)
+        assert_allclose(shown_points(copy)[is_end(local_points(copy)), 2], 1.5, atol=1e-4)
+        assert bpy.ops.meshfree.deform_unbind() == {"FINISHED"}
+        assert [item.empty.name for item in copy.meshfree.deform.handle_items] == ["Cloud Handle"]
+        bpy.context.view_layer.objects.active = copy
+        assert bpy.ops.meshfree.deform_unbind() == {"FINISHED"}
+        assert [obj.name for obj in bpy.data.objects] == ["Cloud", "Cloud.001"]
+        assert len(bpy.data.meshes) == 2
 
     def test_new_names_do_not_matter(self, strip):
         empty = bind()
@@ -719,6 +749,8 @@ class TestPanel:
         assert "Bound: follows its handles" in draw()
         assert "Moves handles of Cloud" in draw()
         assert "not a Mesh" not in self.texts()
+        for name in ("bake", "free", "reset", "apply"):
+            assert getattr(bpy.ops.meshfree, f"deform_{name}")() == {"FINISHED"}
         move_points(strip, 100, 1.0)
         assert "Not up to date. The points at rest were moved. Bind again" in self.texts()
 

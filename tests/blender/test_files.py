@@ -184,6 +184,14 @@ class TestColumns:
             assert_allclose(attribute(again, "lb_eigenvector_002"), attribute(obj, "lb_eigenvector_002"), rtol=1e-6)
             assert bpy.ops.meshfree.colormap(attribute="lb_boundary") == {"FINISHED"}
 
+    def test_numbers_named_like_vectors(self, tmp_path):
+        (tmp_path / "a.csv").write_text("x,y,z,lb_normal,normal\n" + "1,2,3,4,5\n" * 9)
+        obj = run_import(tmp_path / "a.csv")
+        assert attribute(obj, "lb_normal").tolist() == [4.0] * 9
+        bpy.ops.meshfree.export_points(filepath=str(tmp_path / "b.ply"))
+        table = read_file(tmp_path / "b.ply")
+        assert {name: values[0] for name, values in table.attributes.items()} == {"lb_normal": 4.0, "normal": 5.0}
+
     def test_names_that_blender_keeps_for_itself(self, tmp_path):
         columns = ["id", "material_index", "position", "n" * 80]
         write_file(tmp_path / "a.ply", sphere_points(), {name: np.arange(1000.0) for name in columns})
@@ -221,6 +229,13 @@ def test_undo_takes_an_import_back(tmp_path):
     assert "a" in bpy.data.objects
     bpy.ops.ed.undo()
     assert everywhere() == before
+
+
+def test_a_place_relative_to_the_open_file(tmp_path):
+    write_text(tmp_path / "a.xyz", SURVEY)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    assert bpy.ops.meshfree.import_points(filepath="//a.xyz") == {"FINISHED"}
+    assert bpy.ops.meshfree.import_points(directory="//", files=[{"name": "a.xyz"}]) == {"FINISHED"}
 
 
 def test_import_needs_object_mode(tmp_path):

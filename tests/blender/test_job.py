@@ -180,6 +180,19 @@ def test_one_job_at_a_time(operator, obj):
     assert bpy.ops.meshfree.analyze() == {"FINISHED"}
 
 
+def test_a_file_browser_that_was_open_before_another_job_began(operator, core, jobs, obj):
+    started = operator([obj], Work())
+    with pytest.raises(core.PointCloudError, match="Try is running. Wait for it, or press Esc to stop it"):
+        operator([obj], Work())
+    assert jobs.running() is started._job
+    started.tick("ESC", "PRESS")
+
+
+def test_a_dialog_that_is_closed_ends_nothing(operator, jobs):
+    object.__new__(operator).cancel(bpy.context)
+    assert jobs.running() is None
+
+
 def moved_point(obj):
     obj.data.vertices[3].co.x += 0.01
 

@@ -14,6 +14,7 @@ OPERATORS = (
     "analyze",
     "apply_preset",
     "colormap",
+    "convert",
     "deform_apply",
     "deform_bake",
     "deform_bind",
@@ -58,7 +59,7 @@ class Layout:
     def row(self, **_):
         return Layout(self.texts)
 
-    column = box = grid_flow = row
+    column = box = grid_flow = split = row
 
     def label(self, text="", icon="NONE"):
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
@@ -78,7 +79,7 @@ class Layout:
         search_data.path_resolve(search_property)
         self.prop(data, path)
 
-    def operator(self, idname, text=None, icon="NONE", depress=False):
+    def operator(self, idname, text=None, icon="NONE", icon_value=0, depress=False):
         kind = getattr(bpy.ops.meshfree, idname.removeprefix("meshfree.")).get_rna_type()
         self.texts.append(text if text is not None else kind.name)
         return SimpleNamespace(**dict.fromkeys(item.identifier for item in kind.properties))

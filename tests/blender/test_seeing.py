@@ -217,6 +217,7 @@ def test_points_out_of_range_are_gray_or_hidden(display, obj, tmp_path):
     above = pixels[40:][pixels[40:, :, 3] == 1.0][:, :3]
     assert np.median(np.ptp(above, axis=1)) > 0.1
     obj.meshfree.outside = "HIDE"
+    bpy.context.scene.cycles.transparent_max_bounces = 64  # Cycles paints what lies behind more hidden points black
     assert 0.35 * whole < covered_share(tmp_path / "hidden.png") < 0.65 * whole
 
 
@@ -273,17 +274,17 @@ def radius(display, modifiers, obj):
 
 def test_point_size_follows_the_spacing_unless_set_by_hand(display, modifiers, obj):
     first = radius(display, modifiers, obj)
-    assert first == pytest.approx(0.75 * obj.meshfree.spacing)
+    assert first == pytest.approx(1.1 * obj.meshfree.spacing)
     obj.data.vertices.foreach_set("co", 3.0 * attribute(obj, "position").reshape(-1))
     bpy.ops.meshfree.analyze()
     assert radius(display, modifiers, obj) == pytest.approx(3.0 * first, rel=1e-3)
-    obj.meshfree.point_size = 1.5
+    obj.meshfree.point_size = 2.2
     assert radius(display, modifiers, obj) == pytest.approx(6.0 * first, rel=1e-3)
     modifiers.set_input(display.find_display(obj), "Radius", 0.321)
     obj.data.vertices.foreach_set("co", 2.0 * attribute(obj, "position").reshape(-1))
     bpy.ops.meshfree.analyze()
     assert radius(display, modifiers, obj) == pytest.approx(0.321)
-    obj.meshfree.point_size = 0.75
+    obj.meshfree.point_size = 1.1
     assert radius(display, modifiers, obj) == pytest.approx(6.0 * first, rel=1e-3)
 
 

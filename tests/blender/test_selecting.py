@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, everything, grid_points, local_points, sphere_points
+from tests.blender.clouds import add_group, add_object, everything, grid_points, local_points, sphere_points
 
 
 @pytest.fixture
@@ -46,6 +46,21 @@ def test_a_group_from_the_selection(obj, mode):
         bpy.ops.object.mode_set(mode="OBJECT")
     assert (in_group(obj, "Anchor") == (local_points(obj)[:, 2] > 0.95)).all()
     bpy.ops.object.mode_set(mode=mode)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_selected_faces_do_not_select_their_vertices_again(mode):
+    """Edit Mode selects all vertices of edges and faces that are selected."""
+    meshed = add_object(sphere_points(40), faces=[(0, 1, 2), (3, 4, 5)])
+    add_group(meshed, "Chosen", [0, 3, 4])
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.object.mode_set(mode=mode)
+    assert bpy.ops.meshfree.select_group(name="Chosen") == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.flatnonzero(selected(meshed)).tolist() == [0, 3, 4]
+    assert [edge.vertices[:] for edge in meshed.data.edges if edge.select] == [(3, 4)]
 
 
 def test_growing(obj, mode):

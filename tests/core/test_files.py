@@ -47,6 +47,22 @@ def test_what_is_written_is_read_again(tmp_path, name):
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
+@pytest.mark.parametrize("name", ["a.ply", "a.xyz", "a.csv"])
+def test_attributes_named_like_coordinates_and_normals(tmp_path, name):
+    """They must not take the place of those."""
+    values = np.arange(200.0)
+    names = ("x", "flow_z", "red", "normal", "Höhe")
+    vectors = {"flow": np.ones((200, 3), np.float32)}
+    table = PointTable(POINTS, {**vectors, **dict.fromkeys(names, values)}, np.ones((200, 4), np.float32))
+    write_points(tmp_path / name, table)
+    read = read_points(tmp_path / name)
+    assert_allclose(read.points, POINTS, rtol=0.0, atol=1e-9)
+    assert_allclose(read.colors, 1.0)
+    assert read.attributes.keys() == {"flow", "x_2", "flow_z_2", "red_2", "normal", "Höhe"}
+    assert_allclose(read.attributes["flow"], 1.0)
+    assert_allclose(read.attributes["x_2"], values)
+
+
 def test_single_precision_by_choice(tmp_path):
     near = (POINTS - FAR).astype(np.float32).astype(np.float64)
     write_points(tmp_path / "a.ply", PointTable(near), double=False)
@@ -228,6 +244,14 @@ class TestArrays:
         np.save(tmp_path / "a.npy", POINTS)
         np.savez(tmp_path / "a.npz", points=POINTS, areas=np.ones(200))
         for name in ("a.npy", "a.npz"):
+            assert_array_equal(read_points(tmp_path / name).points, POINTS)
+
+    def test_under_the_name_of_the_other_kind(self, tmp_path):
+        np.save(tmp_path / "a.npy", POINTS)
+        (tmp_path / "a.npy").rename(tmp_path / "b.npz")
+        np.savez(tmp_path / "a.npz", points=POINTS)
+        (tmp_path / "a.npz").rename(tmp_path / "b.npy")
+        for name in ("b.npy", "b.npz"):
             assert_array_equal(read_points(tmp_path / name).points, POINTS)
 
     def test_others(self, tmp_path):

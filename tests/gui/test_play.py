@@ -143,6 +143,14 @@ class TestJobs:
         finish(job, 5)
         assert job.python("bpy.data.objects.keys()") == ["Camera", "Cube", "Light"]
 
+    @pytest.mark.parametrize("name", ["Smooth Points", "Export Points"])
+    def test_closing_the_dialog(self, gui, name):
+        add_sphere(gui, 500)
+        gui.search(name)
+        gui.key("Escape")  # no error in Python is seen, says the fixture
+        assert gui.python(WORKING) == []
+        assert gui.python(UNCHANGED)
+
     def test_orbit_while_it_works(self, gui):
         add_sphere(gui, 8000)
         start(gui, "Smooth Points")
