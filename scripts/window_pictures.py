@@ -65,6 +65,21 @@ def analyzed(gui):
     gui.python("bpy.context.object.select_set(False)")
 
 
+def seeing(gui):
+    """All that is drawn over the view."""
+    begin(gui, "MESHFREE_PT_spectrum")
+    gui.python("bpy.context.object.meshfree.modes = 30")
+    gui.press("meshfree.spectrum")
+    gui.wait_until("'lb_eigenvalues' in bpy.context.object", 180)
+    gui.settle()
+    gui.python("bpy.context.object.meshfree.point_size = 1.2")
+    gui.python("bpy.context.object.meshfree.histogram = bpy.context.object.meshfree.plot_eigenvalues = True")
+    gui.python("bpy.ops.meshfree.colormap(attribute='lb_eigenvector_020')")
+    gui.python("bpy.context.object.select_set(False)")
+    gui.python("view3d()[0].spaces.active.region_3d.view_location = (0.75, 0.0, -0.9)")
+    gui.point_at_view()
+
+
 def groups(gui):
     """Points chosen in Edit Mode, for the groups that the panel makes."""
     begin(gui, "MESHFREE_PT_points", count=6000)
@@ -94,7 +109,7 @@ def deform(gui):
     gui.python("bpy.data.objects['Coral Handle'].rotation_euler.y = 0.7")
 
 
-TAKES = (working, analyzed, groups, deform)
+TAKES = (working, analyzed, seeing, groups, deform)
 
 
 def main(gui, names):
