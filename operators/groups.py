@@ -1,16 +1,15 @@
 """Groups of points: vertex groups of meshes; on point clouds, which have none, attributes of truth or weight."""
 
 import zlib
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core import PointCloudError
 from .attributes import point_count, read_attribute, tag_changed, write_attribute
+from .glance import Glances
 
 HANDLE, ANCHOR, FIXED, SOURCE, VALUE, RIM = ROLES = "Handle", "Anchor", "Fixed", "Source", "Value", "Rim"
-_PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
 
 
@@ -21,7 +20,7 @@ class Members(NamedTuple):
     checksum: int
 
 
-_seen = {}  # Members and until when they are trusted, by object and group
+_glances = Glances()  # Members by object and group
 
 
 def group_kind(obj) -> str:
@@ -63,21 +62,16 @@ def group_weights(obj, name: str, outside=0.0):
 def members(obj, name: str, glance=False) -> Members:
     """Count the points to which a group gives a weight above zero.
 
-    To read them takes Blender 80 ms for 100,000 points, too much for a panel: a glance may miss a change for some
-    seconds.
+    To read them takes Blender 80 ms for 100,000 points, too much for a panel, which takes a glance.
     """
     if not has_group(obj, name):
         return Members(0, 0)
-    key = obj.session_uid, name, point_count(obj.data)
-    known, until = _seen.get(key, (None, 0.0))
-    began = perf_counter()
-    if not glance or known is None or began > until:
+
+    def read():
         inside = group_weights(obj, name) > 0.0
-        known = Members(int(np.count_nonzero(inside)), zlib.crc32(inside))
-        if len(_seen) > 100:
-            _seen.clear()
-        _seen[key] = known, perf_counter() + _PATIENCE * (perf_counter() - began)
-    return known
+        return Members(int(np.count_nonzero(inside)), zlib.crc32(inside))
+
+    return _glances.read((obj.session_uid, name, point_count(obj.data)), read, glance)
 
 
 def is_chosen(obj, name: str, default: str) -> bool:
