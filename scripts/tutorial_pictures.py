@@ -28,11 +28,15 @@ CORAL = "bpy.data.objects['coral']"
 HANDLE = "bpy.data.objects['coral Handle']"
 MOVED = f"np.linalg.norm(attribute({CORAL}, 'lb_displacement'), axis=1).max()"
 RENDERING = """
+from mathutils import Euler
 scene = bpy.context.scene
 scene.render.engine, scene.cycles.samples = "CYCLES", 32
 scene.cycles.use_denoising = False  # Debian's Blender cannot
 scene.render.resolution_x, scene.render.resolution_y = 960, 600
 bpy.context.preferences.view.render_display_type = "AREA"
+view = view3d()[0].spaces.active.region_3d
+view.view_perspective, view.view_distance = "PERSP", 1.8 * view.view_distance
+view.view_rotation = Euler((1.25, 0.0, 0.3)).to_quaternion()
 rendered = []
 bpy.app.handlers.render_complete.append(lambda *_: rendered.append(True))
 """
@@ -102,10 +106,12 @@ def choose(gui):
     gui.press("meshfree.group_from_selection(role='ANCHOR'")
     box(gui, (-2.0, -1.3), (-1.3, 0.0))
     gui.press("meshfree.group_from_selection(role='HANDLE'")
+    gui.python(f"{CORAL}.meshfree.show_groups = True")
     keep(gui, "groups")
     gui.point_at_view()
     gui.key("Tab")
     gui.wait_until(f"{CORAL}.mode == 'OBJECT'")
+    gui.python(f"{CORAL}.meshfree.show_groups = False")
 
 
 def scroll(gui, steps):
@@ -133,16 +139,27 @@ def bend(gui):
 
 
 def color(gui):
-    """Steps 5 and 6: the colors of the displacement, and a picture of them."""
+    """Step 5: how far the points went, and what the bent shape is like."""
     gui.click(*gui.python("on_screen((0.0, 0.0, 0.3))"))
     gui.wait_until("bpy.context.object.name == 'coral'")
     scroll(gui, 40)
     gui.press('meshfree.colormap(attribute="lb_displacement"')
-    gui.python(f"{CORAL}.meshfree.point_size = 1.2")
     gui.point_at_view()
     keep(gui, "display")
+    scroll(gui, -15)
+    gui.press("meshfree.deform_apply")
+    gui.wait_until(f"{MOVED} == 0.0")
+    scroll(gui, -40)
+    gui.press("meshfree.analyze")
+    gui.wait_until(WORKING)
+    gui.wait_until(f"not {WORKING}", 120)
+    scroll(gui, 40)
+    gui.press('meshfree.colormap(attribute="lb_mean_curvature"')
+
+
+def render(gui):
+    """Step 6: a picture by the camera."""
     gui.python(RENDERING)
-    gui.python("view3d()[0].spaces.active.region_3d.view_distance *= 1.6")
     gui.point_at_view()
     gui.key("ctrl+alt+KP_0")
     gui.python("bpy.context.scene.view_settings.view_transform = 'Standard'")
@@ -160,7 +177,7 @@ def color(gui):
 
 def main(gui):
     """Play all steps."""
-    for step in (write_sample, import_sample, analyze, choose, bend, color):
+    for step in (write_sample, import_sample, analyze, choose, bend, color, render):
         step(gui)
 
 

@@ -72,12 +72,13 @@ def seeing(gui):
     gui.press("meshfree.spectrum")
     gui.wait_until("'lb_eigenvalues' in bpy.context.object", 180)
     gui.settle()
-    gui.python("bpy.context.object.meshfree.point_size = 1.2")
     gui.python("bpy.context.object.meshfree.histogram = bpy.context.object.meshfree.plot_eigenvalues = True")
     gui.python("bpy.ops.meshfree.colormap(attribute='lb_eigenvector_020')")
     gui.python("bpy.context.object.select_set(False)")
-    gui.python("view3d()[0].spaces.active.region_3d.view_location = (0.75, 0.0, -0.9)")
+    gui.python("view3d()[0].spaces.active.region_3d.view_location = (0.0, 0.0, -1.3)")
     gui.point_at_view()
+    gui.key("n")  # what is drawn needs the width
+    gui.wait_until("view3d()[2].width < 2")
 
 
 def groups(gui):
