@@ -122,8 +122,9 @@ class ShownOperator(ApplicationOperator):
         return self.writes[0]
 
     def conclude(self, context, objects):
+        sharing = [other for obj in objects for other in sharing_objects(obj) if other in context.selected_objects]
         if self.show:
-            for obj in objects:
+            for obj in [*objects, *sharing]:
                 with context.temp_override(object=obj):
                     bpy.ops.meshfree.colormap(attribute=self.shown if self.shown in obj.data.attributes else "")
 

@@ -7,7 +7,6 @@ empties move which groups is in `Object.meshfree.deform`.
 import re
 import zlib
 from dataclasses import dataclass
-from time import perf_counter
 from uuid import uuid4
 
 import bmesh
@@ -24,14 +23,14 @@ from .attributes import (
     write_attribute,
 )
 from .deform_nodes import find_deform, is_baked
+from .glance import Glances
 from .groups import ANCHOR, chosen_weights, has_group, is_chosen
 from .options import settings_values
 from .reading import TYPES, fingerprint, sharing_objects
 
 WRITES = DISPLACEMENT, REST
 POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
-_PATIENCE = 30.0  # a glance at groups trusts what was read for this many times the seconds that reading took
-_glances = {}
+_glances = Glances()  # of `_glance`
 
 
 @dataclass(frozen=True)
@@ -100,18 +99,16 @@ def read_constraints(obj) -> Constraints:
 
 def _glance(obj, glance, trusting):
     """Return the constraints, or None, and text that differs where they do; a glance may miss a change for seconds."""
-    key = (tuple(handle_names(obj)), obj.meshfree.deform.anchors, point_count(obj.data))
-    known = _glances.get(obj.session_uid)
-    if not glance or known is None or known[0] != key or (perf_counter() > known[1] and not trusting):
-        began = perf_counter()
+
+    def read():
         try:
             constraints = read_constraints(obj)
-            text = constraints.checksum
         except PointCloudError as error:
-            constraints, text = None, str(error)
-        now = perf_counter()
-        known = _glances[obj.session_uid] = (key, now + _PATIENCE * (now - began), constraints, text)
-    return known[2:]
+            return None, str(error)
+        return constraints, constraints.checksum
+
+    key = obj.session_uid, tuple(handle_names(obj)), obj.meshfree.deform.anchors, point_count(obj.data)
+    return _glances.read(key, read, glance, trusting)
 
 
 def forget_glances():

@@ -116,6 +116,7 @@ def _take_display(obj):
     if modifier is None:
         return None
     kept = modifier.name, modifier.node_group, {name: get_input(modifier, name) for name in ("Radius", "Material")}
+    set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
     obj.modifiers.remove(modifier)
     return kept
 

@@ -285,7 +285,7 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
     )
 
     def change(self, context, obj):
-        others = [other for other in bpy.data.objects if other != obj and is_bound(other) and copied_from(other) != obj]
+        others = [other for other in bpy.data.objects if other != obj]  # copies, too, which may be bound to them again
         used = {item.empty for other in others for item in other.meshfree.deform.handle_items}
         empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
         put_back(context, obj)

@@ -299,7 +299,8 @@ def _start(obj, key, pose, depsgraph):
         return False
     if binding.same_pose(_troubles.get(obj.session_uid, (None, None))[1], pose):
         return False  # it would go wrong again
-    if perf_counter() >= _due or key not in _lives:
+    # A setting that is dragged must not start a thread for each value. Before the first factors waiting is of no use.
+    if perf_counter() >= _due or all(known[0] != key[0] for known in _lives):
         compute, pose = plan_settled(obj, depsgraph)
         _jobs[obj.session_uid] = _Settling(Job("Deform", [], compute), key, pose, prepares=key not in _lives)
     return True

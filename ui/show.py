@@ -82,6 +82,7 @@ def show_groups(obj):
     modifier, material = find_display(obj), find_material(obj)
     plain = material is not None and is_plain(material)
     if plain and not obj.meshfree.show_groups:
+        set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
         obj.modifiers.remove(modifier)
         if not material.users - material.use_fake_user:
             bpy.data.materials.remove(material)

@@ -193,6 +193,22 @@ class TestFollowing:
         bpy.ops.meshfree.deform_update()
         assert_allclose(displacement(strip), turned, atol=1e-5)
 
+    def test_a_setting_that_is_dragged_starts_no_thread_before_it_rests(self, strip, live, binding):
+        lift(bind(soft=True), 1.0)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for weight in (0.5, 0.1, 0.01):
+            strip.meshfree.deform.weight = weight
+            assert live._attend(strip, depsgraph)
+            assert not live._jobs
+        live._due = 0.0
+        assert live._attend(strip, depsgraph)
+        (job,) = live._jobs.values()
+        job.work.wait(30.0)
+        live._attend(strip, depsgraph)
+        assert not live._attend(strip, depsgraph)
+        assert binding.written_pose(strip)[1]
+        assert np.abs(displacement(strip)[is_end(local_points(strip)), 2] - 1.0).max() > 1e-3
+
     def test_strength(self, modifiers, strip):
         before = local_points(strip)
         lift(bind(), 1.0)

@@ -118,9 +118,12 @@ class TestCopiesOfBoundObjects:
         lift(empty_of(bound), 0.5)
         assert displacement(bound)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
 
-    def test_unbinding_the_original_removes_its_handle(self, bound):
-        duplicate(bound)
+    def test_the_last_of_the_copies_removes_the_handle(self, bound):
+        copy = duplicate(bound)
         choose(bound)
+        bpy.ops.meshfree.deform_unbind()
+        assert [obj.name for obj in bpy.data.objects if obj.type == "EMPTY"] == ["Cloud Handle"]
+        choose(copy)
         bpy.ops.meshfree.deform_unbind()
         assert not [obj for obj in bpy.data.objects if obj.type == "EMPTY"]
 
@@ -185,7 +188,7 @@ class TestGroupColors:
         ((count, names, radii, _),) = display_points(grouped)
         assert count == 600
         assert names >= set(ROLES)  # which the material reads
-        assert radii.max() == pytest.approx(0.75 * grouped.meshfree.spacing)
+        assert radii.max() == pytest.approx(1.1 * grouped.meshfree.spacing)
         colors = self.colors(module, grouped)
         assert set(colors) == set(ROLES)
         assert len(set(colors.values())) == 6
@@ -290,6 +293,38 @@ class TestGroupColors:
         texts = draw()
         assert "Assign to Handles" in texts
         assert texts.count("50") == 6
+
+
+class TestSeveral:
+    """Several selected objects of all kinds in one go."""
+
+    def test_all_that_share_a_mesh_show_it(self, cloud, module):
+        copy = duplicate(cloud, linked=True)
+        copy.location.x += 5.0
+        choose(cloud, copy)
+        bpy.ops.meshfree.analyze()
+        display = module("ui.display")
+        assert [display.shown_attribute(obj) for obj in (cloud, copy)] == ["lb_mean_curvature"] * 2
+        assert copy.meshfree.total_area == cloud.meshfree.total_area
+
+    @POINT_CLOUDS
+    def test_mixed_types(self, cloud):
+        other = add_object(sphere_points(500), "Other")
+        other.modifiers.new("Array", "ARRAY")
+        points = add_object(sphere_points(400), "Points")
+        choose(points)
+        bpy.ops.meshfree.convert(target="POINTCLOUD")
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=40, ring_count=24)
+        faces = bpy.context.object
+        empty = bpy.data.objects.new("Empty", None)
+        bpy.context.scene.collection.objects.link(empty)
+        choose(cloud, other, points, faces, empty)
+        for name in ("analyze", "smooth", "signature"):
+            settings = {"modes": 12, "count": 2} if name == "signature" else {}
+            assert getattr(bpy.ops.meshfree, name)(**settings) == {"FINISHED"}
+        for obj in (cloud, other, points, faces):
+            assert "lb_heat_signature_002" in obj.data.attributes
+            assert obj.meshfree.total_area > 0.0
 
 
 class TestObstacles:
@@ -452,6 +487,7 @@ class TestConverting:
             assert not result.is_stale(obj)
             assert display.shown_attribute(obj) == "lb_eigenvector_002"
             assert display.find_material(obj) == material
+            assert material.users == 1
             ((count, *_),) = display_points(obj)
             assert count == 600
             weights = module("operators.groups").group_weights
