@@ -112,8 +112,8 @@ class TestChangesOfTheGroup:
         assert (attribute(obj, "lb_boundary") == np.array(in_group(obj, "Part"))).all()
 
     def test_panel_looks_at_members_only_now_and_then(self, extension, obj, result, monkeypatch):
-        groups = importlib.import_module(f"{extension.__name__}.operators.groups")
-        monkeypatch.setattr(groups, "_PATIENCE", 1e9)
+        counting = importlib.import_module(f"{extension.__name__}.operators.counting")
+        monkeypatch.setattr(counting, "_PATIENCE", 1e9)
         assert not result.is_stale(obj)
         obj.vertex_groups["Rim"].add([500], 1.0, "REPLACE")
         assert not result.is_stale(obj, glance=True)
