@@ -213,7 +213,12 @@ def find_object(uid):
     return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
 
 
-def spacing(positions) -> float:
+def spacing(data) -> float:
+    """Typical distance between neighbouring points of a mesh or a point cloud in local lengths; 0 if unknown."""
+    return typical_distance(own_positions(data))
+
+
+def typical_distance(positions) -> float:
     """Typical distance between neighbouring points, (n, 3), from 10,000 of them at most; 0 if unknown.
 
     The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8.

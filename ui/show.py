@@ -4,11 +4,11 @@ import math
 
 import bpy
 
-from ..operators.attributes import MEAN_CURVATURE, own_positions, read_attribute
+from ..operators.attributes import MEAN_CURVATURE, read_attribute
 from ..operators.binding import handle_names, positions_now
 from ..operators.groups import ANCHOR, HANDLE, RIM, ROLES
 from ..operators.modifiers import DISPLAY_TAG, get_input, set_input
-from ..operators.reading import TYPES, fingerprint, spacing
+from ..operators.reading import TYPES, fingerprint, spacing, typical_distance
 from . import colormaps, legend
 from .display import (
     NAME,
@@ -112,9 +112,9 @@ def resize(obj):
     if obj.mode != "EDIT":
         points = fingerprint(obj, glance=True)
         if kept.spacing_of != points:
-            kept.spacing_of, kept.spacing = points, spacing(own_positions(obj.data))
+            kept.spacing_of, kept.spacing = points, spacing(obj.data)
     elif not kept.spacing:
-        kept.spacing = spacing(positions_now(obj))
+        kept.spacing = typical_distance(positions_now(obj))
     set_input(modifier, "Radius", _radius(kept))
     obj.update_tag()
 
