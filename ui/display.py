@@ -31,12 +31,12 @@ def shown_attribute(obj) -> str:
 
 def range_node(obj):
     """Return the node with the bounds of the colours; None if vectors are shown as directions, or nothing is."""
-    return _find_node(obj, RANGE)
+    return _find_node(obj, RANGE) if _find_node(obj, COLORS) else None  # somebody may have deleted either
 
 
 def color_node(obj):
     """Return the node with the colours from low to high; None if vectors are shown as directions, or nothing is."""
-    return _find_node(obj, COLORS)
+    return _find_node(obj, COLORS) if _find_node(obj, RANGE) else None
 
 
 def shown_range(obj):

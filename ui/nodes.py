@@ -102,7 +102,8 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
     """
     stepped = color_map in colormaps.STEPPED
     repeated, hiding = color_map == "CATEGORICAL", settings.outside == "HIDE"
-    if _begin(material, name, f"{component} {repeated} {hiding} {groups}"):
+    needed = (RANGE, COLORS, LINES, BELOW, ABOVE) if hiding else (RANGE, COLORS, LINES, BELOW, ABOVE, GRAY)
+    if _begin(material, name, f"{component} {repeated} {hiding} {groups}", needed):
         _build_number_tree(material.node_tree, component, repeated, hiding, groups)
     nodes = material.node_tree.nodes
     colors = colormaps.colors(color_map, settings.reverse)
@@ -119,9 +120,12 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
         nodes[GRAY].inputs[1].default_value = float(settings.outside == "GRAY")
 
 
-def _begin(material, name, kind):
-    """Let a material read an attribute; return whether it is empty but for that, since its nodes were of other kind."""
-    fits = material.get(_KIND) == kind and material.node_tree.nodes.get(ATTRIBUTE) is not None
+def _begin(material, name, kind, needed=()):
+    """Let a material read an attribute; return whether it is empty but for that.
+
+    So it is where its nodes were of another kind, or somebody has deleted one that is needed.
+    """
+    fits = material.get(_KIND) == kind and {ATTRIBUTE, *needed} <= set(material.node_tree.nodes.keys())
     if not fits:
         add_node(new_tree(material), "ShaderNodeAttribute", 0, 0, name=ATTRIBUTE)
         material[_KIND] = kind

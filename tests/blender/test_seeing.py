@@ -596,3 +596,15 @@ def test_point_clouds_are_seen_as_meshes_are(display, modifiers, overlay):
     middle = float(np.median(values))
     bpy.ops.meshfree.select_by_range(low=middle, high=1.0)
     assert (attribute(obj, ".selection") == (values >= np.float32(middle))).all()
+
+
+@pytest.mark.parametrize("name", ["Attribute", "Range", "Colors"])
+def test_nodes_that_somebody_deletes(display, overlay, obj, name):
+    nodes = display.find_material(obj).node_tree.nodes
+    nodes.remove(nodes[name])
+    obj.meshfree.histogram = True
+    overlay.pictures(obj, bpy.context.scene)
+    obj.meshfree.reverse = True
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert display.shown_attribute(obj) == "lb_area"
+    assert len(overlay.pictures(obj, bpy.context.scene)) == 2
