@@ -234,4 +234,4 @@ def on_bar():
     yield from bend(laplacian, quads, section)
 
 
-GROUPS = {"bar": on_bar, "scans": scans, "cost": cost, "following": following}
+GROUPS = {"bar": on_bar, "scans": scans, "cost": cost}

@@ -1,10 +1,16 @@
-"""How soon the extension answers: second runs in Blender's module, and keys in a window; both run on their own."""
+"""How soon the extension answers: handles and second runs in Blender's module, and keys in a window."""
 
 import subprocess
 import sys
 
-from .deformation import BLENDER, ROOT
+from .deformation import BLENDER, ROOT, following
 from .tables import Table
+from .targets import HEADER
+
+
+def dragged_handle():
+    """Points that follow a handle."""
+    return Table("A dragged handle", HEADER, list(following()))
 
 
 def second_runs():

@@ -19,6 +19,7 @@ TABLES = {
     "applications": applications.applications,
     "areas": speed.areas_against_algorithm_1,
     "responsiveness": responsiveness.responsiveness,
+    "dragged_handle": interaction.dragged_handle,
     "second_runs": interaction.second_runs,
     "window": interaction.window,
     "stages": speed.stages_and_memory,
