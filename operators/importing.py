@@ -24,6 +24,10 @@ if bpy.app.version >= (4, 5, 0):
     _KINDS.append(("POINTCLOUD", "Point Cloud", "A point cloud object, which shows its points by itself"))
 
 
+# Blender 5.2 crashes when it is given a path relative to the file for a property that does not say so.
+_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+
+
 class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     """Import the points of PLY, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as objects of loose vertices"""
 
@@ -31,6 +35,13 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
+    filepath: StringProperty(
+        name="File Path",
+        description="File to import",
+        maxlen=1024,
+        subtype="FILE_PATH",
+        options={"SKIP_PRESET", *_RELATIVE},
+    )
     filter_glob: StringProperty(
         name="File Filter",
         description="Names of files that are listed",
@@ -47,7 +58,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         name="Folder",
         description="Folder of several files",
         subtype="DIR_PATH",
-        options={"HIDDEN", "SKIP_SAVE"},
+        options={"HIDDEN", "SKIP_SAVE", *_RELATIVE},
     )
     up: EnumProperty(
         name="Up",
