@@ -40,7 +40,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="File to import",
         maxlen=1024,
         subtype="FILE_PATH",
-        options={"SKIP_PRESET", *_RELATIVE},
+        options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
     )
     filter_glob: StringProperty(
         name="File Filter",
