@@ -15,6 +15,7 @@ from bpy.app.handlers import persistent
 
 from .attributes import point_count
 from .groups import group_weights, has_group
+from .stages import redraw_panels
 
 _AT_ONCE = 5_000  # points of which all groups are read when a panel is drawn
 _PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
@@ -115,7 +116,7 @@ def _tick():
             _wanted.pop(uid), _passes.pop(uid, None)
     for uid, obj in objects.items():
         if uid in _wanted and _go_on(obj):
-            _redraw_panels()
+            redraw_panels(bpy.context.window_manager)
     return _PAUSE if _wanted else None
 
 
@@ -152,13 +153,6 @@ def _go_on(obj) -> bool:
     if not _wanted[uid]:
         del _wanted[uid]
     return True
-
-
-def _redraw_panels():
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
 
 
 @persistent

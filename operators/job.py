@@ -13,7 +13,7 @@ from .options import settings_values
 from .reading import find_object, fingerprint, metric, obstacle, read_points
 from .ready import ReadyOperator
 from .result import same_lengths
-from .stages import StageTimes
+from .stages import StageTimes, redraw_panels
 
 _TICK = 0.1  # seconds between two looks at the work
 _PATIENCE = 1.0  # seconds that Blender waits at its end for the thread to stop by itself
@@ -150,14 +150,6 @@ class Job(StageTimes):
 
 def _busy():
     return f"{running().label} is running. Wait for it, or press Esc to stop it"
-
-
-def redraw_panels(window_manager):
-    """Draw the sidebars of all 3D views again, for what they tell of a job."""
-    for window in window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                next(region for region in area.regions if region.type == "UI").tag_redraw()
 
 
 class JobOperator(ReadyOperator):

@@ -17,9 +17,10 @@ from bpy.app.handlers import persistent
 
 from ..core import Cancelled, Deformer, PointCloudError
 from . import binding, cache
-from .job import Job, redraw_panels
+from .job import Job
 from .options import laplacian_options
 from .reading import TYPES, rim_points
+from .stages import redraw_panels
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
 _TICK = 0.05  # seconds between two looks at a thread
