@@ -9,12 +9,14 @@ import numpy
 import scipy
 
 from . import accuracy, applications, interaction, responsiveness, speed, targets
+from .peers import check
 
 TABLES = {
     "figure3": accuracy.paper_figure_3,
     "spheres": accuracy.default_on_spheres,
     "structure": accuracy.structure,
     "invariance": accuracy.invariance,
+    "peers": check.check,
     "targets": targets.targets,
     "applications": applications.applications,
     "areas": speed.areas_against_algorithm_1,
