@@ -83,6 +83,10 @@ def pcl(points, time_factor=1.0):
     points : ndarray, (n, 3)
     time_factor : float
         t in squared spacings, of which one is the mean area.
+
+    Notes
+    -----
+    At a rim, where nothing bounds them, cells reach out some 1.5 spacings: the areas are too large there.
     """
     tree = cKDTree(points)
     distance, neighbors = tree.query(points, _VORONOI + 1)

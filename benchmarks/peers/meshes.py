@@ -63,11 +63,11 @@ def levy(points, triangles):
     return Operator(points, without_row_sums(0.5 * (rows + rows.T)), np.ones(len(areas)), areas)
 
 
-def robust(points):
-    """Sharp, Crane 2020, by robust_laplacian's own way from points."""
+def robust(points, neighbors=30):
+    """Sharp, Crane 2020, by robust_laplacian's own way from points; 30 neighbours are its default."""
     import robust_laplacian
 
-    stiffness, mass = robust_laplacian.point_cloud_laplacian(points)
+    stiffness, mass = robust_laplacian.point_cloud_laplacian(points, n_neighbors=neighbors)
     return Operator(points, sparse.csr_array(stiffness), mass.diagonal(), mass.diagonal())
 
 

@@ -58,7 +58,7 @@ METHODS = {
 }
 
 
-def build(name, points, triangles=None) -> Operator:
+def build(name, points, triangles=None, **settings) -> Operator:
     """Build an operator by name and take the time.
 
     Parameters
@@ -68,6 +68,8 @@ def build(name, points, triangles=None) -> Operator:
     points : ndarray, (n, 3)
     triangles : ndarray, (m, 3), optional
         The true mesh, for the methods that need one; the others never see it.
+    **settings
+        Of the method: ``options`` of ours, ``time_factor`` of pcl, ``neighbors`` of robust.
     """
     method = METHODS[name]
     if method.mesh and triangles is None:
@@ -77,5 +79,5 @@ def build(name, points, triangles=None) -> Operator:
     points = np.ascontiguousarray(points, dtype=np.float64)
     given = (points, triangles) if method.mesh else (points,)
     began = time.perf_counter()
-    operator = method.function(*given)
+    operator = method.function(*given, **settings)
     return replace(operator, name=name, seconds=time.perf_counter() - began)
