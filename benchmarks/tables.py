@@ -1,24 +1,41 @@
 """Rows of figures, written as Markdown."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass
 class Table:
-    """A titled table; every row is a list of texts as long as the header."""
+    """A titled table; every row is a list of texts as long as the header.
+
+    Attributes
+    ----------
+    plots : list of str
+        Pictures of the same figures, as files beside the document.
+    goals : list of list of str
+        Rows of quantity, target, what was measured, and whether it was met, for the summary of the document.
+    """
 
     title: str
     header: list
     rows: list
     note: str = ""
+    plots: list = field(default_factory=list)
+    goals: list = field(default_factory=list)
 
     def markdown(self):
         """Return the table as Markdown text."""
         lines = [f"## {self.title}", ""]
         if self.note:
             lines += [self.note, ""]
+        for plot in self.plots:
+            lines += [f"![{self.title}]({plot})", ""]
         lines += ["| " + " | ".join(row) + " |" for row in (self.header, ["---"] * len(self.header), *self.rows)]
         return "\n".join([*lines, ""])
+
+
+def goal(quantity, target, measured, met):
+    """Return a row of the summary."""
+    return [quantity, target, measured, "yes" if met else "no"]
 
 
 def gather(groups, names=(), report=lambda row: None):
