@@ -1,4 +1,4 @@
-"""Errors on spheres, the paper's Figure 3, structure of the matrix, and invariances."""
+"""Errors on spheres, structure of the matrix, and invariances."""
 
 import numpy as np
 from scipy.sparse.linalg import eigsh
@@ -41,24 +41,6 @@ def eigenvalue_errors(laplacian, exact):
     except core.UnresolvedModesError as error:
         values = laplacian.eigenpairs(error.resolved).eigenvalues
     return values[1:] / exact[1 : len(values)] - 1.0
-
-
-def paper_figure_3():
-    """The first three rows of the paper's Figure 3: uniform sphere, WPCA normals."""
-    laplacian = core.build_laplacian(icosahedral_sphere(28), options=core.LaplacianOptions.paper())
-    errors = sphere_errors(laplacian)
-    printed = (2.93e-3, 24.5e-3, 19.4e-3)
-    rows = [
-        [f"L {name}", f"{error:.3e}", f"{paper:.3e}", f"{100.0 * (error / paper - 1.0):+.1f} %"]
-        for name, error, paper in zip(("x", "x^2", "e^x"), errors, printed, strict=True)
-    ]
-    rows.append(["area", f"{laplacian.areas.sum() / SPHERE - 1.0:+.1e}", "0.08 %", ""])
-    return Table(
-        "Paper preset on the uniform sphere (Figures 2 and 3)",
-        ["quantity", "relative l2 error", "paper", "difference"],
-        rows,
-        f"Icosahedral sphere, {len(laplacian.points):,} points, `LaplacianOptions.paper()`.",
-    )
 
 
 def default_on_spheres():

@@ -1,4 +1,8 @@
-"""Run the benchmarks and write docs/results.md: ``python -m benchmarks.run [name ...]``."""
+"""Run the benchmarks and write docs/results.md: ``python -m benchmarks.run [name ...]``.
+
+Without names: the evaluation of the paper beside the peers, in about a quarter of an hour. The other tables stay as
+they are until they are named, or ``all``.
+"""
 
 import platform
 import sys
@@ -28,21 +32,43 @@ TABLES = {
 }
 
 
+SUMMARY = "What must come out"
+ABOUT = (
+    "Of the figures and tables below, which hold the rows. A peer is better than this project where it is above, by the"
+    " factor that is given."
+)
+
+
 def main(names):
-    """Print the named tables, all of them if none is named, and renew them in docs/results.md."""
+    """Print the named tables, those of the evaluation if none is named, and renew them in docs/results.md."""
     path = Path(__file__).parents[1] / "docs" / "results.md"
-    known = path.read_text(encoding="utf-8").split("\n## ")[1:] if names and path.exists() else []
-    tables = {text.partition("\n")[0]: f"## {text.strip()}\n" for text in known}
-    for name in names or TABLES:
+    every = EVALUATION | OTHERS
+    known = {}
+    for text in path.read_text(encoding="utf-8").split("\n## ")[1:] if path.exists() else []:
+        known[text.partition("\n")[0]] = f"## {text.strip()}\n"
+    goals = {row[0]: row for row in rows_of(known.pop(SUMMARY, ""))}
+    tables, seconds = {}, {}
+    for name in every if names == ["all"] else names or EVALUATION:
         began = time.perf_counter()
-        table = TABLES[name]()
+        table = every[name]()
+        seconds[name] = time.perf_counter() - began
         tables[table.title] = table.markdown()
-        print(tables[table.title], f"({time.perf_counter() - began:.0f} s)\n", flush=True)
+        figure = table.title.partition(":")[0]
+        goals = {key: row for key, row in goals.items() if not key.startswith(f"{figure}:")}
+        goals |= {row[0]: row for row in table.goals}
+        print(tables[table.title], f"({seconds[name]:.0f} s)\n", flush=True)
+    summary = Table(SUMMARY, ["quantity", "target", "measured", "met"], [goals[key] for key in sorted(goals)], ABOUT)
     head = (
-        "# Results\n\nMade by `make benchmark`; times are of the machine it ran on, compare only those of one table."
-        f" Python {platform.python_version()}, numpy {numpy.__version__}, scipy {scipy.__version__}.\n"
+        "# Results\n\nMade by `make benchmark`, on two cores in about a quarter of an hour; the tables after the peers'"
+        " by their names, such as `make benchmark ARGUMENTS=\"targets applications\"`. Times are of the machine it ran on,"
+        f" compare only those of one table. Python {platform.python_version()}, numpy {numpy.__version__},"
+        f" scipy {scipy.__version__}.\n"
     )
-    path.write_text("\n".join([head, *tables.values()]), encoding="utf-8")
+    # The order of those there were, the evaluation first.
+    order = [title for title in tables if title not in known] + list(known)
+    parts = [tables.get(title) or known[title] for title in order]
+    path.write_text("\n".join([head, summary.markdown(), *parts]), encoding="utf-8")
+    print(summary.markdown(), f"{sum(seconds.values()):.0f} s: {seconds}")
 
 
 if __name__ == "__main__":

@@ -33,6 +33,12 @@ class Table:
         return "\n".join([*lines, ""])
 
 
+def rows_of(text):
+    """Return the rows of the first table in Markdown text, as lists of texts."""
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
 def goal(quantity, target, measured, met):
     """Return a row of the summary."""
     return [quantity, target, measured, "yes" if met else "no"]
