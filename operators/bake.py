@@ -2,14 +2,17 @@
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.props import IntProperty
 
 from ..core import PointCloudError
+from ..core.phrases import Phrase
 from . import live
 from .attributes import DISPLACEMENT, point_count, read_attribute, write_attribute
 from .binding import stale_reason
 from .deform import BoundOperator, check_fresh, delete_bake
 from .deform_nodes import find_deform, is_baked, show_baked
+from .translation import translated
 
 _LAST = 1048574  # frame of Blender
 _TICK = 0.01  # seconds between two frames, for the window to notice Esc
@@ -45,10 +48,12 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
             check_fresh(obj)
             if self.last < self.first:
                 raise PointCloudError(
-                    f"The last frame, {self.last}, comes before the first one, {self.first}. Swap them."
+                    "The last frame, {last}, comes before the first one, {first}. Swap them.",
+                    last=self.last,
+                    first=self.first,
                 )
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         self._uid, self._frames, self._kept = obj.session_uid, [], (scene.frame_current, scene.frame_subframe)
         if attended:
@@ -65,15 +70,19 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
-            return self._finish(context, "Stopped: nothing was baked", "INFO")
+            return self._finish(context, Phrase("Stopped: nothing was baked"), "INFO")
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         problem = self._take(context)
         count = self.last - self.first + 1
         if problem or len(self._frames) == count:
             return self._finish(context, problem)
-        at = f"Frame {self.first + len(self._frames)}, {len(self._frames) / count:.0%}"
-        context.workspace.status_text_set(f"{self.bl_label}: {at}    Esc to stop")
+        text = Phrase(
+            "Bake: Frame {frame}, {share:.0%}    Esc to stop",
+            frame=self.first + len(self._frames),
+            share=len(self._frames) / count,
+        )
+        context.workspace.status_text_set(translated(text, iface_))
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
@@ -91,14 +100,14 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
         context.scene.frame_set(self.first + len(self._frames))
         obj = self._find(context)
         if obj is None:
-            return "The object was deleted. Nothing was baked."
+            return Phrase("The object was deleted. Nothing was baked.")
         try:
             live.update(obj)
         except PointCloudError as error:
-            return str(error)
+            return error.text
         reason = stale_reason(obj)
         if reason:
-            return f'"{obj.name}" is not up to date. {reason}.'
+            return Phrase('"{object}" is not up to date. {reason}.', object=obj.name, reason=reason)
         self._frames.append(read_attribute(obj.data, DISPLACEMENT))
         return ""
 
@@ -108,7 +117,7 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
         frame, subframe = self._kept
         context.scene.frame_set(frame, subframe=subframe)
         if problem:
-            self.report({kind}, problem)
+            self.report({kind}, translated(problem))
             return {"CANCELLED"}
         obj = self._find(context)
         mesh = bpy.data.meshes.new(f"{obj.name} Bake")
@@ -118,7 +127,13 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
         cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
         show_baked(find_deform(obj), cache, self.first, len(self._frames))
         size = np.prod([len(self._frames), *self._frames[0].shape]) * 4 / 2**20
-        self.report({"INFO"}, f"{obj.name}: {len(self._frames)} frames are baked, {size:.1f} MB in the file")
+        text = Phrase(
+            "{object}: {count} frames are baked, {size:.1f} MB in the file",
+            object=obj.name,
+            count=len(self._frames),
+            size=size,
+        )
+        self.report({"INFO"}, translated(text))
         return {"FINISHED"}
 
 
@@ -133,13 +148,13 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
     def obstacle(cls, context):
         reason = super().obstacle(context)
         obj = cls.subject(context)
-        return reason or ("" if is_baked(obj) else f'Nothing of "{obj.name}" is baked')
+        return reason or ("" if is_baked(obj) else Phrase('Nothing of "{object}" is baked', object=obj.name))
 
     def change(self, context, obj):
         delete_bake(obj)
         context.view_layer.update()
         live.update(obj)
-        return f"{obj.name}: follows its handles again"
+        return Phrase("{object}: follows its handles again", object=obj.name)
 
 
 CLASSES = (MESHFREE_OT_deform_bake, MESHFREE_OT_deform_free)

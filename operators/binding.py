@@ -13,6 +13,7 @@ import bmesh
 import numpy as np
 
 from ..core import PointCloudError
+from ..core.phrases import Phrase
 from .attributes import (
     DISPLACEMENT,
     REST,
@@ -82,16 +83,18 @@ def read_constraints(obj) -> Constraints:
     """
     settings = obj.meshfree.deform
     names = handle_names(obj) or [settings.handles]  # which says what is missing
-    weights = np.array([chosen_weights(obj, name, "Handles") for name in names])
+    weights = np.array([chosen_weights(obj, name, Phrase("Handles")) for name in names])
     several = int(np.count_nonzero(np.count_nonzero(weights > 0.0, axis=0) > 1))
     if several:
         raise PointCloudError(
-            f'{several} points of "{obj.name}" are in more than one of the groups {", ".join(names)}. Leave each'
-            " in one."
+            '{several} points of "{object}" are in more than one of the groups {names}. Leave each in one.',
+            several=several,
+            object=obj.name,
+            names=", ".join(names),
         )
     anchors = np.zeros(weights.shape[1])
     if is_chosen(obj, settings.anchors, ANCHOR):
-        anchors = chosen_weights(obj, settings.anchors, "Anchors")
+        anchors = chosen_weights(obj, settings.anchors, Phrase("Anchors"))
     moved, kept = np.flatnonzero(weights.max(axis=0) > 0.0), np.flatnonzero(anchors > 0.0)
     owner = weights.argmax(axis=0)[moved]
     return Constraints(names, moved, owner, kept, np.concatenate([weights.max(axis=0)[moved], anchors[kept]]))
@@ -178,34 +181,38 @@ def stale_reason(obj, glance=False, trusting=False) -> str:
     settings = obj.meshfree.deform
     count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
     if is_baked(obj):
-        return "Its animation is baked. Delete the bake to let it follow the handles again"
+        return Phrase("Its animation is baked. Delete the bake to let it follow the handles again")
     original = copied_from(obj)
     if original is not None and original.data == obj.data:
-        return f'It shares its mesh with "{original.name}", whose handles move both'
+        return Phrase('It shares its mesh with "{other}", whose handles move both', other=original.name)
     if original is not None:
-        return f'It has no handles of its own, "{original.name}" has them. Bind again to get copies of them'
+        return Phrase(
+            'It has no handles of its own, "{other}" has them. Bind again to get copies of them', other=original.name
+        )
     if count != settings.point_count:
-        return f"It had {settings.point_count:,} points and has {count:,} now. Bind again"
+        return Phrase(
+            "It had {before:,} points and has {count:,} now. Bind again", before=settings.point_count, count=count
+        )
     gone = [item.name for item in settings.handle_items if item.has_empty and not is_there(item.empty)]
     if gone:
-        return f"The empty of {', '.join(gone)} was deleted. Bind again to get a new one"
+        return Phrase("The empty of {names} was deleted. Bind again to get a new one", names=", ".join(gone))
     if find_deform(obj) is None:
-        return 'The modifier "Mesh-Free Deform" was removed. Bind again'
+        return Phrase('The modifier "Mesh-Free Deform" was removed. Bind again')
     if settings.settings_used != settings_text(obj):
-        return "Settings changed. Bind again"
+        return Phrase("Settings changed. Bind again")
     others = [other.name for other in sharing_objects(obj) if is_bound(other) and copied_from(other) != obj]
     if others:
-        return f'It shares its mesh with "{others[0]}", which is bound, too. Make it a single user'
+        return Phrase('It shares its mesh with "{other}", which is bound, too. Make it a single user', other=others[0])
     if in_edit_mesh(obj):  # groups and positions are only known to be right when one leaves it
         return ""
     if any(obj.data.attributes.get(name) is None for name in WRITES):
-        return f"The attributes {' and '.join(WRITES)} were removed. Bind again"
+        return Phrase("The attributes {first} and {second} were removed. Bind again", first=WRITES[0], second=WRITES[1])
     constraints, groups = _glance(obj, glance, trusting)
     if settings.groups_used != groups:
-        return "The groups of handles or anchors changed. Bind again"
+        return Phrase("The groups of handles or anchors changed. Bind again")
     known = rest_fingerprint(obj, constraints, glance)
     if known and settings.fingerprint != known:
-        return "The points at rest were moved. Bind again"
+        return Phrase("The points at rest were moved. Bind again")
     return ""
 
 
@@ -226,7 +233,8 @@ def relative_matrix(obj, empty, depsgraph=None):
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     if not np.linalg.cond(matrix[:3, :3]) < 1e6:
         raise PointCloudError(
-            f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
+            '"{object}" is scaled to nothing along an axis. Give it a scale above zero along each axis.',
+            object=obj.name,
         )
     return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
 

@@ -6,15 +6,18 @@ from threading import Event, Thread
 import bpy
 from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_tip as tip_
 
 from ..core import Cancelled, PointCloudError
+from ..core.phrases import Phrase
 from .options import settings_values
 from .reading import find_object, fingerprint, metric, obstacle, read_points
 from .ready import ReadyOperator
 from .result import same_lengths
 from .stages import StageTimes, redraw_panels
+from .translation import translated
 
+_STOPPED = Phrase("Stopped: nothing was changed")
 _TICK = 0.1  # seconds between two looks at the work
 _PATIENCE = 1.0  # seconds that Blender waits at its end for the thread to stop by itself
 _jobs = []  # the one that runs
@@ -46,12 +49,14 @@ class Snapshot:
         """
         obj = self.find()
         if obj is None:
-            raise PointCloudError(f'"{self.name}" was deleted meanwhile')
+            raise PointCloudError('"{object}" was deleted meanwhile', object=self.name)
         reason = obstacle(obj, modes)
         if reason:
-            raise PointCloudError(reason)
+            raise PointCloudError("{reason}", reason=reason)
         if _state(context, obj) != self._state or not same_lengths(self._metric, metric(obj)):
-            raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile. Start it again')
+            raise PointCloudError(
+                'points, scale or settings of "{object}" were changed meanwhile. Start it again', object=obj.name
+            )
         return obj
 
 
@@ -75,7 +80,7 @@ class Job(StageTimes):
 
     Attributes
     ----------
-    reason : str
+    reason : Phrase or ""
         Why it was stopped; empty while nobody did.
     """
 
@@ -108,7 +113,12 @@ class Job(StageTimes):
         """Whether there is a result or an error, or it was stopped."""
         return bool(self.reason) or self._future.done()
 
-    def stop(self, reason="Stopped: nothing was changed"):
+    @property
+    def title(self):
+        """The label in the language of the interface."""
+        return iface_(self.label, "Operator")
+
+    def stop(self, reason=_STOPPED):
         """End it for everybody; the thread itself ends at its next report of progress, and its result is dropped."""
         self.reason = self.reason or reason
         self._stop.set()
@@ -125,7 +135,7 @@ class Job(StageTimes):
 
     def show(self, context):
         """Tell in the status bar how far it is, and let the panel do so too."""
-        text = iface_("{}: {}, {:.0%}    Esc to stop").format(iface_(self.label), iface_(self.stage), self.fraction)
+        text = iface_("{}: {}, {:.0%}    Esc to stop").format(self.title, iface_(self.stage), self.fraction)
         if text != self._shown:
             self._shown = text
             context.workspace.status_text_set(text)
@@ -149,7 +159,7 @@ class Job(StageTimes):
 
 
 def _busy():
-    return f"{running().label} is running. Wait for it, or press Esc to stop it"
+    return Phrase("{label} is running. Wait for it, or press Esc to stop it", label=running().title)
 
 
 class JobOperator(ReadyOperator):
@@ -164,14 +174,14 @@ class JobOperator(ReadyOperator):
     @classmethod
     def poll(cls, context):
         if running() is not None:
-            cls.poll_message_set(_busy())
+            cls.poll_message_set(translated(_busy(), tip_))
             return False
         return super().poll(context)
 
     def start(self, context, objects, compute):
         """Begin to work for some objects."""
         if running() is not None:  # since a file browser opened
-            raise PointCloudError(f"{_busy()}.")
+            raise PointCloudError("{reason}.", reason=_busy())
         self._job = Job(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
         self._job.open(context)
         context.window_manager.modal_handler_add(self)
@@ -185,7 +195,7 @@ class JobOperator(ReadyOperator):
             return {"PASS_THROUGH"}
         for snapshot in job.snapshots:
             if snapshot.find() is None:
-                job.stop(f'Stopped because "{snapshot.name}" was deleted: nothing was changed')
+                job.stop(Phrase('Stopped because "{object}" was deleted: nothing was changed', object=snapshot.name))
         if job.ended:
             job.close(context)
             return self.complete(context, job)
@@ -202,16 +212,17 @@ class JobOperator(ReadyOperator):
         """Find the objects again, and let `finish` use what was computed for them, if they are as they were."""
         try:
             results = job.result()
-        except Cancelled as stop:
-            self.report({"INFO"}, str(stop))
+        except Cancelled:
+            self.report({"INFO"}, translated(job.reason))
             return {"CANCELLED"}
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            self.report({"WARNING"}, rpt_("{} wrote nothing: {}").format(iface_(job.label), change))
+            text = Phrase("{label} wrote nothing: {change}", label=job.title, change=change.text)
+            self.report({"WARNING"}, translated(text))
             return {"CANCELLED"}
         return self.finish(context, objects, results, job.seconds)
 
@@ -225,7 +236,7 @@ class MESHFREE_OT_stop(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if running() is None:
-            cls.poll_message_set("Nothing is running")
+            cls.poll_message_set(translated(Phrase("Nothing is running"), tip_))
         return running() is not None
 
     def execute(self, context):
@@ -253,7 +264,7 @@ def detach():
 def _undone(*_):
     job = running()
     if job is not None:
-        job.stop("Stopped by undo: nothing was changed")
+        job.stop(Phrase("Stopped by undo: nothing was changed"))
 
 
 @persistent

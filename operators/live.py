@@ -212,7 +212,7 @@ def update_all(scene, depsgraph, quick):
             try:
                 update(obj, depsgraph, quick)
             except PointCloudError as error:
-                _troubles[obj.session_uid] = str(error), None
+                _troubles[obj.session_uid] = error.text, None
 
 
 def _bound_objects(scene):
@@ -288,7 +288,7 @@ def _attend(obj, depsgraph) -> bool:
         elif job.key != key:
             job.work.stop()
     except PointCloudError as error:
-        _troubles[uid] = str(error), None if job is None else job.pose
+        _troubles[uid] = error.text, None if job is None else job.pose
         return job is not None  # else wait for another pose, not to go wrong again at once
     return True
 

@@ -9,6 +9,7 @@ from ..operators.deform_nodes import find_deform, is_baked
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property
 from ..operators.reading import obstacle
+from ..operators.translation import translated
 from .panel import SidebarPanel
 
 _WIDTH = 38  # letters in a line of the panel
@@ -73,8 +74,8 @@ def _draw_state(layout, obj):
     """Draw whether the points follow the handles, and what to do if not."""
     reason, working = stale_reason(obj, glance=True) or live.trouble(obj), live.preparing(obj)
     if reason:
-        state = iface_("Baked. {}") if is_baked(obj) else iface_("Copy. {}") if copied_from(obj) is not None else ""
-        text = (state or iface_("Not up to date. {}")).format(reason)
+        state = "Baked. {}" if is_baked(obj) else "Copy. {}" if copied_from(obj) is not None else "Not up to date. {}"
+        text = iface_(state).format(translated(reason, iface_))
         icon = "INFO" if is_baked(obj) else "ERROR"
     elif working is not None:
         stage, fraction = working
