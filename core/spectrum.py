@@ -177,7 +177,7 @@ def correct_eigenvalues(laplacian, values, vectors):
     if not np.isfinite(corrected).all():
         resolved = int(np.argmin(np.isfinite(corrected)))
         raise UnresolvedModesError(
-            "The {given} modes asked for vary faster than the smoothing length resolves: {resolved} are resolved"
+            "The {count} modes asked for vary faster than the smoothing length resolves: {resolved} are resolved"
             " on {n} points. Ask for at most {resolved}, or lower the number of neighbors.",
             count=len(values),
             resolved=resolved,
