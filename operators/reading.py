@@ -39,23 +39,22 @@ def obstacle(obj, modes=("OBJECT",)) -> Phrase | str:
         )
     if obj.type not in TYPES:
         types = obj.bl_rna.properties["type"]
-        kind = types.enum_items[obj.type].name
-        vowel = kind[0] in "AE"
+        english = types.enum_items[obj.type].name
+        vowel, kind = english[0] in "AE", iface_(english, types.translation_context)
+        if obj.type in _CONVERTIBLE:
+            return Phrase(
+                '"{object}" is an {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
+                if vowel
+                else '"{object}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh',
+                object=obj.name,
+                kind=kind,
+            )
         return Phrase(
-            {
-                (False, False): '"{object}" is a {kind}, not a Mesh. Select a mesh',
-                (True, False): '"{object}" is an {kind}, not a Mesh. Select a mesh',
-                (
-                    False,
-                    True,
-                ): '"{object}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh',
-                (
-                    True,
-                    True,
-                ): '"{object}" is an {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh',
-            }[vowel, obj.type in _CONVERTIBLE],
+            '"{object}" is an {kind}, not a Mesh. Select a mesh'
+            if vowel
+            else '"{object}" is a {kind}, not a Mesh. Select a mesh',
             object=obj.name,
-            kind=iface_(kind, types.translation_context),
+            kind=kind,
         )
     if not obj.is_editable or not obj.data.is_editable:
         return Phrase(
