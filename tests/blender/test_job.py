@@ -84,6 +84,11 @@ def operator(jobs, monkeypatch):
         def tick(self, kind="TIMER", value="NOTHING"):
             return self.modal(self.context, event(kind, value))
 
+        def press_escape(self, value="PRESS", heard=frozenset({"RUNNING_MODAL"})):
+            """Let what hears Esc in each window hear it, and look at the work."""
+            assert jobs.MESHFREE_OT_escape.modal(None, self.context, event("ESC", value)) == heard
+            return self.tick()
+
         def end(self):
             """Wait for the thread and look once more."""
             self._job.wait(5.0)
@@ -118,7 +123,7 @@ def test_keys_and_the_mouse_go_on_to_blender(operator, obj):
     started = operator([obj], work)
     for kind in ("MIDDLEMOUSE", "Z", "X", "TAB", "LEFTMOUSE", "TIMER"):
         assert started.tick(kind, "PRESS") == {"PASS_THROUGH"}
-    assert started.tick("ESC", "RELEASE") == {"PASS_THROUGH"}
+    assert started.press_escape("RELEASE", {"PASS_THROUGH"}) == {"PASS_THROUGH"}
     work.go_on.set()
     assert started.end() == {"FINISHED"}
 
@@ -127,7 +132,7 @@ def test_esc_ends_it_at_once_though_the_thread_goes_on(operator, jobs, obj):
     work, before = Work(), everything(obj)
     started = operator([obj], work)
     work.began.wait(5.0)
-    assert started.tick("ESC", "PRESS") == {"CANCELLED"}
+    assert started.press_escape() == {"CANCELLED"}
     assert jobs.running() is None
     assert started.reports == [("INFO", "Stopped: nothing was changed")]
     work.go_on.set()
@@ -142,7 +147,7 @@ def test_a_late_result_is_dropped(operator, jobs, obj):
     started = operator([obj], work)
     work.go_on.set()
     started._job.wait(5.0)
-    assert started.tick("ESC", "PRESS") == {"CANCELLED"}
+    assert started.press_escape() == {"CANCELLED"}
     assert started.finished is None
 
 
@@ -176,7 +181,7 @@ def test_one_job_at_a_time(operator, obj):
     for call in (bpy.ops.meshfree.analyze, bpy.ops.meshfree.smooth, bpy.ops.meshfree.select_grow):
         with pytest.raises(RuntimeError, match=r"Try is running. Wait for it, or press Esc to stop it"):
             call()
-    started.tick("ESC", "PRESS")
+    started.press_escape()
     assert bpy.ops.meshfree.analyze() == {"FINISHED"}
 
 
@@ -185,7 +190,7 @@ def test_a_file_browser_that_was_open_before_another_job_began(operator, core, j
     with pytest.raises(core.PointCloudError, match="Try is running. Wait for it, or press Esc to stop it"):
         operator([obj], Work())
     assert jobs.running() is started._job
-    started.tick("ESC", "PRESS")
+    started.press_escape()
 
 
 def test_a_dialog_that_is_closed_ends_nothing(operator, jobs):
