@@ -164,7 +164,9 @@ class Job(StageTimes):
             return
         _jobs.remove(self)
         context.window_manager.event_timer_remove(self._timer)
-        _set_status(bpy.data.workspaces, None)  # others may be open now than when it was shown
+        if not bpy.app.background:
+            # Later: a window that is being closed must not find another context than it had.
+            bpy.app.timers.register(_clear_status, persistent=True)
         redraw_panels(context.window_manager)
 
 
@@ -203,6 +205,11 @@ def all_steps(steps):
             next(steps)
         except StopIteration as end:
             return end.value
+
+
+def _clear_status():
+    if running() is None:
+        _set_status(bpy.data.workspaces, None)  # others may be open now than when it was shown
 
 
 def _set_status(workspaces, text):
