@@ -70,9 +70,9 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
                 while not work.ended:
                     progress(work.stage, 0.0)
                     yield
+                live.keep(self._kept.find()[1], work.result()[0])
             finally:
                 work.stop()
-            live.keep(self._kept.find()[1], work.result()[0])
         return (yield from self._frames(progress))
 
     def _frames(self, progress):
@@ -87,7 +87,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
                 )
             scene.frame_set(number)
             self._kept.expect()
-            live.update(obj)
+            live.update(obj, waits=live.find(obj) is None)
             reason = stale_reason(obj, glance=True, trusting=True)
             if reason:
                 raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')

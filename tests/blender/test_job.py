@@ -70,9 +70,9 @@ def operator(jobs, monkeypatch):
     class Operator(jobs.JobOperator):
         bl_label = "Try"
 
-        def __init__(self, objects, compute):
+        def __init__(self, objects, compute, kind=jobs.Job):
             self.reports, self.finished, self.context = [], None, Context()
-            assert self.start(self.context, objects, compute) == {"RUNNING_MODAL"}
+            assert self.start(self.context, objects, compute, kind) == {"RUNNING_MODAL"}
 
         def report(self, kinds, text):
             self.reports.append((*kinds, text))
@@ -159,6 +159,60 @@ def test_the_stop_button(operator, jobs, obj):
     assert started.tick() == {"CANCELLED"}
 
 
+def test_steps_on_the_main_thread(operator, jobs, obj):
+    def compute(progress):
+        for number in range(3):
+            progress("Frames", number / 3)
+            yield
+        return "all"
+
+    started = operator([obj], compute, jobs.SteppedJob)
+    assert [started.tick() for _ in range(3)] == [{"PASS_THROUGH"}] * 3
+    assert (jobs.running().stage, jobs.running().fraction) == ("Frames", 2 / 3)
+    assert started.finished is None
+    assert started.tick() == {"FINISHED"}
+    assert started.finished[1] == "all"
+
+
+@pytest.mark.parametrize("way", ["escape", "stop", "cancel"])
+def test_steps_that_are_stopped_are_put_back(operator, jobs, obj, way):
+    ended, left = [], []
+
+    def compute(progress):
+        try:
+            while True:
+                progress("Frames", 0.5)
+                yield
+        finally:
+            ended.append(True)
+
+    started = operator([obj], compute, jobs.SteppedJob)
+    started.leave = left.append
+    started.tick()
+    if way == "escape":
+        assert started.press_escape() == {"CANCELLED"}
+    elif way == "stop":
+        bpy.ops.meshfree.stop()
+        assert started.tick() == {"CANCELLED"}
+    else:
+        started.cancel(started.context)
+    assert jobs.running() is None
+    assert (ended, len(left)) == ([True], 1)
+    started.cancel(started.context)
+    assert len(left) == 1
+
+
+def test_steps_that_go_wrong(operator, core, jobs, obj):
+    def compute(progress):
+        yield
+        raise core.PointCloudError("No")
+
+    started = operator([obj], compute, jobs.SteppedJob)
+    assert started.tick() == {"PASS_THROUGH"}
+    assert started.tick() == {"CANCELLED"}
+    assert started.reports == [("ERROR", "No")]
+
+
 def test_an_error_is_reported(operator, core, obj):
     work = Work(core.PointCloudError("No"))
     started = operator([obj], work)
@@ -178,6 +232,8 @@ def test_an_error_that_nobody_foresaw_is_raised_and_leaves_nothing(operator, job
 
 def test_one_job_at_a_time(operator, obj):
     started = operator([obj], Work())
+    with pytest.raises(RuntimeError, match="Try is running"):
+        bpy.ops.meshfree.deform_bake()
     for call in (bpy.ops.meshfree.analyze, bpy.ops.meshfree.smooth, bpy.ops.meshfree.select_grow):
         with pytest.raises(RuntimeError, match=r"Try is running. Wait for it, or press Esc to stop it"):
             call()
