@@ -50,7 +50,7 @@ class ApplicationOperator(JobOperator):
         """Do all at once for scripts; beside the window for somebody there."""
         attended = self.takes_window()
         context.view_layer.update()  # a script may have moved or scaled an object a line ago
-        objects, left_out = [context.object], []
+        objects, left_out = [self.subject(context)], []
         if not self.only_active:
             objects, left_out = chosen_objects(context, self.becomes_single)
         plans = []

@@ -30,6 +30,7 @@ from .binding import (
 )
 from .deform_nodes import add_deform, find_deform, is_baked, show_live
 from .groups import HANDLE, assign, check_assignable, has_group
+from .job import busy
 from .modifiers import get_input
 from .positions import add_key, check_movable
 from .reading import read_points, shape_keys
@@ -67,7 +68,15 @@ class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
         return change
 
 
-class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
+class HandledOperator(ReadyOperator):
+    """An operator on the active object, or on the one that the active empty moves."""
+
+    @classmethod
+    def subject(cls, context):
+        return handled_object(context.object, context.scene)
+
+
+class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Operator):
     """Prepare the deformation: the points of some groups are moved, those of another stay, and all others follow"""
 
     bl_idname = "meshfree.deform_bind"
@@ -160,18 +169,14 @@ def _copy_empty(obj, empty):
     return copy
 
 
-class BoundOperator(ReadyOperator):
-    """An operator on a bound object, or on the one that the active empty moves."""
+class BoundOperator(HandledOperator):
+    """An operator on a bound object."""
 
     works_stale = False  # whether the handles may have lost their hold
 
     @classmethod
-    def subject(cls, context):
-        return handled_object(context.object, context.scene)
-
-    @classmethod
     def obstacle(cls, context):
-        return super().obstacle(context) or not_bound(cls.subject(context))
+        return busy() or super().obstacle(context) or not_bound(cls.subject(context))
 
     def execute(self, context):
         obj = self.subject(context)
@@ -200,7 +205,7 @@ def check_fresh(obj):
         raise PointCloudError('"{object}" is not up to date. {reason}.', object=obj.name, reason=reason)
 
 
-class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
+class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.Operator):
     """Let all points follow the handles to where they are now, which happens by itself when they are moved"""
 
     bl_idname = "meshfree.deform_update"
@@ -211,7 +216,7 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        return super().obstacle(context) or not_bound(context.object)
+        return super().obstacle(context) or not_bound(cls.subject(context))
 
     def plan(self, context, obj):
         check_fresh(obj)

@@ -1,4 +1,4 @@
-"""Long work beside the window: a thread, the objects it is for, and all that ends it."""
+"""Long work beside the window: a thread or steps, the objects it is for, and all that ends it."""
 
 from concurrent.futures import Future
 from threading import Event, Thread
@@ -17,7 +17,7 @@ from .result import same_lengths
 from .stages import StageTimes, redraw_panels
 from .translation import translated
 
-_STOPPED = Phrase("Stopped: nothing was changed")
+STOPPED = Phrase("Stopped: nothing was changed")  # by somebody
 _TICK = 0.1  # seconds between two looks at the work
 _PATIENCE = 1.0  # seconds that Blender waits at its end for the thread to stop by itself
 _jobs = []  # the one that runs
@@ -26,6 +26,14 @@ _jobs = []  # the one that runs
 def running():
     """Return the job that runs, or None."""
     return _jobs[0] if _jobs else None
+
+
+def busy() -> str:
+    """Say that a job runs, and what to do; empty if none does."""
+    job = running()
+    if job is None:
+        return ""
+    return Phrase("{label} is running. Wait for it, or press Esc to stop it", label=job.title)
 
 
 class Snapshot:
@@ -84,14 +92,19 @@ class Job(StageTimes):
         Why it was stopped; empty while nobody did.
     """
 
+    tick = _TICK
+
     def __init__(self, label, snapshots, compute):
         super().__init__()
         self.label, self.snapshots = label, snapshots
         self.stage, self.reason, self._stop = "Start", "", Event()
         self._timer, self._shown = None, ""
         self._future = Future()
+        self._begin(compute)
+
+    def _begin(self, compute):
         # Not of a pool: Blender must not wait for it at its end.
-        self._thread = Thread(target=self._run, args=(compute,), name=label, daemon=True)
+        self._thread = Thread(target=self._run, args=(compute,), name=self.label, daemon=True)
         self._thread.start()
 
     def __call__(self, stage, fraction):
@@ -118,7 +131,10 @@ class Job(StageTimes):
         """The label in the language of the interface."""
         return iface_(self.label, "Operator")
 
-    def stop(self, reason=_STOPPED):
+    def go_on(self):
+        """Do what there is to do on Blender's main thread: nothing."""
+
+    def stop(self, reason=STOPPED):
         """End it for everybody; the thread itself ends at its next report of progress, and its result is dropped."""
         self.reason = self.reason or reason
         self._stop.set()
@@ -134,32 +150,84 @@ class Job(StageTimes):
         self._thread.join(seconds)
 
     def show(self, context):
-        """Tell in the status bar how far it is, and let the panel do so too."""
+        """Tell in all windows how far it is, and let Esc end it there."""
+        windows = context.window_manager.windows
+        if not bpy.app.background:
+            for window in windows:  # also such as were opened meanwhile
+                if all(operator.bl_idname != _ESCAPE for operator in window.modal_operators):
+                    with bpy.context.temp_override(window=window):
+                        bpy.ops.meshfree.escape("INVOKE_DEFAULT")
         text = iface_("{}: {}, {:.0%}    Esc to stop").format(self.title, iface_(self.stage), self.fraction)
         if text != self._shown:
             self._shown = text
-            context.workspace.status_text_set(text)
+            _set_status([window.workspace for window in windows], text)
             redraw_panels(context.window_manager)
 
     def open(self, context):
-        """Begin to show it in the window and to look at it there again and again."""
+        """Begin to show it, and to look at it again and again in the window that it belongs to."""
         _jobs.append(self)
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        self._timer = context.window_manager.event_timer_add(self.tick, window=context.window)
         self.show(context)
 
     def close(self, context):
-        """Leave nothing of it in the window; may be called again."""
+        """Leave nothing of it in any window; may be called again."""
         if self not in _jobs:
             return
         _jobs.remove(self)
         context.window_manager.event_timer_remove(self._timer)
-        for workspace in bpy.data.workspaces:  # another one may be open now than when it was shown
-            workspace.status_text_set(None)
+        if not bpy.app.background:
+            # Later: a window that is being closed must not find another context than it had.
+            bpy.app.timers.register(_clear_status, persistent=True)
         redraw_panels(context.window_manager)
 
 
-def _busy():
-    return Phrase("{label} is running. Wait for it, or press Esc to stop it", label=running().title)
+class SteppedJob(Job):
+    """A computation that needs Blender itself, so that it is done in steps on its main thread, one at each look.
+
+    `compute` is a generator function, whose result is what it returns; see `all_steps`.
+    """
+
+    tick = 0.01
+
+    def _begin(self, compute):
+        self._steps = compute(self)
+
+    def go_on(self):
+        """Take a step."""
+        try:
+            next(self._steps)
+        except StopIteration as end:
+            self._future.set_result(end.value)
+        except BaseException as error:  # goes to whoever asks for the result
+            self._future.set_exception(error)
+
+    def wait(self, seconds):
+        """Wait for nothing: no step is taken any more."""
+
+    def close(self, context):
+        super().close(context)
+        self._steps.close()
+
+
+def all_steps(steps):
+    """Take all steps of a generator at once, and return its result."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+
+
+def _clear_status():
+    if running() is None:
+        _set_status(bpy.data.workspaces, None)  # others may be open now than when it was shown
+
+
+def _set_status(workspaces, text):
+    """Set the text in the status bar of workspaces, or clear it by None."""
+    for workspace in workspaces:
+        with bpy.context.temp_override(workspace=workspace):  # which is the one that Blender writes to
+            workspace.status_text_set(text)
 
 
 class JobOperator(ReadyOperator):
@@ -173,40 +241,46 @@ class JobOperator(ReadyOperator):
 
     @classmethod
     def poll(cls, context):
-        if running() is not None:
-            cls.poll_message_set(translated(_busy(), tip_))
+        if busy():
+            cls.poll_message_set(translated(busy(), tip_))
             return False
         return super().poll(context)
 
-    def start(self, context, objects, compute):
+    def start(self, context, objects, compute, kind=Job):
         """Begin to work for some objects."""
-        if running() is not None:  # since a file browser opened
-            raise PointCloudError("{reason}.", reason=_busy())
-        self._job = Job(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
+        if busy():  # since a file browser opened
+            raise PointCloudError("{reason}.", reason=busy())
+        self._job = kind(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
         self._job.open(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        job = self._job
-        if event.type == "ESC" and event.value == "PRESS":
-            job.stop()
-        elif event.type != "TIMER":
+        if event.type != "TIMER":
             return {"PASS_THROUGH"}
+        job = self._job
         for snapshot in job.snapshots:
             if snapshot.find() is None:
                 job.stop(Phrase('Stopped because "{object}" was deleted: nothing was changed', object=snapshot.name))
+        if not job.ended:
+            job.go_on()
         if job.ended:
             job.close(context)
+            self.leave(context)
             return self.complete(context, job)
         job.show(context)
         return {"PASS_THROUGH"}
 
     def cancel(self, context):
         """End the work, if it has begun, with its dialog or the window that shows it."""
-        if self._job is not None:
-            self._job.stop()
-            self._job.close(context)
+        job = self._job
+        if job is not None and job is running():
+            job.stop()
+            job.close(context)
+            self.leave(context)
+
+    def leave(self, context):
+        """Put back what the work itself has changed in Blender: nothing."""
 
     def complete(self, context, job):
         """Find the objects again, and let `finish` use what was computed for them, if they are as they were."""
@@ -244,6 +318,36 @@ class MESHFREE_OT_stop(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MESHFREE_OT_escape(bpy.types.Operator):
+    """Let Esc stop what is running, in the window where it is pressed"""
+
+    bl_idname = "meshfree.escape"
+    bl_label = "Stop by Esc"
+    bl_options = {"INTERNAL"}  # each window has one while something runs
+
+    def invoke(self, context, event):
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        job = running()
+        if job is None:
+            self.cancel(context)
+            return {"CANCELLED", "PASS_THROUGH"}
+        if event.type != "ESC" or event.value != "PRESS":
+            return {"PASS_THROUGH"}
+        job.stop()
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Leave no timer behind, should the window be closed."""
+        context.window_manager.event_timer_remove(self._timer)
+
+
+_ESCAPE = MESHFREE_OT_escape.__name__
+
+
 def attach():
     """End the work when its objects become others, by undo or another file."""
     for event, handler in _HANDLERS.items():
@@ -276,4 +380,4 @@ def _abandon(*_):
 
 
 _HANDLERS = {"undo_post": _undone, "redo_post": _undone, "load_pre": _abandon}
-CLASSES = (MESHFREE_OT_stop,)
+CLASSES = (MESHFREE_OT_stop, MESHFREE_OT_escape)

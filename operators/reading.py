@@ -15,7 +15,7 @@ from ..core.rims import FEWEST
 from .attributes import own_positions, point_count
 from .counting import members
 from .groups import chosen_members
-from .modifiers import is_own
+from .modifiers import is_own, modifier_settings
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 _CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
@@ -213,7 +213,7 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
 
     A glance is quick enough for a panel, some milliseconds for 1 million points, may see a change of the rim group
     some seconds late, and is empty while that has not been counted yet. Of modifiers, if they are used, both see which
-    ones there are, not their settings.
+    ones there are and their settings, not what is in other data that these name.
     """
     positions = own_positions(obj.data)
     positions[np.asarray(left_out, dtype=int)] = 0.0
@@ -226,7 +226,7 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
             checksum = zlib.crc32(key_positions(block), checksum)
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.use_modifiers:
-        state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_own(item)]
+        state = [modifier_settings(item) for item in obj.modifiers if not is_own(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.rim_group:
         rim = members(obj, obj.meshfree.rim_group, glance)

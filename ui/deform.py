@@ -30,7 +30,6 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         layout, obj = self.layout, handled_object(context.object, context.scene)
         if obj != context.object:
             layout.label(text=iface_("Moves handles of {}").format(obj.name), icon="EMPTY_DATA")
-            layout.context_pointer_set("object", obj)  # for which the buttons are
         settings = obj.meshfree.deform
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -40,7 +39,8 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         names = handle_names(obj)
         if len(names) > 1:
             column.label(text=iface_("{} groups of handles").format(len(names)), icon="INFO")
-        layout.operator("meshfree.handle_add")
+        if obj == context.object:  # whose points are selected
+            layout.operator("meshfree.handle_add")
         column = layout.column(align=True)
         column.prop(settings, "add_empties")
         column.prop(settings, "rotation_aware")
@@ -79,7 +79,8 @@ def _draw_state(layout, obj):
         icon = "INFO" if is_baked(obj) else "ERROR"
     elif working is not None:
         stage, fraction = working
-        text, icon = iface_("Preparing: {}, {:.0%}").format(iface_(stage), fraction), "SORTTIME"
+        text = iface_("Not up to date. Binding: {}, {:.0%}").format(iface_(stage), fraction)
+        icon = "SORTTIME"
     else:
         text, icon = iface_("Bound: follows its handles"), "CHECKMARK"
     column = layout.column(align=True)
