@@ -15,6 +15,7 @@ from .ready import ReadyOperator
 from .result import same_lengths
 from .stages import StageTimes, redraw_panels
 
+_FIRST = 0.01  # seconds to the first look, which comes after the first drawing
 _TICK = 0.1  # seconds between two looks at the work
 _PATIENCE = 1.0  # seconds that Blender waits at its end for the thread to stop by itself
 _jobs = []  # the one that runs
@@ -72,6 +73,8 @@ class Job(StageTimes):
         The objects that it is for.
     compute : callable
         Called with this as its progress callback; must not touch Blender.
+    at_once : bool
+        Whether it begins now, and not with `begin`.
 
     Attributes
     ----------
@@ -79,7 +82,7 @@ class Job(StageTimes):
         Why it was stopped; empty while nobody did.
     """
 
-    def __init__(self, label, snapshots, compute):
+    def __init__(self, label, snapshots, compute, at_once=True):
         super().__init__()
         self.label, self.snapshots = label, snapshots
         self.stage, self.reason, self._stop = "Start", "", Event()
@@ -87,7 +90,8 @@ class Job(StageTimes):
         self._future = Future()
         # Not of a pool: Blender must not wait for it at its end.
         self._thread = Thread(target=self._run, args=(compute,), name=label, daemon=True)
-        self._thread.start()
+        if at_once:
+            self._thread.start()
 
     def __call__(self, stage, fraction):
         if self._stop.is_set():
@@ -121,7 +125,8 @@ class Job(StageTimes):
 
     def wait(self, seconds):
         """Wait for the thread to end, some seconds at most."""
-        self._thread.join(seconds)
+        if self._thread.ident is not None:
+            self._thread.join(seconds)
 
     def show(self, context):
         """Tell in the status bar how far it is, and let the panel do so too."""
@@ -134,8 +139,16 @@ class Job(StageTimes):
     def open(self, context):
         """Begin to show it in the window and to look at it there again and again."""
         _jobs.append(self)
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        self._timer = context.window_manager.event_timer_add(_FIRST, window=context.window)
         self.show(context)
+
+    def begin(self, context):
+        """Let the work begin, if it has not yet: once Blender has drawn that it does, from which it would take time."""
+        if self._thread.ident is not None:
+            return
+        self._thread.start()
+        context.window_manager.event_timer_remove(self._timer)
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
 
     def close(self, context):
         """Leave nothing of it in the window; may be called again."""
@@ -172,7 +185,7 @@ class JobOperator(ReadyOperator):
         """Begin to work for some objects."""
         if running() is not None:  # since a file browser opened
             raise PointCloudError(f"{_busy()}.")
-        self._job = Job(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
+        self._job = Job(self.bl_label, [Snapshot(context, obj) for obj in objects], compute, at_once=False)
         self._job.open(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -189,6 +202,7 @@ class JobOperator(ReadyOperator):
         if job.ended:
             job.close(context)
             return self.complete(context, job)
+        job.begin(context)
         job.show(context)
         return {"PASS_THROUGH"}
 

@@ -70,9 +70,11 @@ def operator(jobs, monkeypatch):
     class Operator(jobs.JobOperator):
         bl_label = "Try"
 
-        def __init__(self, objects, compute):
+        def __init__(self, objects, compute, begins=True):
             self.reports, self.finished, self.context = [], None, Context()
             assert self.start(self.context, objects, compute) == {"RUNNING_MODAL"}
+            if begins:
+                assert self.tick() == {"PASS_THROUGH"}
 
         def report(self, kinds, text):
             self.reports.append((*kinds, text))
@@ -111,6 +113,28 @@ def test_a_result_comes_with_its_objects_and_stages(operator, jobs, obj):
     objects, result, seconds = started.finished
     assert (objects, result, list(seconds)) == ([obj], 7, ["One", "Two"])
     assert jobs.running() is None
+
+
+def test_the_work_waits_until_it_was_drawn(operator, obj):
+    work = Work()
+    work.go_on.set()
+    started = operator([obj], work, begins=False)
+    started._job.wait(5.0)
+    assert not work.began.wait(0.05)
+    assert started.tick("MOUSEMOVE") == {"PASS_THROUGH"}
+    assert not work.began.wait(0.05)
+    assert started.tick() == {"PASS_THROUGH"}
+    assert work.began.wait(5.0)
+    assert started.end() == {"FINISHED"}
+
+
+def test_esc_before_the_work_began(operator, jobs, obj):
+    work = Work()
+    started = operator([obj], work, begins=False)
+    assert started.tick("ESC", "PRESS") == {"CANCELLED"}
+    assert jobs.running() is None
+    assert not work.began.wait(0.05)
+    assert started.reports == [("INFO", "Stopped: nothing was changed")]
 
 
 def test_keys_and_the_mouse_go_on_to_blender(operator, obj):
