@@ -5,13 +5,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..core import PointCloudError
 from ..core.files import replacing, write_points
 from . import cache
-from .files import analysis_arrays, place_of, point_table, save_arrays
+from .files import analysis_arrays, file_filter, place_of, point_table, save_arrays
 from .job import JobOperator
 from .options import laplacian_options
 from .reading import read_points
@@ -74,12 +74,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
     bl_label = "Export Points"
     told = "{}: {:,} points written to {}"
 
-    filter_glob: StringProperty(
-        name="File Filter",
-        description="Names of files that are listed",
-        default="*.ply;*.xyz;*.csv",
-        options={"HIDDEN"},
-    )
+    filter_glob: file_filter(".ply", ".xyz", ".csv")
     format: EnumProperty(
         name="Format",
         description="Kind of the file in the file browser; in scripts the ending of the name decides",
@@ -133,9 +128,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
     told = "{}: {:,} weights and {} modes written to {}"
     suffix = ".npz"
 
-    filter_glob: StringProperty(
-        name="File Filter", description="Names of files that are listed", default="*.npz", options={"HIDDEN"}
-    )
+    filter_glob: file_filter(".npz")
 
     def plan(self, context, obj):
         reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
@@ -159,9 +152,7 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
     told = "{}: {} eigenvalues written to {}"
     suffix = ".csv"
 
-    filter_glob: StringProperty(
-        name="File Filter", description="Names of files that are listed", default="*.csv", options={"HIDDEN"}
-    )
+    filter_glob: file_filter(".csv")
 
     @classmethod
     def obstacle(cls, context):

@@ -12,7 +12,7 @@ from bpy_extras.io_utils import ImportHelper
 from ..core import PointCloudError
 from ..core.files import READABLE, read_points
 from . import cache
-from .files import OFFSET, add_object, known_offset, offset_of
+from .files import OFFSET, add_object, file_filter, known_offset, offset_of
 from .job import JobOperator
 from .stages import Stages
 
@@ -42,12 +42,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         subtype="FILE_PATH",
         options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
     )
-    filter_glob: StringProperty(
-        name="File Filter",
-        description="Names of files that are listed",
-        default=";".join(f"*{suffix}" for suffix in (*READABLE, *LASER)),
-        options={"HIDDEN"},
-    )
+    filter_glob: file_filter(*READABLE, *LASER)
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Files",
