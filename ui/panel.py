@@ -15,6 +15,7 @@ from .legend import find_legend
 
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
+_EDITING = ("Choose points here, in Edit Mode.", "Switch to Object Mode to analyze")
 _SETTINGS = (  # what belongs together
     ("rims", "rim_group", "sheets", "projection"),
     ("bandwidth", "neighbors", "bandwidth_factor"),
@@ -57,7 +58,8 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             return  # the panel of the deformation tells
         if reason:
             column = layout.column(align=True)
-            for sentence in reason.split(". "):
+            editing = not obstacle(obj, ("EDIT",))
+            for sentence in _EDITING if editing else reason.split(". "):
                 column.label(text=sentence)
             if context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
