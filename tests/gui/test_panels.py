@@ -78,11 +78,9 @@ class TestPresets:
 
         gui.python(f"{NEIGHBORS} = {usual + 7}")
         gui.click(plus, y)
-        gui.shot("preset_dialog")
-        gui.key("Tab")
         gui.type("Mine")
-        gui.key("Return")
-        gui.key("Return")
+        gui.shot("preset_dialog")
+        gui.key("Return", "Return")  # of the name, of the dialog
         assert gui.python(PRESET_FILES) == ["Mine.py"]
 
         gui.python(f"{NEIGHBORS} = {usual}")
