@@ -53,12 +53,6 @@ class MESHFREE_OT_add_preset(ReadyOperator, AddPresetBase, bpy.types.Operator):
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
-    def draw(self, context):
-        layout = self.layout
-        layout.activate_init = True  # the name can be typed at once
-        layout.use_property_split = True
-        layout.prop(self, "name")
-
 
 class MESHFREE_MT_presets(bpy.types.Menu):
     """Settings that suit some kind of points"""

@@ -82,6 +82,7 @@ class TestPresets:
 
         gui.python(f"{NEIGHBORS} = {usual + 7}")
         gui.click(plus, y)
+        gui.click(plus - 60, y)  # the field for the name, which comes up under the mouse
         gui.type("Mine")
         gui.shot("preset_dialog")
         gui.key("Return", "Return")  # of the name, of the dialog
