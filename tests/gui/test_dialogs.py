@@ -6,14 +6,15 @@ WORKING = "[operator.bl_idname for operator in main_window().modal_operators]"
 UNCHANGED = "everything(bpy.data.objects['Cloud']) == before"
 KEYS = "bpy.context.object.data.shape_keys and bpy.context.object.data.shape_keys.key_blocks.keys()"
 CLOUD = """
-points, outermost = grid_points(60, 45)  # enough for a hundred modes
+points, outermost = grid_points(40, 30)
 cloud = add_object(points)
 cloud.select_set(True)
+cloud.meshfree.neighbors = 20  # fine enough for a hundred modes
 add_group(cloud, "Fixed", outermost)
 add_group(cloud, "Source", [0])
-for column, value in ((0, 0.1), (59, 0.9)):
+for column, value in ((0, 0.1), (39, 0.9)):
     group = cloud.vertex_groups.get("Value") or cloud.vertex_groups.new(name="Value")
-    group.add(np.flatnonzero(np.arange(len(points)) % 60 == column).tolist(), value, "REPLACE")
+    group.add(np.flatnonzero(np.arange(len(points)) % 40 == column).tolist(), value, "REPLACE")
 view3d()[0].spaces.active.shading.type = "WIREFRAME"
 bpy.ops.ed.undo_push(message="Cloud")
 before = everything(cloud)
