@@ -10,7 +10,7 @@ SIDEBAR = "view3d()[0].spaces.active.show_region_ui"
 PRESET_FILES = """
 import os
 folders = bpy.utils.preset_paths("meshfree_laplacian")
-sorted(name for folder in folders for name in os.listdir(folder))
+sorted(name for folder in folders for name in os.listdir(folder) if name.endswith(".py"))
 """
 INFO_LOG = """
 area = next(area for area in main_window().screen.areas if area.type == "PROPERTIES")
