@@ -4,14 +4,14 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..core import PointCloudError
 from ..core.files import replacing, write_points
 from ..core.phrases import Phrase
 from . import cache
-from .files import analysis_arrays, place_of, point_table, save_arrays
+from .files import analysis_arrays, file_filter, place_of, point_table, save_arrays
 from .job import JobOperator
 from .options import laplacian_options
 from .reading import read_points
@@ -72,12 +72,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
     bl_idname = "meshfree.export_points"
     bl_label = "Export Points"
 
-    filter_glob: StringProperty(
-        name="File Filter",
-        description="Names of files that are listed",
-        default="*.ply;*.xyz;*.csv",
-        options={"HIDDEN"},
-    )
+    filter_glob: file_filter(".ply", ".xyz", ".csv")
     format: EnumProperty(
         name="Format",
         description="Kind of the file in the file browser; in scripts the ending of the name decides",
@@ -132,9 +127,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
     bl_label = "Export Laplacian"
     suffix = ".npz"
 
-    filter_glob: StringProperty(
-        name="File Filter", description="Names of files that are listed", default="*.npz", options={"HIDDEN"}
-    )
+    filter_glob: file_filter(".npz")
 
     def plan(self, context, obj):
         reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
@@ -163,9 +156,7 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
     bl_label = "Export Eigenvalues"
     suffix = ".csv"
 
-    filter_glob: StringProperty(
-        name="File Filter", description="Names of files that are listed", default="*.csv", options={"HIDDEN"}
-    )
+    filter_glob: file_filter(".csv")
 
     @classmethod
     def obstacle(cls, context):

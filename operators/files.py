@@ -2,6 +2,7 @@
 
 import bpy
 import numpy as np
+from bpy.props import StringProperty
 
 from ..core import PointCloudError
 from ..core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, read_points, replacing, write_points
@@ -24,6 +25,16 @@ INPUTS = (*READABLE, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
 _COLORS = ("BYTE_COLOR", "FLOAT_COLOR")
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
+
+
+def file_filter(*suffixes):
+    """Return the property that lets file browsers list only names with these endings, to annotate an operator with."""
+    return StringProperty(
+        name="File Filter",
+        description="Names of files that are listed",
+        default=";".join(f"*{suffix}" for suffix in suffixes),
+        options={"HIDDEN"},
+    )
 
 
 def offset_of(obj):

@@ -24,11 +24,13 @@ def has_group(obj, name: str) -> bool:
 
 
 def search_group(layout, settings, name: str, obj):
-    """Draw a setting that names a group of an object."""
-    if obj.type == "MESH":
-        layout.prop_search(settings, name, obj, "vertex_groups")
-    else:
-        layout.prop_search(settings, name, obj.data, "attributes")
+    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned."""
+    group = getattr(settings, name)
+    owner, groups = (obj, "vertex_groups") if obj.type == "MESH" else (obj.data, "attributes")
+    awaited = group in ROLES and not has_group(obj, group)
+    layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
+    if awaited:
+        layout.label(text=Phrase("No points assigned yet"), icon="INFO")
 
 
 def group_weights(obj, name: str, outside=0.0):

@@ -12,7 +12,7 @@ from ..core import PointCloudError
 from ..core.files import READABLE, read_points
 from ..core.phrases import Phrase
 from . import cache
-from .files import OFFSET, add_object, known_offset, offset_of
+from .files import OFFSET, add_object, file_filter, known_offset, offset_of
 from .job import JobOperator
 from .stages import Stages
 from .translation import translated
@@ -43,12 +43,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         subtype="FILE_PATH",
         options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
     )
-    filter_glob: StringProperty(
-        name="File Filter",
-        description="Names of files that are listed",
-        default=";".join(f"*{suffix}" for suffix in (*READABLE, *LASER)),
-        options={"HIDDEN"},
-    )
+    filter_glob: file_filter(*READABLE, *LASER)
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Files",

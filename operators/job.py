@@ -18,6 +18,7 @@ from .stages import StageTimes, redraw_panels
 from .translation import translated
 
 STOPPED = Phrase("Stopped: nothing was changed")  # by somebody
+_FIRST = 0.01  # seconds to the first look, which comes after the first drawing
 _TICK = 0.1  # seconds between two looks at the work
 _PATIENCE = 1.0  # seconds that Blender waits at its end for the thread to stop by itself
 _jobs = []  # the one that runs
@@ -85,6 +86,8 @@ class Job(StageTimes):
         The objects that it is for.
     compute : callable
         Called with this as its progress callback; must not touch Blender.
+    at_once : bool
+        Whether it begins now, and not with `go_on`.
 
     Attributes
     ----------
@@ -92,20 +95,19 @@ class Job(StageTimes):
         Why it was stopped; empty while nobody did.
     """
 
-    tick = _TICK
-
-    def __init__(self, label, snapshots, compute):
+    def __init__(self, label, snapshots, compute, at_once=True):
         super().__init__()
         self.label, self.snapshots = label, snapshots
         self.stage, self.reason, self._stop = "Start", "", Event()
         self._timer, self._shown = None, ""
         self._future = Future()
-        self._begin(compute)
+        self._prepare(compute, at_once)
 
-    def _begin(self, compute):
+    def _prepare(self, compute, at_once):
         # Not of a pool: Blender must not wait for it at its end.
         self._thread = Thread(target=self._run, args=(compute,), name=self.label, daemon=True)
-        self._thread.start()
+        if at_once:
+            self._thread.start()
 
     def __call__(self, stage, fraction):
         if self._stop.is_set():
@@ -131,8 +133,12 @@ class Job(StageTimes):
         """The label in the language of the interface."""
         return iface_(self.label, "Operator")
 
-    def go_on(self):
-        """Do what there is to do on Blender's main thread: nothing."""
+    def go_on(self, context):
+        """Let the work begin, if it has not yet: once Blender has drawn that it does, from which it would take time."""
+        if self._thread.ident is None:
+            self._thread.start()
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
 
     def stop(self, reason=STOPPED):
         """End it for everybody; the thread itself ends at its next report of progress, and its result is dropped."""
@@ -147,7 +153,8 @@ class Job(StageTimes):
 
     def wait(self, seconds):
         """Wait for the thread to end, some seconds at most."""
-        self._thread.join(seconds)
+        if self._thread.ident is not None:
+            self._thread.join(seconds)
 
     def show(self, context):
         """Tell in all windows how far it is, and let Esc end it there."""
@@ -166,7 +173,7 @@ class Job(StageTimes):
     def open(self, context):
         """Begin to show it, and to look at it again and again in the window that it belongs to."""
         _jobs.append(self)
-        self._timer = context.window_manager.event_timer_add(self.tick, window=context.window)
+        self._timer = context.window_manager.event_timer_add(_FIRST, window=context.window)
         self.show(context)
 
     def close(self, context):
@@ -187,12 +194,10 @@ class SteppedJob(Job):
     `compute` is a generator function, whose result is what it returns; see `all_steps`.
     """
 
-    tick = 0.01
-
-    def _begin(self, compute):
+    def _prepare(self, compute, at_once):
         self._steps = compute(self)
 
-    def go_on(self):
+    def go_on(self, context):
         """Take a step."""
         try:
             next(self._steps)
@@ -250,7 +255,7 @@ class JobOperator(ReadyOperator):
         """Begin to work for some objects."""
         if busy():  # since a file browser opened
             raise PointCloudError("{reason}.", reason=busy())
-        self._job = kind(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
+        self._job = kind(self.bl_label, [Snapshot(context, obj) for obj in objects], compute, at_once=False)
         self._job.open(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -263,7 +268,7 @@ class JobOperator(ReadyOperator):
             if snapshot.find() is None:
                 job.stop(Phrase('Stopped because "{object}" was deleted: nothing was changed', object=snapshot.name))
         if not job.ended:
-            job.go_on()
+            job.go_on(context)
         if job.ended:
             job.close(context)
             self.leave(context)

@@ -322,25 +322,26 @@ class Window:
         self.type(text)
         self.key("Return")
 
-    def find_button(self, operator, region="UI"):
+    def find_button(self, operator, region="UI", across=0.35):
         """Find the button of an operator, such as "meshfree.analyze", and leave the mouse on it.
 
-        Of several buttons of an operator one is found by its settings: "meshfree.group_from_selection(role='ANCHOR'".
+        It is looked for from top to bottom at that share of the way from left to right. Of several buttons of an
+        operator one is found by its settings: "meshfree.group_from_selection(role='ANCHOR'".
         """
         wanted = f"bpy.ops.{operator}" if "(" in operator else f"bpy.ops.{operator}("
         x, top, width, height = self.region(region)
         seen = []
         for y in range(top + 8, top + height, 9):
-            self.move(x + width * 0.35, y)
+            self.move(x + width * across, y)
             found = self.python(f"button_under_mouse({region!r})")
             if found.startswith(wanted):
-                return x + width * 0.35, y
+                return x + width * across, y
             seen += [found] if found and found not in seen else []
         raise WindowError(f"No button of {operator} is seen, only {seen}")
 
-    def press(self, operator, region="UI"):
+    def press(self, operator, region="UI", across=0.35):
         """Click on the button of an operator in the sidebar."""
-        self.click(*self.find_button(operator, region))
+        self.click(*self.find_button(operator, region, across))
 
     # Pictures
 

@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..core.value_range import CLASSES, STEPPED
 from ..operators.modifiers import DISPLAY_TAG, add_input, add_node, is_intact, new_group
 from . import colormaps
 
@@ -99,7 +100,7 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
     groups : dict of str to tuple
         Names of groups, whose points have these colours instead; (r, g, b, 1), linear.
     """
-    stepped = color_map in colormaps.STEPPED
+    stepped = color_map in STEPPED
     repeated, hiding = color_map == "CATEGORICAL", settings.outside == "HIDE"
     needed = (RANGE, COLORS, LINES, BELOW, ABOVE) if hiding else (RANGE, COLORS, LINES, BELOW, ABOVE, GRAY)
     if _begin(material, name, f"{component} {repeated} {hiding} {groups}", needed):
@@ -147,7 +148,7 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
         number = separate.outputs[component]
     place = number
     if repeated:  # -1 and below have one colour, 0 and above repeat
-        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", number, -1.0), colormaps.CLASSES)
+        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", number, -1.0), CLASSES)
     bounds = add_node(tree, "ShaderNodeMapRange", 3, 0, name=RANGE)
     ramp = add_node(tree, "ShaderNodeValToRGB", 4, 0, name=COLORS)
     tree.links.new(place, bounds.inputs["Value"])

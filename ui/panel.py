@@ -3,6 +3,7 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from ..core.phrases import Phrase
 from ..operators.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.binding import handled_object
 from ..operators.groups import search_group
@@ -16,6 +17,7 @@ from .legend import find_legend
 
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
+_EDITING = Phrase("Choose points here, in Edit Mode. Switch to Object Mode to analyze")
 _SETTINGS = (  # what belongs together
     ("rims", "rim_group", "sheets", "projection"),
     ("bandwidth", "neighbors", "bandwidth_factor"),
@@ -58,7 +60,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             return  # the panel of the deformation tells
         if reason:
             column = layout.column(align=True)
-            for sentence in translated(reason, iface_).split(". "):
+            for sentence in translated(reason if obstacle(obj, ("EDIT",)) else _EDITING, iface_).split(". "):
                 column.label(text=sentence)
             if context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")

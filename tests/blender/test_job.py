@@ -70,9 +70,11 @@ def operator(jobs, monkeypatch):
     class Operator(jobs.JobOperator):
         bl_label = "Try"
 
-        def __init__(self, objects, compute, kind=jobs.Job):
+        def __init__(self, objects, compute, kind=jobs.Job, begins=True):
             self.reports, self.finished, self.context = [], None, Context()
             assert self.start(self.context, objects, compute, kind) == {"RUNNING_MODAL"}
+            if begins:
+                assert self.tick() == {"PASS_THROUGH"}
 
         def report(self, kinds, text):
             self.reports.append((*kinds, text))
@@ -116,6 +118,28 @@ def test_a_result_comes_with_its_objects_and_stages(operator, jobs, obj):
     objects, result, seconds = started.finished
     assert (objects, result, list(seconds)) == ([obj], 7, ["One", "Two"])
     assert jobs.running() is None
+
+
+def test_the_work_waits_until_it_was_drawn(operator, obj):
+    work = Work()
+    work.go_on.set()
+    started = operator([obj], work, begins=False)
+    started._job.wait(5.0)
+    assert not work.began.wait(0.05)
+    assert started.tick("MOUSEMOVE") == {"PASS_THROUGH"}
+    assert not work.began.wait(0.05)
+    assert started.tick() == {"PASS_THROUGH"}
+    assert work.began.wait(5.0)
+    assert started.end() == {"FINISHED"}
+
+
+def test_esc_before_the_work_began(operator, jobs, obj):
+    work = Work()
+    started = operator([obj], work, begins=False)
+    assert started.tick("ESC", "PRESS") == {"CANCELLED"}
+    assert jobs.running() is None
+    assert not work.began.wait(0.05)
+    assert started.reports == [("INFO", "Stopped: nothing was changed")]
 
 
 def test_keys_and_the_mouse_go_on_to_blender(operator, obj):
@@ -166,7 +190,7 @@ def test_steps_on_the_main_thread(operator, jobs, obj):
             yield
         return "all"
 
-    started = operator([obj], compute, jobs.SteppedJob)
+    started = operator([obj], compute, jobs.SteppedJob, begins=False)
     assert [started.tick() for _ in range(3)] == [{"PASS_THROUGH"}] * 3
     assert (jobs.running().stage, jobs.running().fraction) == ("Frames", 2 / 3)
     assert started.finished is None
@@ -186,7 +210,7 @@ def test_steps_that_are_stopped_are_put_back(operator, jobs, obj, way):
         finally:
             ended.append(True)
 
-    started = operator([obj], compute, jobs.SteppedJob)
+    started = operator([obj], compute, jobs.SteppedJob, begins=False)
     started.leave = left.append
     started.tick()
     if way == "escape":
@@ -207,7 +231,7 @@ def test_steps_that_go_wrong(operator, core, jobs, obj):
         yield
         raise core.PointCloudError("No")
 
-    started = operator([obj], compute, jobs.SteppedJob)
+    started = operator([obj], compute, jobs.SteppedJob, begins=False)
     assert started.tick() == {"PASS_THROUGH"}
     assert started.tick() == {"CANCELLED"}
     assert started.reports == [("ERROR", "No")]
