@@ -267,12 +267,11 @@ class JobOperator(ReadyOperator):
         for snapshot in job.snapshots:
             if snapshot.find() is None:
                 job.stop(Phrase('Stopped because "{object}" was deleted: nothing was changed', object=snapshot.name))
-        if not job.ended:
-            job.go_on(context)
         if job.ended:
             job.close(context)
             self.leave(context)
             return self.complete(context, job)
+        job.go_on(context)
         job.show(context)
         return {"PASS_THROUGH"}
 

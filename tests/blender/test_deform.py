@@ -977,7 +977,7 @@ class TestPanel:
         assert "Delete Bake" in draw()
         assert "Baked." in self.texts()
 
-    def test_while_it_binds_and_when_that_was_stopped(self, strip, live):
+    def test_while_it_binds_and_when_that_was_stopped(self, strip, live, core):
         bind()
         work = SimpleNamespace(stage="Areas", fraction=0.5)
         live._jobs[strip.session_uid] = live._Settling(work, (), np.zeros(2), prepares=True)
@@ -985,7 +985,8 @@ class TestPanel:
             assert "Not up to date. Binding: Areas, 50%" in self.texts()
         finally:
             live._jobs.clear()
-        live._troubles[strip.session_uid] = "Binding was stopped. Press Update, or move a handle", None
+        stopped = core.phrases.Phrase("Binding was stopped. Press Update, or move a handle")
+        live._troubles[strip.session_uid] = stopped, None
         assert "Not up to date. Binding was stopped. Press Update, or move a handle" in self.texts()
 
     def test_buttons_for_the_object_of_the_empty(self, strip):

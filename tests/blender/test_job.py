@@ -136,7 +136,7 @@ def test_the_work_waits_until_it_was_drawn(operator, obj):
 def test_esc_before_the_work_began(operator, jobs, obj):
     work = Work()
     started = operator([obj], work, begins=False)
-    assert started.tick("ESC", "PRESS") == {"CANCELLED"}
+    assert started.press_escape() == {"CANCELLED"}
     assert jobs.running() is None
     assert not work.began.wait(0.05)
     assert started.reports == [("INFO", "Stopped: nothing was changed")]
@@ -193,6 +193,7 @@ def test_steps_on_the_main_thread(operator, jobs, obj):
     started = operator([obj], compute, jobs.SteppedJob, begins=False)
     assert [started.tick() for _ in range(3)] == [{"PASS_THROUGH"}] * 3
     assert (jobs.running().stage, jobs.running().fraction) == ("Frames", 2 / 3)
+    assert started.tick() == {"PASS_THROUGH"}
     assert started.finished is None
     assert started.tick() == {"FINISHED"}
     assert started.finished[1] == "all"
@@ -232,7 +233,7 @@ def test_steps_that_go_wrong(operator, core, jobs, obj):
         raise core.PointCloudError("No")
 
     started = operator([obj], compute, jobs.SteppedJob, begins=False)
-    assert started.tick() == {"PASS_THROUGH"}
+    assert [started.tick() for _ in range(2)] == [{"PASS_THROUGH"}] * 2
     assert started.tick() == {"CANCELLED"}
     assert started.reports == [("ERROR", "No")]
 

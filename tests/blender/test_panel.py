@@ -23,6 +23,7 @@ OPERATORS = (
     "deform_to_shape_key",
     "deform_unbind",
     "deform_update",
+    "escape",
     "export_eigenvalues",
     "export_operator",
     "export_points",
