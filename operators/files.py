@@ -2,6 +2,7 @@
 
 import bpy
 import numpy as np
+from bpy.props import StringProperty
 
 from ..core import PointCloudError
 from ..core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, read_points, replacing, write_points
@@ -24,6 +25,16 @@ INPUTS = (*READABLE, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
 _COLORS = ("BYTE_COLOR", "FLOAT_COLOR")
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
+
+
+def file_filter(*suffixes):
+    """Return the property that lets file browsers list only names with these endings, to annotate an operator with."""
+    return StringProperty(
+        name="File Filter",
+        description="Names of files that are listed",
+        default=";".join(f"*{suffix}" for suffix in suffixes),
+        options={"HIDDEN"},
+    )
 
 
 def offset_of(obj):
@@ -184,7 +195,7 @@ def load(path, name: str = ""):
     elif path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
     else:
-        raise PointCloudError(f"There is no file {path}. Check its name and folder.")
+        raise PointCloudError("There is no file {path}. Check its name and folder.", path=path)
     return _choose_object(path, name), notices
 
 
@@ -193,7 +204,7 @@ def _choose_object(path, name):
     meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
     active = bpy.context.view_layer.objects.active
     if not meshes:
-        raise PointCloudError(f"{path} has no mesh object. Give a file with points.")
+        raise PointCloudError("{path} has no mesh object. Give a file with points.", path=path)
     if name:
         chosen = [obj for obj in meshes if obj.name == name]
     elif active in meshes:
@@ -202,8 +213,14 @@ def _choose_object(path, name):
         chosen = meshes
     if len(chosen) != 1:
         names = ", ".join(obj.name for obj in meshes)
-        asked = f'no mesh object "{name}"' if name else "no active mesh object"
-        raise PointCloudError(f"{path} has {asked}. Name one of its mesh objects with --object: {names}.")
+        raise PointCloudError(
+            '{path} has no mesh object "{name}". Name one of its mesh objects with --object: {names}.'
+            if name
+            else "{path} has no active mesh object. Name one of its mesh objects with --object: {names}.",
+            path=path,
+            name=name,
+            names=names,
+        )
     bpy.context.view_layer.objects.active = chosen[0]
     return chosen[0]
 

@@ -80,9 +80,18 @@ class Stages(StageTimes):
         self._window_manager.progress_update(100 * fraction)
 
 
+def redraw_views(window_manager):
+    """Draw all 3D views again, for what is drawn over them."""
+    for area in _views(window_manager):
+        area.tag_redraw()
+
+
 def redraw_panels(window_manager):
     """Draw the sidebars of all 3D views again, for what they tell of work that goes on."""
-    for window in window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                next(region for region in area.regions if region.type == "UI").tag_redraw()
+    for area in _views(window_manager):
+        next(region for region in area.regions if region.type == "UI").tag_redraw()
+
+
+def _views(window_manager):
+    areas = (area for window in window_manager.windows for area in window.screen.areas)
+    return (area for area in areas if area.type == "VIEW_3D")

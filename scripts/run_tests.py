@@ -13,7 +13,7 @@ import pythons
 from environments import ROOT, ensure, ensure_blender, isolated
 
 RESULTS = ROOT / "build" / "tests"
-LIMIT = 1200  # seconds for one run of pytest
+LIMIT = 1800  # seconds for one run of pytest
 
 
 def run_pytest(name, python, folder, *options):

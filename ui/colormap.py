@@ -1,14 +1,13 @@
 """Shows an attribute of the active object as colours."""
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError
 from ..operators.ready import ReadyOperator
-from .settings import COLOR_MAPS, RANGE_MODES
+from ..operators.translation import translated
+from .color_choices import COLOR_CHOICES, color_choice
 from .show import show_attribute, use_material_preview
-
-_SETTINGS = ("color_map", "reverse", "range_mode", "coverage")  # of the object, which keep what they are unless given
 
 
 class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
@@ -22,30 +21,10 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
         description="Name of the attribute; empty for the one on show, or the mean curvature",
         options={"SKIP_SAVE"},
     )
-    color_map: EnumProperty(
-        name="Color Map",
-        description="Colors from low to high values; those of the object's settings unless given",
-        items=COLOR_MAPS,
-        options={"SKIP_SAVE"},
-    )
-    reverse: BoolProperty(
-        name="Reverse", description="Turn the colors round, from high to low values", options={"SKIP_SAVE"}
-    )
-    range_mode: EnumProperty(
-        name="Range",
-        description="Which values the colors stretch over; those of the object's settings unless given",
-        items=RANGE_MODES,
-        options={"SKIP_SAVE"},
-    )
-    coverage: FloatProperty(
-        name="Coverage",
-        description="Share of the values inside the color range, so that a few outliers do not wash the rest out",
-        default=98.0,
-        min=50.0,
-        max=100.0,
-        subtype="PERCENTAGE",
-        options={"SKIP_SAVE"},
-    )
+    color_map: color_choice("color_map", options={"SKIP_SAVE"})
+    reverse: color_choice("reverse", options={"SKIP_SAVE"})
+    range_mode: color_choice("range_mode", options={"SKIP_SAVE"})
+    coverage: color_choice("coverage", options={"SKIP_SAVE"})
     radius: FloatProperty(
         name="Point Radius",
         description="Radius of the points in the object's own lengths; 0 leaves it to the setting Point Size",
@@ -65,9 +44,9 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
         try:
             show_attribute(obj, self.attribute, self.radius)
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
-        for name in _SETTINGS:
+        for name in COLOR_CHOICES:  # the settings of the object keep what they are unless given
             if not self.properties.is_property_set(name):
                 setattr(self, name, getattr(obj.meshfree, name))
             elif getattr(self, name) != getattr(obj.meshfree, name):

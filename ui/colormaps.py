@@ -1,6 +1,4 @@
-"""Colour maps as even samples, and the range of values they stretch over."""
-
-import numpy as np
+"""Colour maps as even samples."""
 
 # sRGB in hexadecimal, low to high. Viridis and Magma are perceptually uniform: S. van der Walt, N. Smith, CC0.
 _VIRIDIS = (
@@ -23,7 +21,6 @@ _CYCLIC = (
 _MAPS = {"VIRIDIS": _VIRIDIS, "MAGMA": _MAGMA, "COOL_WARM": _COOL_WARM, "CYCLIC": _CYCLIC}
 # For -1 as "none", then 0 to 6, which any colour vision tells apart: M. Okabe, K. Ito, Color Universal Design, 2008.
 _NONE, *_CLASSES = ("555555", "0072b2", "e69f00", "009e73", "d55e00", "56b4e9", "cc79a7", "f0e442")
-CLASSES = len(_CLASSES)  # whole numbers from 0 with a colour of their own; they repeat from there
 _TRUTH = ("bdbdbd", "d55e00")
 # The same for groups of points, by the names of `operators.groups`.
 _GROUPS = {
@@ -34,66 +31,6 @@ _GROUPS = {
     "Value": "cc79a7",
     "Rim": "56b4e9",
 }
-STEPPED = ("TRUTH", "CATEGORICAL")  # maps with a colour for each whole number
-
-
-def fit(values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 98.0, locked=(0.0, 1.0)):
-    """Choose a colour map and its range for values.
-
-    Parameters
-    ----------
-    values : ndarray, (n,)
-        Numbers or truth values.
-    name : {"AUTO", "VIRIDIS", "MAGMA", "COOL_WARM", "CYCLIC", "CATEGORICAL"}
-        AUTO takes two colours for truth values, one for each of few whole numbers, and the diverging map if the values
-        reach clearly to both sides of zero.
-    mode : {"AUTO", "DATA", "PERCENTILE", "SYMMETRIC", "LOCKED"}
-        Range from the least to the greatest value, from one percentile to the other, as far to both sides of zero as
-        those reach, or as given. AUTO is SYMMETRIC for the diverging map of signed values, DATA for the cyclic map,
-        whose ends would not meet otherwise, and PERCENTILE for all else.
-    coverage : float
-        Percentage of the values between the percentiles, so that a few outliers do not wash the rest out; all of them
-        for whole numbers and truth values.
-    locked : tuple of float
-        Range to keep.
-
-    Returns
-    -------
-    name : str
-        As given, or what AUTO came to: also "TRUTH".
-    low, high : float
-        Of stepped maps the first and the last whole number.
-    """
-    kind = values.dtype.kind
-    if name == "AUTO" and kind == "b":
-        return "TRUTH", 0.0, 1.0
-    values = values[np.isfinite(values)].astype(np.float64)
-    ends = (values.min(), values.max()) if len(values) else (0.0, 1.0)
-    if name == "AUTO" and kind == "i" and len(values) and ends[0] >= -1 and ends[1] < CLASSES:
-        name = "CATEGORICAL"
-    outside = 0.5 * (100.0 - coverage) if kind == "f" else 0.0  # whole numbers have no outliers
-    share = np.percentile(values, (outside, 100.0 - outside)) if len(values) else ends
-    if share[0] == share[1]:  # most values alike: the few others are what there is to see
-        share = ends
-    if name == "AUTO":
-        signed = min(-share[0], share[1]) > 0.01 * max(-share[0], share[1])
-        name = "COOL_WARM" if signed and (kind == "f" or ends[0] < -1) else "VIRIDIS"
-    if mode == "AUTO":
-        signed = name == "COOL_WARM" and share[0] < 0.0 < share[1]
-        mode = "SYMMETRIC" if signed else "DATA" if name == "CYCLIC" else "PERCENTILE"
-    if mode == "LOCKED":
-        low, high = min(locked), max(locked)
-    elif mode == "SYMMETRIC":
-        high = np.abs(share).max()
-        low = -high
-    else:
-        low, high = ends if mode == "DATA" else share
-    if name in STEPPED:
-        return name, float(np.rint(low)), float(np.rint(high))
-    if high - low <= 1e-6 * max(abs(low), abs(high)):  # a constant, up to rounding: the middle of the map
-        margin = 0.1 * abs(high) or 1.0
-        low, high = low - margin, high + margin
-    return name, float(low), float(high)
 
 
 def colors(name: str, reverse: bool = False) -> list:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from ..core.value_range import CLASSES
 from ..operators.attributes import BOUNDARY, COMPONENT, DISPLACEMENT, DISTANCE, read_attribute
 from ..operators.modifiers import DISPLAY_TAG, get_input, is_display
-from . import colormaps
 from .nodes import ATTRIBUTE, COLORS, RANGE
 
 NAME = "Mesh-Free Display"
@@ -60,7 +60,7 @@ def step_colors(obj) -> dict:
     first, last = (round(value) for value in shown_range(obj))
     none, *repeated = colors
     steps = range(first, last + 1)
-    return {str(number): none if number < 0 else repeated[number % colormaps.CLASSES] for number in steps}
+    return {str(number): none if number < 0 else repeated[number % CLASSES] for number in steps}
 
 
 def shown_values(obj):

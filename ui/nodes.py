@@ -2,7 +2,8 @@
 
 import bpy
 
-from ..operators.modifiers import DISPLAY_TAG, add_node, new_group
+from ..core.value_range import CLASSES, STEPPED
+from ..operators.modifiers import DISPLAY_TAG, add_input, add_node, is_intact, new_group
 from . import colormaps
 
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
@@ -17,15 +18,14 @@ _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 def display_group():
     """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
-        if DISPLAY_TAG in group and group.library is None:
+        if DISPLAY_TAG in group and group.library is None and is_intact(group):
             return group
     group = new_group("Mesh-Free Display", DISPLAY_TAG)
-    new_socket = group.interface.new_socket
-    radius = new_socket("Radius", in_out="INPUT", socket_type="NodeSocketFloat", description="Size of the points")
+    radius = add_input(group, "Radius", "Float", "Size of the points")
     radius.subtype = "DISTANCE"
     radius.default_value = 0.01
     radius.min_value = 0.0
-    new_socket("Material", in_out="INPUT", socket_type="NodeSocketMaterial", description="Colors of the points")
+    add_input(group, "Material", "Material", "Colors of the points")
 
     given = add_node(group, "NodeGroupInput", 0, 0)
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
@@ -100,7 +100,7 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
     groups : dict of str to tuple
         Names of groups, whose points have these colours instead; (r, g, b, 1), linear.
     """
-    stepped = color_map in colormaps.STEPPED
+    stepped = color_map in STEPPED
     repeated, hiding = color_map == "CATEGORICAL", settings.outside == "HIDE"
     needed = (RANGE, COLORS, LINES, BELOW, ABOVE) if hiding else (RANGE, COLORS, LINES, BELOW, ABOVE, GRAY)
     if _begin(material, name, f"{component} {repeated} {hiding} {groups}", needed):
@@ -148,7 +148,7 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
         number = separate.outputs[component]
     place = number
     if repeated:  # -1 and below have one colour, 0 and above repeat
-        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", number, -1.0), colormaps.CLASSES)
+        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", number, -1.0), CLASSES)
     bounds = add_node(tree, "ShaderNodeMapRange", 3, 0, name=RANGE)
     ramp = add_node(tree, "ShaderNodeValToRGB", 4, 0, name=COLORS)
     tree.links.new(place, bounds.inputs["Value"])

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ..core import PointCloudError
+from ..core.value_range import histogram
 from ..operators.attributes import mode_number
 from ..operators.result import EIGENVALUES
 from . import canvas, plots
@@ -60,7 +61,7 @@ def _histogram(obj, scale):
     key = zlib.crc32(values.view(np.uint8)), len(values), scale.bounds, bool(scale.boxes)
     if key not in _counted:
         _counted.clear()
-        _counted[key] = plots.histogram(values, scale.bounds, bool(scale.boxes))
+        _counted[key] = histogram(values, scale.bounds, bool(scale.boxes))
     return _counted[key]
 
 

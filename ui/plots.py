@@ -1,6 +1,7 @@
 """The pictures over the view: the legend, the histogram of what is shown, and the eigenvalues."""
 
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
 
 from .canvas import DIM, WHITE, Picture
 from .colormaps import to_display
@@ -9,7 +10,6 @@ from .ticks import round_ticks, tick_texts
 _HEIGHT = 230.0
 _EDGE = 12.0  # between the plate's border and what is on it
 _LINE = 16.0  # height of a line of text
-_BINS = 60
 _BEYOND = (0.45, 0.45, 0.45, 1.0)
 _MARK = (1.0, 0.75, 0.2, 1.0)
 _FEWEST = 6  # boxes that fill a legend
@@ -37,31 +37,6 @@ def legend_picture(scale) -> Picture:
         picture.line((right, y), (right + 5.0, y), WHITE)
         picture.text(text, right + 10.0, y)
     return picture
-
-
-def histogram(values, bounds, stepped: bool):
-    """Count values along an axis that holds the range and, to half its width on each side, what lies beyond.
-
-    Returns
-    -------
-    ndarray, (b + 1,)
-        Edges of the bins; one for each whole number where these have a colour each.
-    ndarray, (b,)
-        How many values each holds.
-    tuple of int
-        How many values lie below and above the range.
-    """
-    values = values[np.isfinite(values)].astype(np.float64)
-    low, high = bounds
-    beyond = int(np.count_nonzero(values < low)), int(np.count_nonzero(values > high))
-    if stepped:
-        low, high = low - 0.5, high + 0.5
-        edges = np.arange(low, high + 0.5) if high - low <= 4 * _BINS else np.linspace(low, high, _BINS + 1)
-    else:
-        half = 0.5 * (high - low)
-        first, last = (values.min(), values.max()) if len(values) else (low, high)
-        edges = np.linspace(max(min(first, low), low - half), min(max(last, high), high + half), _BINS + 1)
-    return edges, np.histogram(values, edges)[0], beyond
 
 
 def histogram_picture(scale, edges, counts, beyond) -> Picture:
@@ -105,8 +80,8 @@ def histogram_picture(scale, edges, counts, beyond) -> Picture:
             )
     y = _EDGE + 0.2 * _LINE
     if any(beyond):
-        picture.text(f"{beyond[0]:,} below", left, y)
-        picture.text(f"{beyond[1]:,} above", right, y, "RIGHT")
+        picture.text(iface_("{:,} below").format(beyond[0]), left, y)
+        picture.text(iface_("{:,} above").format(beyond[1]), right, y, "RIGHT")
     return picture
 
 

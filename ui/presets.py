@@ -36,8 +36,8 @@ class MESHFREE_OT_add_preset(ReadyOperator, AddPresetBase, bpy.types.Operator):
     bl_options = {"REGISTER", "INTERNAL"}  # it changes nothing that could be undone
     preset_menu = "MESHFREE_MT_presets"
     preset_subdir = "meshfree_laplacian"
-    preset_defines = ["settings = bpy.context.object.meshfree"]
-    preset_values = [f"settings.{name}" for name in NAMES]
+    # In full: names in preset_defines are not found by Python 3.13 in Blender 4.3 and the like.
+    preset_values = [f"bpy.context.object.meshfree.{name}" for name in NAMES]
 
     name: StringProperty(name="Name", description="Name of the preset", maxlen=64, options={"SKIP_SAVE"})
     remove_name: BoolProperty(

@@ -13,32 +13,9 @@ from bpy.props import (
 )
 
 from ..operators.options import DEFAULTS
+from ..operators.stages import redraw_views
 from . import deform_settings, show
-
-COLOR_MAPS = (
-    (
-        "AUTO",
-        "Automatic",
-        "Cool to Warm for values on both sides of zero, a color each for few whole numbers and for true or"
-        " false, Viridis otherwise",
-    ),
-    ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
-    ("MAGMA", "Magma", "From black over red to light yellow, in even steps to the eye"),
-    ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
-    ("CYCLIC", "Cyclic", "All around the hues back to the first one, for angles and phases"),
-    ("CATEGORICAL", "Categorical", "A color for each whole number; seven, which then repeat"),
-)
-RANGE_MODES = (
-    (
-        "AUTO",
-        "Automatic",
-        "Symmetric for Cool to Warm and values on both sides of zero, Data for Cyclic, Percentile otherwise",
-    ),
-    ("DATA", "Data", "From the least to the greatest value"),
-    ("PERCENTILE", "Percentile", "The share of the values that Coverage says, without the outermost ones"),
-    ("SYMMETRIC", "Symmetric", "As far below zero as above, by the share of the values that Coverage says"),
-    ("LOCKED", "Locked", "The values below, whatever is shown"),
-)
+from .color_choices import color_choice
 
 
 def _recolor(settings, context):
@@ -62,7 +39,7 @@ def _show_groups(settings, context):
 
 
 def _redraw(settings, context):
-    show.redraw()
+    redraw_views(context.window_manager)
 
 
 class MESHFREE_PG_stage(bpy.types.PropertyGroup):
@@ -192,32 +169,10 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         min=1,
         soft_max=100,
     )
-    color_map: EnumProperty(
-        name="Color Map",
-        description="Colors from low to high values",
-        items=COLOR_MAPS,
-        default="AUTO",
-        update=_recolor,
-    )
-    reverse: BoolProperty(
-        name="Reverse", description="Turn the colors round, from high to low values", default=False, update=_recolor
-    )
-    range_mode: EnumProperty(
-        name="Range",
-        description="Which values the colors stretch over",
-        items=RANGE_MODES,
-        default="AUTO",
-        update=_recolor,
-    )
-    coverage: FloatProperty(
-        name="Coverage",
-        description="Share of the values inside the color range, so that a few outliers do not wash the rest out",
-        default=98.0,
-        min=50.0,
-        max=100.0,
-        subtype="PERCENTAGE",
-        update=_recolor,
-    )
+    color_map: color_choice("color_map", update=_recolor)
+    reverse: color_choice("reverse", update=_recolor)
+    range_mode: color_choice("range_mode", update=_recolor)
+    coverage: color_choice("coverage", update=_recolor)
     range_low: FloatProperty(
         name="From", description="Value of the first color", default=0.0, precision=4, update=_recolor_locked
     )

@@ -4,11 +4,13 @@ import math
 
 import bpy
 
+from ..core.value_range import fit_range
 from ..operators.attributes import MEAN_CURVATURE, read_attribute
 from ..operators.binding import handle_names, positions_now
 from ..operators.groups import ANCHOR, HANDLE, RIM, ROLES
 from ..operators.modifiers import DISPLAY_TAG, get_input, set_input
 from ..operators.reading import TYPES, fingerprint, spacing, typical_distance
+from ..operators.stages import redraw_views
 from . import colormaps, legend
 from .display import (
     NAME,
@@ -119,14 +121,6 @@ def resize(obj):
     obj.update_tag()
 
 
-def redraw():
-    """Draw all 3D views again, for what is drawn over them."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
-
-
 def _radius(settings):
     return settings.point_size * settings.spacing or _NO_SPACING
 
@@ -144,7 +138,7 @@ def _color(obj, name, values):
         color_by_direction(material, name, groups)
     else:
         locked = settings.range_low, settings.range_high
-        color_map, low, high = colormaps.fit(
+        color_map, low, high = fit_range(
             without_unreached(name, shown), settings.color_map, settings.range_mode, settings.coverage, locked
         )
         if settings.range_mode != "LOCKED":
@@ -153,7 +147,7 @@ def _color(obj, name, values):
         color_by_number(material, name, component_shown, color_map, low, high, settings, groups)
     obj.update_tag()
     legend.renew(obj)
-    redraw()
+    redraw_views(bpy.context.window_manager)
 
 
 def _own_material(obj):

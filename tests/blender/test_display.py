@@ -15,11 +15,6 @@ def display(extension):
 
 
 @pytest.fixture
-def colormaps(extension):
-    return importlib.import_module(f"{extension.__name__}.ui.colormaps")
-
-
-@pytest.fixture
 def obj():
     obj = add_object(sphere_points() * (1.0, 1.3, 1.7))
     bpy.ops.meshfree.analyze(modes=4)
@@ -228,48 +223,6 @@ def test_attributes_of_other_origin_can_be_shown(display, obj):
         obj.data.attributes.new(name, kind, "POINT")
         bpy.ops.meshfree.colormap(attribute=name)
         assert display.shown_attribute(obj) == name
-
-
-def test_outliers_do_not_wash_the_colors_out(colormaps):
-    values = np.linspace(1.0, 2.0, 1000)
-    values[:3] = 1e6
-    name, low, high = colormaps.fit(values, coverage=98.0)
-    assert name == "VIRIDIS"
-    assert 1.0 <= low < high < 2.1
-
-
-@pytest.mark.parametrize(
-    ("values", "name"),
-    [
-        (np.zeros(5, bool), "TRUTH"),
-        (np.zeros(5, np.int32), "CATEGORICAL"),
-        (np.arange(-1, 7), "CATEGORICAL"),
-        (np.arange(-1, 8), "VIRIDIS"),
-        (np.arange(-2, 3), "COOL_WARM"),
-        (np.arange(3.0), "VIRIDIS"),
-    ],
-    ids=["truth", "one part", "parts", "many parts", "signed", "numbers"],
-)
-def test_automatic_maps(colormaps, values, name):
-    assert colormaps.fit(values, coverage=98.0)[0] == name
-    assert colormaps.fit(values, coverage=98.0, name="VIRIDIS")[0] == "VIRIDIS"
-
-
-@pytest.mark.parametrize(
-    ("values", "low", "high"),
-    [
-        (np.full(9, 3.0), 2.7, 3.3),
-        (np.zeros(9), -1.0, 1.0),
-        (np.array([np.nan, 1.0, 2.0]), 1.0, 2.0),
-        (np.full(3, np.nan), 0.0, 1.0),
-        (np.arange(100) == 7, 0.0, 1.0),
-        (np.empty(0), 0.0, 1.0),
-    ],
-    ids=["constant", "zero", "not finite in part", "not finite", "one of many", "empty"],
-)
-def test_range_of_special_values(colormaps, values, low, high):
-    coverage = 100.0 if np.isnan(values.astype(float)).any() else 98.0
-    assert colormaps.fit(values, coverage=coverage)[1:] == pytest.approx((low, high))
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ OPERATORS = (
     "deform_to_shape_key",
     "deform_unbind",
     "deform_update",
+    "escape",
     "export_eigenvalues",
     "export_operator",
     "export_points",
@@ -75,7 +76,7 @@ class Layout:
         data.path_resolve(path)
         self.texts.append(text or path)
 
-    def prop_search(self, data, path, search_data, search_property):
+    def prop_search(self, data, path, search_data, search_property, results_are_suggestions=False):
         search_data.path_resolve(search_property)
         self.prop(data, path)
 
@@ -113,11 +114,34 @@ def test_panel_without_object_says_what_to_do():
     assert "Select a mesh" in " ".join(draw())
 
 
-def test_panel_in_edit_mode_says_what_to_do():
+def test_panel_in_edit_mode_says_what_works_there():
     add_object(sphere_points())
     bpy.ops.object.mode_set(mode="EDIT")
-    assert "Switch to Object Mode" in " ".join(draw())
+    texts = draw()
+    assert texts[:2] == ["Choose points here, in Edit Mode", "Switch to Object Mode to analyze"]
+    assert "Assign to Anchors" in texts
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_panel_in_other_modes_says_what_to_do():
+    add_object(sphere_points(), faces=[(0, 1, 2)])
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert draw()[:2] == ['"Cloud" is not in Object Mode', "Switch to Object Mode first"]
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_panel_tells_calmly_of_groups_without_points():
+    obj = add_object(sphere_points())
+    texts = draw()
+    assert texts[texts.index("handles") : texts.index("anchors") + 2] == [
+        "handles",
+        "No points assigned yet",
+        "anchors",
+        "No points assigned yet",
+    ]
+    obj.vertex_groups.new(name="Anchor")
+    obj.meshfree.deform.handles = "Nowhere"
+    assert "No points assigned yet" not in draw()
 
 
 def test_panel_of_a_new_object():
@@ -234,7 +258,7 @@ def test_dialogs_show_every_setting(name):
             operator.draw_settings(settings, bpy.context, settings.layout)
         else:
             operator.draw(settings, bpy.context)
-    assert set(texts) == set(values)
+    assert set(texts) - {"No points assigned yet"} == set(values)
 
 
 @pytest.mark.parametrize("name", OPERATORS)
@@ -258,7 +282,7 @@ def test_adjust_last_operation_offers_what_is_quick(name):
 def test_panel_while_something_runs(extension, monkeypatch):
     add_object(sphere_points())
     panel = importlib.import_module(f"{extension.__name__}.ui.panel")
-    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(label="Smooth Points", stage="Filter", fraction=0.25))
+    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(title="Smooth Points", stage="Filter", fraction=0.25))
     texts = draw()
     assert "Smooth Points (Esc to Stop)" in texts
     assert "Filter: 25%" in texts

@@ -38,11 +38,6 @@ def display(extension):
 
 
 @pytest.fixture
-def plots(extension):
-    return module(extension, "ui.plots")
-
-
-@pytest.fixture
 def overlay(extension):
     return module(extension, "ui.overlay")
 
@@ -288,20 +283,6 @@ def test_point_size_follows_the_spacing_unless_set_by_hand(display, modifiers, o
     assert radius(display, modifiers, obj) == pytest.approx(6.0 * first, rel=1e-3)
 
 
-def test_histogram_counts_every_value_near_the_range(plots):
-    values = np.append(np.random.default_rng(0).normal(size=5000), (np.nan, 50.0))
-    edges, counts, beyond = plots.histogram(values, (-1.0, 1.0), stepped=False)
-    assert beyond == (np.count_nonzero(values < -1.0), np.count_nonzero(values > 1.0))
-    assert (edges[0], edges[-1]) == (-2.0, 2.0)
-    assert counts.sum() == np.count_nonzero(np.abs(values) <= 2.0)
-    edges, counts, beyond = plots.histogram(np.array([0.2, 0.4]), (0.0, 1.0), stepped=False)
-    assert (edges[0], edges[-1], counts.sum(), beyond) == (0.0, 1.0, 2, (0, 0))
-    edges, counts, beyond = plots.histogram(np.array([-1, 0, 0, 2]), (-1.0, 2.0), stepped=True)
-    assert counts.tolist() == [1, 2, 0, 1]
-    edges, counts, beyond = plots.histogram(np.empty(0), (0.0, 1.0), stepped=False)
-    assert counts.sum() == 0
-
-
 def texts(picture):
     return [text.text for text in picture.texts]
 
@@ -485,6 +466,166 @@ def test_legend_outlives_its_camera(obj):
     bpy.ops.meshfree.legend()
     bpy.data.objects.remove(camera)
     obj.meshfree.coverage = 60.0  # nothing to put the legend in front of
+
+
+def title_of(legend):
+    return next(part for part in legend.objects if part.type == "FONT" and part["meshfree_legend_part"] == "title")
+
+
+@pytest.fixture
+def legends(extension):
+    return module(extension, "ui.legend")
+
+
+def test_legend_is_written_anew_on_the_same_objects(legends, obj):
+    add_camera()
+    bpy.ops.meshfree.legend()
+    legend = legends.find_legend(bpy.context.scene, obj)
+    before = {part: part.data for part in legend.objects}
+    texts = legend_texts()
+    obj.meshfree.range_mode = "LOCKED"
+    obj.meshfree.range_low, obj.meshfree.range_high = 3.0 * obj.meshfree.range_low, 3.0 * obj.meshfree.range_high
+    assert legend_texts() != texts
+    after = {part: part.data for part in legend.objects}
+    assert sum(before.get(part) == data for part, data in after.items()) == min(len(before), len(after))
+    bpy.ops.meshfree.colormap(attribute="lb_boundary")
+    assert legend_texts() == ["Rim", "No", "Yes"] or legend_texts() == ["Rim", "Yes", "No"]
+    assert len(bpy.data.curves) == 3
+
+
+def test_legend_is_found_by_its_mark(legends, obj):
+    add_camera()
+    scene = bpy.context.scene
+    foreign = bpy.data.collections.new("Mesh-Free Legend")  # somebody's own
+    scene.collection.children.link(foreign)
+    bpy.ops.meshfree.legend()
+    legend = legends.find_legend(scene, obj)
+    assert legend != foreign
+    legend.name = "My Colors"
+    foreign.children.link(legend)  # below another one
+    scene.collection.children.unlink(legend)
+    before = legend_texts()
+    obj.meshfree.coverage = 50.0
+    assert legend_texts() != before
+    bpy.ops.meshfree.legend(show=False)
+    assert bpy.data.collections.keys() == ["Mesh-Free Legend"]
+    assert legend_texts() == []
+
+
+@pytest.mark.parametrize("typed", [False, True])
+def test_legend_keeps_the_title_that_somebody_wrote(legends, obj, typed):
+    add_camera()
+    bpy.ops.meshfree.legend(title="" if typed else "Bend of the Hull")
+    legend = legends.find_legend(bpy.context.scene, obj)
+    if typed:
+        title_of(legend).data.body = "Bend of the Hull"
+    obj.meshfree.reverse = True
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert legend_texts()[:2] == ["Bend of the Hull", "cm²"]
+    bpy.ops.meshfree.legend()
+    assert legend_texts()[0] == "Area"
+    bpy.ops.meshfree.colormap(attribute="lb_eigenvector_002")
+    assert legend_texts()[0] == "Mode 2"
+
+
+def test_two_scenes_have_a_legend_each(legends, obj):
+    first, camera = bpy.context.scene, add_camera()
+    bpy.ops.meshfree.legend(title="First")
+    second = bpy.data.scenes.new("Second")
+    other = bpy.data.objects.new("Camera", camera.data)
+    for item in (obj, other):
+        second.collection.objects.link(item)
+    assert legends.find_legend(second, obj) is None
+    legends.make_legend(second, obj, other)
+    legend, its = (legends.find_legend(scene, obj) for scene in (first, second))
+    assert legend != its
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert [title_of(item).data.body for item in (legend, its)] == ["First", "Area"]
+    assert [{part.parent for part in item.objects} for item in (legend, its)] == [{camera}, {other}]
+    bpy.ops.meshfree.legend(show=False)
+    assert legends.find_legend(first, obj) is None
+    assert legends.find_legend(second, obj) == its
+    bpy.data.scenes.remove(second)
+
+
+@pytest.mark.parametrize("kind", ["LINK_COPY", "FULL_COPY"])
+def test_legend_in_a_copy_of_the_scene(legends, obj, kind):
+    first, camera = bpy.context.scene, add_camera()
+    bpy.ops.meshfree.legend()
+    legend = legends.find_legend(first, obj)
+    bpy.ops.scene.new(type=kind)
+    second = bpy.context.scene
+    assert second != first
+    copy = obj if kind == "LINK_COPY" else bpy.context.object
+    its = legends.find_legend(second, copy)
+    assert (copy == obj, its == legend) == ((True, True) if kind == "LINK_COPY" else (False, False))
+    legends.make_legend(second, copy, second.camera, "Second")
+    its = legends.find_legend(second, copy)
+    assert its != legend
+    assert [title_of(item).data.body for item in (legend, its)] == ["Mean Curvature", "Second"]
+    assert legends.find_legend(first, obj) == legend
+    assert {part.parent for part in legend.objects} == {camera}
+    legends.remove_legend(second, its)
+    assert legends.find_legend(second, copy) is None
+    assert len(legend.objects) > 4
+    assert title_of(legend).data.body == "Mean Curvature"
+    bpy.data.scenes.remove(second)
+
+
+def test_taking_a_legend_away_from_a_linked_copy_leaves_the_other(legends, obj):
+    first = bpy.context.scene
+    add_camera()
+    bpy.ops.meshfree.legend()
+    bpy.ops.scene.new(type="LINK_COPY")
+    bpy.ops.meshfree.legend(show=False)
+    assert legends.find_legend(bpy.context.scene, obj) is None
+    assert legends.find_legend(first, obj) is not None
+    bpy.data.scenes.remove(bpy.context.scene)
+
+
+def test_legend_whose_objects_are_deleted(legends, obj):
+    add_camera()
+    scene = bpy.context.scene
+    bpy.ops.meshfree.legend()
+    legend = legends.find_legend(scene, obj)
+    count = len(legend.objects)
+    bpy.data.objects.remove(title_of(legend))
+    obj.meshfree.coverage = 97.0
+    assert title_of(legend).data.body == "Mean Curvature"
+    assert len(legend.objects) >= count - 2
+    bpy.data.batch_remove(list(legend.objects))
+    assert legends.find_legend(scene, obj) is None
+    obj.meshfree.coverage = 98.0  # it does not come back by itself
+    assert list(legend.objects) == []
+    bpy.ops.meshfree.legend()
+    assert legends.find_legend(scene, obj) == legend
+    assert len(legend.objects) == count
+    bpy.data.collections.remove(legend)
+    obj.meshfree.coverage = 97.0
+    assert legends.find_legend(scene, obj) is None
+
+
+def test_legend_of_a_deleted_object(legends, obj):
+    add_camera()
+    bpy.ops.meshfree.legend()
+    bpy.data.objects.remove(obj)
+    other = add_object(sphere_points(seed=1), "Other")
+    bpy.ops.meshfree.analyze()
+    assert legends.find_legend(bpy.context.scene, other) is None
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    bpy.ops.meshfree.legend()
+    assert len(bpy.data.collections) == 1
+    assert legend_texts()[0] == "Area"
+
+
+def test_copies_of_legend_objects_stay_as_they_are(legends, obj):
+    add_camera()
+    bpy.ops.meshfree.legend()
+    title = title_of(legends.find_legend(bpy.context.scene, obj))
+    copy = title.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert (title.data.body, copy.data.body) == ("Area", "Mean Curvature")
 
 
 def selection(obj):

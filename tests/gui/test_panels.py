@@ -1,0 +1,185 @@
+"""The sidebar, what is drawn over the view, and the Info log."""
+
+import numpy as np
+import pytest
+
+WORKING = "[operator.bl_idname for operator in main_window().modal_operators]"
+ANALYZED = "'lb_area' in bpy.context.object.data.attributes"
+NEIGHBORS = "bpy.context.object.meshfree.neighbors"
+SIDEBAR = "view3d()[0].spaces.active.show_region_ui"
+PRESET_FILES = """
+import os
+folders = bpy.utils.preset_paths("meshfree_laplacian")
+sorted(name for folder in folders for name in os.listdir(folder) if name.endswith(".py"))
+"""
+INFO_LOG = """
+area = next(area for area in main_window().screen.areas if area.type == "PROPERTIES")
+area.type = "INFO"
+with bpy.context.temp_override(window=main_window(), area=area, region=area.regions[-1]):
+    bpy.ops.info.select_all(action="SELECT")
+    bpy.ops.info.report_copy()
+area.type = "PROPERTIES"
+bpy.context.window_manager.clipboard.splitlines()
+"""
+
+
+def add_sphere(gui, count=1000, noise=0.0):
+    gui.python(
+        f"""
+points = sphere_points({count})
+points *= 1.0 + {noise} * np.random.default_rng(1).standard_normal((len(points), 1))
+add_object(points).select_set(True)
+view3d()[0].spaces.active.shading.type = "WIREFRAME"
+bpy.ops.ed.undo_push(message="Cloud")
+before = everything(bpy.context.object)
+"""
+    )
+    gui.settle()
+
+
+def corner(gui):
+    """Where the legend is drawn: the lower right corner of the view beside the sidebar."""
+    x, y, width, height = gui.region()
+    right = gui.region("UI")[0] if gui.python(SIDEBAR) else x + width
+    return right - 170, y + height - 260, 160, 250
+
+
+def colors(pixels):
+    return np.count_nonzero(np.ptp(pixels.astype(int), axis=2) > 60)
+
+
+@pytest.fixture
+def opened(gui, request):
+    """A cloud, and the tab with one more panel open."""
+    gui.open_panels(request.param)
+    gui.new_file()
+    add_sphere(gui)
+    gui.open_tab()
+    yield gui
+    gui.open_panels()
+
+
+def red(pixels):
+    return np.count_nonzero((pixels[:, :, 0] > 150) & (pixels[:, :, 1:].max(axis=2) < 90))
+
+
+class TestPresets:
+    """Settings by the menu of presets and the buttons beside it."""
+
+    @pytest.mark.parametrize("opened", ["MESHFREE_PT_settings"], indirect=True)
+    def test_apply_save_and_remove(self, opened):
+        gui = opened
+        usual = gui.python(NEIGHBORS)
+        plus, y = gui.find_button("meshfree.add_preset()", across=0.76)
+        menu = gui.region("UI")[0] + 60, y
+
+        gui.click(*menu)
+        gui.key("p")  # Paper
+        gui.wait_until("bpy.context.object.meshfree.bandwidth == 'GLOBAL'")
+        gui.click(*menu)
+        gui.key("d")  # Default
+        gui.wait_until("bpy.context.object.meshfree.bandwidth == 'ADAPTIVE'")
+
+        gui.python(f"{NEIGHBORS} = {usual + 7}")
+        gui.click(plus, y)
+        gui.click(plus - 60, y)  # the field for the name, which comes up under the mouse
+        gui.type("Mine")
+        gui.shot("preset_dialog")
+        gui.key("Return", "Return")  # of the name, of the dialog
+        assert gui.python(PRESET_FILES) == ["Mine.py"]
+
+        gui.python(f"{NEIGHBORS} = {usual}")
+        gui.click(*menu)
+        gui.shot("preset_menu")
+        gui.key("m")
+        gui.wait_until(f"{NEIGHBORS} == {usual + 7}")
+
+        gui.press("meshfree.add_preset(remove_active=True", across=0.84)
+        assert gui.python(PRESET_FILES) == []
+
+
+class TestView:
+    """What is drawn over the view."""
+
+    def test_local_view(self, gui):
+        add_sphere(gui)
+        gui.python("other = add_object(sphere_points(300) + (3.0, 0.0, 0.0), 'Other')")
+        gui.python("bpy.context.view_layer.objects.active = bpy.data.objects['Cloud']")
+        gui.python("bpy.ops.meshfree.spectrum(count=5)")
+        settings = "bpy.data.objects['Cloud'].meshfree"
+        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        gui.python(f"{settings}.histogram = {settings}.plot_eigenvalues = False")
+        shown = colors(gui.pixels(corner(gui)))
+        assert shown > 1000
+        gui.python(f"{settings}.histogram = {settings}.plot_eigenvalues = True")
+        gui.point_at_view()
+        gui.key("KP_Divide")
+        gui.wait_until("view3d()[0].spaces.active.local_view is not None")
+        assert colors(gui.pixels(corner(gui))) == pytest.approx(shown, rel=0.1)
+        gui.python("view3d()[0].spaces.active.overlay.show_overlays = False")
+        assert colors(gui.pixels(corner(gui))) < 100
+        gui.python("view3d()[0].spaces.active.overlay.show_overlays = True")
+        gui.key("KP_Divide")
+        gui.wait_until("view3d()[0].spaces.active.local_view is None")
+        assert colors(gui.pixels(corner(gui))) == pytest.approx(shown, rel=0.1)
+
+    def test_the_active_object_outside_of_the_local_view(self, gui):
+        add_sphere(gui)
+        gui.python("other = add_object(sphere_points(300) + (3.0, 0.0, 0.0), 'Other')")
+        gui.python("bpy.context.view_layer.objects.active = bpy.data.objects['Cloud']")
+        gui.python("bpy.ops.meshfree.analyze()")
+        gui.python("bpy.data.objects['Cloud'].select_set(False); other.select_set(True)")
+        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        gui.point_at_view()
+        gui.key("KP_Divide")
+        gui.wait_until("view3d()[0].spaces.active.local_view is not None")
+        gui.settle()  # no error in Python is seen, says the fixture
+        gui.key("KP_Divide")
+        gui.wait_until("view3d()[0].spaces.active.local_view is None")
+
+
+class TestSidebar:
+    """The tab and its buttons."""
+
+    def test_hide_and_show_while_it_works(self, gui):
+        add_sphere(gui, 15000, 0.005)
+        gui.open_tab()
+        gui.press("meshfree.analyze")
+        gui.wait_until(WORKING)
+        gui.point_at_view()
+        for shown in (False, True, False, True):
+            gui.key("n")
+            gui.wait_until(f"{SIDEBAR} == {shown}")
+        assert gui.python(f"bool({WORKING})")
+        gui.shot("sidebar_while_it_works")
+        gui.key("Escape")
+        gui.wait_until(f"not {WORKING}", 10)
+        assert gui.python("everything(bpy.data.objects['Cloud']) == before")
+
+    @pytest.mark.parametrize("opened", ["MESHFREE_PT_segment"], indirect=True)
+    def test_a_gray_button_says_why(self, opened):
+        gui = opened
+        x, y = gui.find_button("meshfree.separate_by_segment")
+        around = (x - 160, y - 30, 330, 160)
+        assert red(gui.pixels(around)) == 0
+        gui.move(x + 3, y + 1)
+        gui.python("time.sleep(1.5)")
+        gui.settle()
+        assert red(gui.pixels(around)) > 100  # as Blender writes why a button is disabled
+        assert not gui.python("bpy.ops.meshfree.separate_by_segment.poll()")
+
+    def test_the_info_log_has_the_words_of_scripts(self, gui):
+        add_sphere(gui, 500)
+        gui.open_tab()
+        gui.press("meshfree.analyze")
+        gui.wait_until(ANALYZED, 60)
+        gui.wait_until(f"not {WORKING}")
+        gui.settle()
+        assert gui.python("bpy.context.window_manager.operators[-1].name") == "Analyze Points"
+        lines = gui.python(INFO_LOG)
+        called = [line for line in lines if line.startswith("bpy.ops.meshfree.analyze(")]
+        assert called
+        assert any(line.startswith("Cloud: ") and "500 points" in line for line in lines)
+        gui.python("bpy.ops.ed.undo()")
+        gui.python(f"name = bpy.context.object.name\n{called[-1]}")  # a line of the log is a script
+        assert gui.python(ANALYZED)

@@ -1,0 +1,66 @@
+"""What one can choose about colours, for the settings of objects and for the operator that shows them."""
+
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
+
+_COLOR_MAPS = (
+    (
+        "AUTO",
+        "Automatic",
+        "Cool to Warm for values on both sides of zero, a color each for few whole numbers and for true or"
+        " false, Viridis otherwise",
+    ),
+    ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
+    ("MAGMA", "Magma", "From black over red to light yellow, in even steps to the eye"),
+    ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
+    ("CYCLIC", "Cyclic", "All around the hues back to the first one, for angles and phases"),
+    ("CATEGORICAL", "Categorical", "A color for each whole number; seven, which then repeat"),
+)
+_RANGE_MODES = (
+    (
+        "AUTO",
+        "Automatic",
+        "Symmetric for Cool to Warm and values on both sides of zero, Data for Cyclic, Percentile otherwise",
+    ),
+    ("DATA", "Data", "From the least to the greatest value"),
+    ("PERCENTILE", "Percentile", "The share of the values that Coverage says, without the outermost ones"),
+    ("SYMMETRIC", "Symmetric", "As far below zero as above, by the share of the values that Coverage says"),
+    ("LOCKED", "Locked", "The values below, whatever is shown"),
+)
+_CHOICES = {
+    "color_map": (
+        EnumProperty,
+        {"name": "Color Map", "description": "Colors from low to high values", "items": _COLOR_MAPS, "default": "AUTO"},
+    ),
+    "reverse": (
+        BoolProperty,
+        {"name": "Reverse", "description": "Turn the colors round, from high to low values", "default": False},
+    ),
+    "range_mode": (
+        EnumProperty,
+        {
+            "name": "Range",
+            "description": "Which values the colors stretch over",
+            "items": _RANGE_MODES,
+            "default": "AUTO",
+        },
+    ),
+    "coverage": (
+        FloatProperty,
+        {
+            "name": "Coverage",
+            "description": "Share of the values inside the color range, so that a few outliers do not wash the rest"
+            " out",
+            "default": 98.0,
+            "min": 50.0,
+            "max": 100.0,
+            "subtype": "PERCENTAGE",
+        },
+    ),
+}
+COLOR_CHOICES = tuple(_CHOICES)
+
+
+def color_choice(name: str, **more):
+    """Return the property of a choice, to annotate a class with; more of its arguments may be given."""
+    kind, arguments = _CHOICES[name]
+    return kind(**arguments, **more)
