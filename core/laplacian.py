@@ -233,7 +233,7 @@ def build_laplacian(
         )
 
     report("Areas", 0.5)
-    distance = arc_length(pairs, cloud.normals) if options.curvature_correction else pairs.distance
+    distance = arc_length(cloud) if options.curvature_correction else pairs.distance
     solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
     if not solution.converged:
         notices.append(f"The areas stopped after {solution.products} steps, close to their best values.")
