@@ -10,6 +10,7 @@ _BACK = -0.2  # cosine of two oriented normals below which the points lie on two
 _PARALLEL = 0.5  # cosine, without its sign, of normals on one sheet where the signs do not tell
 _AGAINST, _BENT = 0.5, 0.25  # turn against the bend, and bend, in radians, that cannot both be true
 _STEPS = 8  # nearest neighbours whose chords tell of relief
+_EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
 _LEANING = 0.3  # what normals within sharp features may be off by, as a share of the distance
 
 
@@ -78,14 +79,18 @@ def relief(nearest, normals):
     -------
     ndarray, (m,)
         Mean square of the slope of the chords to the eight nearest neighbours against the mean normal of their ends,
-        averaged over the neighbourhood. Of fourth order in the spacing on a smooth surface.
+        averaged over the neighbourhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
+        turn too fast between neighbours to be right, are no relief: arcs make up for them already.
     """
     near = slice(1, _STEPS + 1)
     index, counted = nearest.index[:, near], nearest.weight[:, near] > 0.0
     chord = nearest.points[index] - nearest.points[:, None]
-    side = np.where(np.einsum("ikc,ic->ik", normals[index], normals) < 0.0, -1.0, 1.0)
+    cosine = np.einsum("ikc,ic->ik", normals[index], normals)
+    side = np.where(cosine < 0.0, -1.0, 1.0)
     height = np.einsum("ikc,ic->ik", chord, normals) + side * np.einsum("ikc,ikc->ik", chord, normals[index])
-    slope = np.where(counted, (0.5 * height / nearest.distance[:, near]) ** 2, 0.0)
+    across = counted & (np.abs(cosine) < _EDGE)
+    smooth = counted & ~across & (across.sum(axis=1) < _ACROSS)[:, None]
+    slope = np.where(smooth, (0.5 * height / nearest.distance[:, near]) ** 2, 0.0)
     return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
 
 

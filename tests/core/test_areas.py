@@ -5,6 +5,7 @@ import pytest
 
 import core
 from benchmarks.samplings import (
+    closed_plate,
     fibonacci_sphere,
     marching_cubes_sphere,
     noisy_sphere,
@@ -99,6 +100,11 @@ class TestRelief:
     @pytest.mark.parametrize("points", [fibonacci_sphere(2000), random_sphere(2000)], ids=["even", "random"])
     def test_of_smooth_surfaces_is_none(self, points):
         assert read_cloud(points, LaplacianOptions()).relief.max() < 1e-6
+
+    @pytest.mark.parametrize(("side", "thickness", "most"), [(40, 2, 0.01), (20, 8, 0.016), (20, 20, 0.013)])
+    def test_of_sharp_edges_is_little(self, side, thickness, most):
+        box, _, _, area = closed_plate(side, thickness)
+        assert core.estimate_areas(box).sum() == pytest.approx(area, rel=most)
 
     @pytest.mark.parametrize("level", [0.02, 0.04, 0.2])
     def test_noise_is_none(self, level):
