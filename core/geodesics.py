@@ -52,8 +52,9 @@ def geodesic_distance(laplacian, sources, progress=None):
     known = np.flatnonzero(chosen & (laplacian.component >= 0))
     if not len(known):
         raise InvalidPointsError(
-            f"All {np.count_nonzero(chosen)} sources are points that the operator left out, because they lie apart from"
-            " the surface. Choose points of the surface."
+            "All {count} sources are points that the operator left out, because they lie apart from the surface."
+            " Choose points of the surface.",
+            count=np.count_nonzero(chosen),
         )
     report("Lengths", 0.0)
     graph = _lengths_of_pairs(laplacian)

@@ -13,6 +13,7 @@ from .errors import InvalidPointsError
 from .images import mirror, own_images
 from .kernel import SECOND_MOMENT, SUPPORT, pair_kernel
 from .options import LaplacianOptions
+from .phrases import Phrase
 from .points import check_points
 from .spectrum import Spectrum, correct_eigenvalues, solve_spectrum
 
@@ -122,7 +123,9 @@ class LaplaceBeltrami:
         values = np.asarray(values, dtype=np.float64)
         if values.ndim not in (1, 2) or len(values) != len(self.areas):
             raise InvalidPointsError(
-                f"Values have the shape {values.shape}, the operator {len(self.areas)} points. Give one row per point."
+                "Values have the shape {shape}, the operator {count} points. Give one row per point.",
+                shape=values.shape,
+                count=len(self.areas),
             )
         areas, lengths = self.areas, self.smoothing_lengths
         if values.ndim == 2:
@@ -228,15 +231,19 @@ def build_laplacian(
     scaled, pairs, notices = cloud.scaled, cloud.neighborhoods, cloud.notices
     if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
         notices.append(
-            "The kernel of most points reaches over a third of the object, which is too wide for good results. Add"
-            " points, or lower the number of neighbors."
+            Phrase(
+                "The kernel of most points reaches over a third of the object, which is too wide for good results. Add"
+                " points, or lower the number of neighbors."
+            )
         )
 
     report("Areas", 0.5)
     distance = arc_length(cloud) if options.curvature_correction else pairs.distance
     solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
     if not solution.converged:
-        notices.append(f"The areas stopped after {solution.products} steps, close to their best values.")
+        notices.append(
+            Phrase("The areas stopped after {steps} steps, close to their best values.", steps=solution.products)
+        )
 
     report("Operator", 0.8)
     if not options.curvature_correction:

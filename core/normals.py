@@ -23,13 +23,18 @@ def unit_normals(normals, count):
     normals = np.asarray(normals)
     if normals.shape != (count, 3) or normals.dtype.kind not in "iuf":
         raise InvalidPointsError(
-            f"Normals of shape {normals.shape} and type {normals.dtype} do not fit {count} points. Give three real"
-            " numbers for each point."
+            "Normals of shape {shape} and type {type} do not fit {count} points. Give three real numbers for each"
+            " point.",
+            shape=normals.shape,
+            type=normals.dtype,
+            count=count,
         )
     length = np.linalg.norm(normals.astype(np.float64), axis=1)
     bad = int(np.count_nonzero(~(np.isfinite(length) & (length > 0.0))))
     if bad:
-        raise InvalidPointsError(f"{bad} of {count} normals are zero or not finite. Leave the normals to be estimated.")
+        raise InvalidPointsError(
+            "{bad} of {count} normals are zero or not finite. Leave the normals to be estimated.", bad=bad, count=count
+        )
     return normals / length[:, None]
 
 
@@ -73,8 +78,10 @@ def covariance_normals(neighborhoods, weighted=True):
     curve = np.count_nonzero(variances[:, 1] < 5e-3 * variances[:, 2])
     if curve > 0.01 * len(points):
         raise NotASurfaceError(
-            f"Around {curve} of {len(points)} points the neighbors lie along a curve, so there is no tangent plane."
-            " Use points of a surface."
+            "Around {curve} of {count} points the neighbors lie along a curve, so there is no tangent plane. Use"
+            " points of a surface.",
+            curve=curve,
+            count=len(points),
         )
     return np.ascontiguousarray(directions[:, :, 0])
 

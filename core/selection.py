@@ -43,7 +43,9 @@ def grow(laplacian, chosen, distance):
     except (TypeError, ValueError):
         reach = np.nan
     if not reach >= 0.0:
-        raise PointCloudError(f"The distance to grow by is {distance!r}. Use a number that is not negative.")
+        raise PointCloudError(
+            "The distance to grow by is {distance!r}. Use a number that is not negative.", distance=distance
+        )
     graph = near_graph(laplacian, _NEIGHBORS)
     start = np.unique(graph.place[mask & (graph.place >= 0)])
     if not len(start):

@@ -35,16 +35,24 @@ def solve_spectrum(laplacian, stiffness, count, progress=None):
     areas = laplacian.areas
     n = len(areas)
     if int(count) != count or count < 1:
-        raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
+        raise TooFewPointsError("{count!r} modes were asked for. Ask for a whole number of at least 1.", count=count)
     if count > n // 3:
-        raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
+        raise TooFewPointsError(
+            "{count} modes were asked for, but {n} points carry at most {most}. Ask for fewer.",
+            count=count,
+            n=n,
+            most=n // 3,
+        )
     try:
         values, vectors = lowest_eigenpairs(
             laplacian, stiffness, int(count), progress or (lambda stage, fraction: None)
         )
     except ArpackNoConvergence as error:
         raise SolverError(
-            f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
+            "The eigenvalue solver found {found} of {count} modes on {n} points. Ask for fewer modes.",
+            found=len(error.eigenvalues),
+            count=count,
+            n=n,
         ) from error
     largest = np.argmax(np.abs(vectors), axis=0)
     vectors *= np.sign(vectors[largest, np.arange(count)])
@@ -169,8 +177,10 @@ def correct_eigenvalues(laplacian, values, vectors):
     if not np.isfinite(corrected).all():
         resolved = int(np.argmin(np.isfinite(corrected)))
         raise UnresolvedModesError(
-            f"The {len(values)} modes asked for vary faster than the smoothing length resolves: {resolved} are resolved"
-            f" on {len(laplacian.areas)} points. Ask for at most {resolved}, or lower the number of neighbors.",
-            resolved,
+            "The {count} modes asked for vary faster than the smoothing length resolves: {resolved} are resolved"
+            " on {n} points. Ask for at most {resolved}, or lower the number of neighbors.",
+            count=len(values),
+            resolved=resolved,
+            n=len(laplacian.areas),
         )
     return corrected

@@ -102,8 +102,10 @@ def fit_surface(points, index, weight, rows=None, normals=None):
         fitted.misfit[block] = np.sqrt((share * misfit).sum(axis=1)) * unit
     if curves > 0.01 * count:
         raise NotASurfaceError(
-            f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane. Use"
-            " points of a surface."
+            "Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane. Use"
+            " points of a surface.",
+            curves=curves,
+            count=count,
         )
     return fitted
 

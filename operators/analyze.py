@@ -7,6 +7,7 @@ import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
 from ..core import LaplaceBeltrami, Spectrum, UnresolvedModesError
+from ..core.phrases import Phrase
 from . import cache
 from .application import ShownOperator
 from .attributes import point_count
@@ -75,7 +76,11 @@ def resolved_modes(laplacian, modes, progress):
     except UnresolvedModesError as error:
         if error.resolved == 0:
             raise
-        notice = f"Only {error.resolved} of {modes} modes were computed: the others are finer than the points resolve."
+        notice = Phrase(
+            "Only {resolved} of {modes} modes were computed: the others are finer than the points resolve.",
+            resolved=error.resolved,
+            modes=modes,
+        )
         return cache.lowest_modes(laplacian, error.resolved, progress), [notice]
 
 
@@ -113,10 +118,17 @@ class AnalysisOperator(ShownOperator):
     def write(self, context, obj, result):
         write_result(obj, result, self.write_limit)
         self.warn(result.notices)
-        message = f"{obj.name}: {area_text(result.total_area)} from {point_count(obj.data):,} points"
-        if result.spectrum is not None:
-            message += f", {len(result.spectrum.eigenvalues)} modes"
-        return f"{message}, {sum(result.seconds.values()):.1f} s"
+        spectrum = result.spectrum
+        return Phrase(
+            "{object}: {area} from {count:,} points, {seconds:.1f} s"
+            if spectrum is None
+            else "{object}: {area} from {count:,} points, {modes} modes, {seconds:.1f} s",
+            object=obj.name,
+            area=area_text(result.total_area),
+            count=point_count(obj.data),
+            modes=0 if spectrum is None else len(spectrum.eigenvalues),
+            seconds=sum(result.seconds.values()),
+        )
 
 
 class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):

@@ -5,17 +5,22 @@ import numpy as np
 from bpy.props import IntProperty
 
 from ..core import PointCloudError
+from ..core.phrases import Phrase
 from . import live
-from .attributes import DISPLACEMENT, point_count, read_attribute, write_attribute
-from .binding import stale_reason
+from .attributes import DISPLACEMENT, point_count, read_attribute, tag_changed, write_attribute
+from .binding import POSE, stale_reason
 from .deform import BoundOperator, check_fresh, delete_bake
 from .deform_nodes import find_deform, is_baked, show_baked
+from .job import Job, JobOperator, SteppedJob, all_steps
+from .reading import find_object
+from .stages import Stages
+from .translation import translated
 
 _LAST = 1048574  # frame of Blender
-_TICK = 0.01  # seconds between two frames, for the window to notice Esc
+_PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
-class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
+class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
     """Keep the deformation of each frame in the file, for machines without the extension"""
 
     bl_idname = "meshfree.deform_bake"
@@ -30,8 +35,6 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
     )
     last: IntProperty(name="Last Frame", description="Last frame to bake", default=0, min=0, max=_LAST)
 
-    _timer = None
-
     def invoke(self, context, event):
         self._attended = True
         self.first, self.last = context.scene.frame_start, context.scene.frame_end
@@ -45,81 +48,140 @@ class MESHFREE_OT_deform_bake(BoundOperator, bpy.types.Operator):
             check_fresh(obj)
             if self.last < self.first:
                 raise PointCloudError(
-                    f"The last frame, {self.last}, comes before the first one, {self.first}. Swap them."
+                    "The last frame, {last}, comes before the first one, {first}. Swap them.",
+                    last=self.last,
+                    first=self.first,
                 )
+            self._kept = _Kept(scene, obj)
+            if attended:
+                return self.start(context, [obj], self._prepared_frames, SteppedJob)
+            try:
+                with Stages(context.window_manager, self.bl_label) as stages:
+                    frames = all_steps(self._frames(stages))
+            finally:
+                self.leave(context)
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
-        self._uid, self._frames, self._kept = obj.session_uid, [], (scene.frame_current, scene.frame_subframe)
-        if attended:
-            self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
-            context.window_manager.modal_handler_add(self)
-            return {"RUNNING_MODAL"}
-        context.window_manager.progress_begin(self.first, self.last)
-        problem = ""
-        while not problem and len(self._frames) <= self.last - self.first:
-            problem = self._take(context)
-            context.window_manager.progress_update(self.first + len(self._frames))
-        context.window_manager.progress_end()
-        return self._finish(context, problem)
+        return self.finish(context, [obj], frames, stages.seconds)
 
-    def modal(self, context, event):
-        if event.type == "ESC" and event.value == "PRESS":
-            return self._finish(context, "Stopped: nothing was baked", "INFO")
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        problem = self._take(context)
-        count = self.last - self.first + 1
-        if problem or len(self._frames) == count:
-            return self._finish(context, problem)
-        at = f"Frame {self.first + len(self._frames)}, {len(self._frames) / count:.0%}"
-        context.workspace.status_text_set(f"{self.bl_label}: {at}    Esc to stop")
-        return {"RUNNING_MODAL"}
+    def _prepared_frames(self, progress):
+        """Make the factors in a thread first, if there are none; see `_frames`."""
+        obj = self._kept.find()[1]
+        if live.find(obj) is None:
+            work = Job(self.bl_label, [], live.plan_settled(obj)[0])
+            try:
+                while not work.ended:
+                    progress(work.stage, 0.0)
+                    yield
+                live.keep(self._kept.find()[1], work.result()[0])
+            finally:
+                work.stop()
+        return (yield from self._frames(progress))
 
-    def cancel(self, context):
-        """Leave nothing in the window, should it be closed; also called when the dialog is."""
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            context.workspace.status_text_set(None)
-            self._timer = None
+    def _frames(self, progress):
+        """Read the displacements of all frames, one at each step; return them as a list."""
+        frames = []
+        for number in range(self.first, self.last + 1):
+            progress("Frames", len(frames) / (self.last + 1 - self.first))
+            scene, obj = self._kept.find()
+            if frames and not self._kept.holds():
+                raise PointCloudError(
+                    'The handles of "{object}" or the frame were changed meanwhile. Nothing was baked.', object=obj.name
+                )
+            scene.frame_set(number)
+            self._kept.expect()
+            live.update(obj, waits=live.find(obj) is None)
+            reason = stale_reason(obj, glance=True, trusting=True)
+            if reason:
+                raise PointCloudError('"{object}" is not up to date. {reason}.', object=obj.name, reason=reason)
+            frames.append(read_attribute(obj.data, DISPLACEMENT))
+            yield
+        return frames
 
-    def _find(self, context):
-        return next((obj for obj in context.scene.objects if obj.session_uid == self._uid), None)
+    def leave(self, context):
+        """Go back to the frame and the handles that were shown."""
+        self._kept.put_back()
 
-    def _take(self, context) -> str:
-        """Read the displacements of the next frame; return what is in the way, or an empty text."""
-        context.scene.frame_set(self.first + len(self._frames))
-        obj = self._find(context)
-        if obj is None:
-            return "The object was deleted. Nothing was baked."
-        try:
-            live.update(obj)
-        except PointCloudError as error:
-            return str(error)
-        reason = stale_reason(obj)
-        if reason:
-            return f'"{obj.name}" is not up to date. {reason}.'
-        self._frames.append(read_attribute(obj.data, DISPLACEMENT))
-        return ""
-
-    def _finish(self, context, problem, kind="ERROR"):
-        """Go back to the frame that was shown, and write what was baked, or report why there is nothing."""
-        self.cancel(context)
-        frame, subframe = self._kept
-        context.scene.frame_set(frame, subframe=subframe)
-        if problem:
-            self.report({kind}, problem)
-            return {"CANCELLED"}
-        obj = self._find(context)
+    def finish(self, context, objects, results, seconds):
+        """Write what was baked."""
+        (obj,) = objects
         mesh = bpy.data.meshes.new(f"{obj.name} Bake")
         mesh.vertices.add(point_count(obj.data))
-        for number, displacement in enumerate(self._frames):
+        for number, displacement in enumerate(results):
             write_attribute(mesh, str(number), displacement, "FLOAT_VECTOR")
         cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
-        show_baked(find_deform(obj), cache, self.first, len(self._frames))
-        size = np.prod([len(self._frames), *self._frames[0].shape]) * 4 / 2**20
-        self.report({"INFO"}, f"{obj.name}: {len(self._frames)} frames are baked, {size:.1f} MB in the file")
+        show_baked(find_deform(obj), cache, self.first, len(results))
+        size = np.prod([len(results), *results[0].shape]) * 4 / 2**20
+        text = Phrase(
+            "{object}: {count} frames are baked, {size:.1f} MB in the file",
+            object=obj.name,
+            count=len(results),
+            size=size,
+        )
+        self.report({"INFO"}, translated(text))
         return {"FINISHED"}
+
+
+class _Kept:
+    """The frame, the handles and the displacements that are shown while others are looked at."""
+
+    def __init__(self, scene, obj):
+        self._scene, self._uid = scene.session_uid, obj.session_uid
+        self._time = scene.frame_current, scene.frame_subframe
+        self._places = self._expected = self._now()
+        self._displacement = read_attribute(obj.data, DISPLACEMENT)
+        self._pose = obj.data[POSE].to_list()
+
+    def find(self):
+        """Return the scene and the object; None for what is gone."""
+        scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self._scene), None)
+        return scene, find_object(self._uid)
+
+    def _now(self):
+        """Read the frame, the binding, and where the object and the empties of its handles are, keyframes or not."""
+        scene, obj = self.find()
+        if scene is None or obj is None:
+            return None
+        settings = obj.meshfree.deform
+        things = {item.empty.session_uid: item.empty for item in settings.handle_items if item.empty}
+        places = {
+            uid: {name: tuple(getattr(thing, name)) for name in _PLACE}
+            for uid, thing in (things | {obj.session_uid: obj}).items()
+        }
+        return scene.frame_current, settings.binding_id, places
+
+    def expect(self):
+        """Remember what is there now."""
+        self._expected = self._now()
+
+    def holds(self) -> bool:
+        """Whether that is still there: nobody has moved anything since."""
+        obj = self.find()[1]
+        return (
+            self._expected is not None
+            and self._now() == self._expected
+            and point_count(obj.data) == len(self._displacement)
+        )
+
+    def put_back(self):
+        """Show again what was shown; handles that somebody has moved meanwhile stay where they are."""
+        scene, obj = self.find()
+        if scene is None:
+            return
+        holds = self.holds()
+        frame, subframe = self._time
+        scene.frame_set(frame, subframe=subframe)
+        if not holds:
+            return
+        for uid, place in self._places[2].items():
+            thing = find_object(uid)
+            for name, value in place.items():
+                if tuple(getattr(thing, name)) != value:  # it had been moved since its keyframe
+                    setattr(thing, name, value)
+        write_attribute(obj.data, DISPLACEMENT, self._displacement)
+        obj.data[POSE] = self._pose
+        tag_changed(obj.data)
 
 
 class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
@@ -133,13 +195,13 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
     def obstacle(cls, context):
         reason = super().obstacle(context)
         obj = cls.subject(context)
-        return reason or ("" if is_baked(obj) else f'Nothing of "{obj.name}" is baked')
+        return reason or ("" if is_baked(obj) else Phrase('Nothing of "{object}" is baked', object=obj.name))
 
     def change(self, context, obj):
         delete_bake(obj)
         context.view_layer.update()
         live.update(obj)
-        return f"{obj.name}: follows its handles again"
+        return Phrase("{object}: follows its handles again", object=obj.name)
 
 
 CLASSES = (MESHFREE_OT_deform_bake, MESHFREE_OT_deform_free)

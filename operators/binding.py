@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from uuid import uuid4
 
 import bmesh
+import bpy
 import numpy as np
 
 from ..core import PointCloudError
+from ..core.phrases import Phrase
 from .attributes import (
     DISPLACEMENT,
     REST,
@@ -22,15 +24,15 @@ from .attributes import (
     tag_changed,
     write_attribute,
 )
+from .counting import members, summarize
 from .deform_nodes import find_deform, is_baked
-from .glance import Glances
 from .groups import ANCHOR, chosen_weights, has_group, is_chosen
 from .options import settings_values
 from .reading import TYPES, fingerprint, sharing_objects
 
 WRITES = DISPLACEMENT, REST
 POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
-_glances = Glances()  # of `_glance`
+_bound = b"", ()  # session_uids of all objects when the bound ones were looked for, and the places of these
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,8 @@ class Constraints:
         The points that stay.
     strength : ndarray, (h + a,)
         Their weights in their groups.
+    checksum : str
+        Text that differs where any of it does.
     """
 
     names: list
@@ -54,14 +58,7 @@ class Constraints:
     owner: np.ndarray
     kept: np.ndarray
     strength: np.ndarray
-
-    @property
-    def checksum(self) -> str:
-        """Text that differs where any of it does."""
-        checksum = zlib.crc32(repr(self.names).encode())
-        for values in (self.moved, self.owner, self.kept, self.strength.astype(np.float32)):
-            checksum = zlib.crc32(np.ascontiguousarray(values), checksum)
-        return f"{checksum:08x}"
+    checksum: str
 
 
 def handle_names(obj) -> list:
@@ -82,38 +79,63 @@ def read_constraints(obj) -> Constraints:
     """
     settings = obj.meshfree.deform
     names = handle_names(obj) or [settings.handles]  # which says what is missing
-    weights = np.array([chosen_weights(obj, name, "Handles") for name in names])
+    weights = np.array([chosen_weights(obj, name, Phrase("Handles")) for name in names])
     several = int(np.count_nonzero(np.count_nonzero(weights > 0.0, axis=0) > 1))
     if several:
         raise PointCloudError(
-            f'{several} points of "{obj.name}" are in more than one of the groups {", ".join(names)}. Leave each'
-            " in one."
+            '{several} points of "{object}" are in more than one of the groups {names}. Leave each in one.',
+            several=several,
+            object=obj.name,
+            names=", ".join(names),
         )
     anchors = np.zeros(weights.shape[1])
     if is_chosen(obj, settings.anchors, ANCHOR):
-        anchors = chosen_weights(obj, settings.anchors, "Anchors")
+        anchors = chosen_weights(obj, settings.anchors, Phrase("Anchors"))
     moved, kept = np.flatnonzero(weights.max(axis=0) > 0.0), np.flatnonzero(anchors > 0.0)
     owner = weights.argmax(axis=0)[moved]
-    return Constraints(names, moved, owner, kept, np.concatenate([weights.max(axis=0)[moved], anchors[kept]]))
+    strength = np.concatenate([weights.max(axis=0)[moved], anchors[kept]])
+    checksum = _groups_checksum(names, [summarize(held) for held in (*weights, anchors)])
+    return Constraints(names, moved, owner, kept, strength, checksum)
 
 
-def _glance(obj, glance, trusting):
-    """Return the constraints, or None, and text that differs where they do; a glance may miss a change for seconds."""
-
-    def read():
-        try:
-            constraints = read_constraints(obj)
-        except PointCloudError as error:
-            return None, str(error)
-        return constraints, constraints.checksum
-
-    key = obj.session_uid, tuple(handle_names(obj)), obj.meshfree.deform.anchors, point_count(obj.data)
-    return _glances.read(key, read, glance, trusting)
+def _groups_checksum(names, found) -> str:
+    """Checksum of the members of the groups of the handles, given by name, and of the anchors."""
+    return f"{zlib.crc32(repr((names, [group.weighted for group in found])).encode()):08x}"
 
 
-def forget_glances():
-    """Read the groups of all objects again when they are needed."""
-    _glances.clear()
+def _groups_now(obj, glance, trusting):
+    """Return the checksum of the groups and which points are moved in Edit Mode; None, while these are not counted."""
+    names = handle_names(obj)
+    found = [members(obj, name, glance, trusting) for name in (*names, obj.meshfree.deform.anchors)]
+    if None in found:
+        return None
+    by_empty = _moved_by_empties(obj)
+    edited = [group.rows for name, group in zip(names, found[:-1], strict=True) if name not in by_empty]
+    return _groups_checksum(names, found), np.concatenate(edited) if edited else np.empty(0, int)
+
+
+def forget_bound(settings=None, context=None):
+    """Look for the bound objects again when they are needed."""
+    global _bound
+    _bound = b"", ()
+
+
+def bound_objects(scene=None) -> list:
+    """Find all bound objects, or those of a scene.
+
+    No object is looked at while they are the same as at the last call, for this is called at each move of the mouse:
+    to look at 5,000 takes 9 ms.
+    """
+    global _bound
+    objects = bpy.data.objects
+    uids = np.empty(len(objects), np.int32)
+    objects.foreach_get("session_uid", uids)
+    known, places = _bound
+    if uids.tobytes() != known:  # in the order of their names
+        places = [place for place, obj in enumerate(objects) if obj.type in TYPES and is_bound(obj)]
+        _bound = uids.tobytes(), places
+    found = [objects[place] for place in places]
+    return found if scene is None else [obj for obj in found if is_there(obj, scene)]
 
 
 def is_bound(obj) -> bool:
@@ -125,9 +147,8 @@ def handled_object(obj, scene):
     """Return an object itself, or if it is an empty that moves handles, the one in the scene that it moves."""
     if obj is None or obj.type in TYPES:
         return obj
-    for other in scene.objects:
-        moved = other.type in TYPES and any(item.empty == obj for item in other.meshfree.deform.handle_items)
-        if moved and copied_from(other) is None:
+    for other in bound_objects(scene):
+        if any(item.empty == obj for item in other.meshfree.deform.handle_items) and copied_from(other) is None:
             return other
     return obj
 
@@ -150,18 +171,18 @@ def copied_from(obj):
 
 def edited_rows(obj, constraints):
     """Return which of the moved points have no empty, and are moved in Edit Mode, (h,) bool."""
-    by_empty = {item.name for item in obj.meshfree.deform.handle_items if item.has_empty}
+    by_empty = _moved_by_empties(obj)
     return ~np.isin(constraints.owner, [index for index, name in enumerate(constraints.names) if name in by_empty])
+
+
+def _moved_by_empties(obj) -> set:
+    """Names of the groups of handles that empties move."""
+    return {item.name for item in obj.meshfree.deform.handle_items if item.has_empty}
 
 
 def moves_in_edit_mode(obj) -> bool:
     """Whether some group of handles has no empty."""
     return any(not item.has_empty for item in obj.meshfree.deform.handle_items)
-
-
-def rest_fingerprint(obj, constraints, glance=False) -> str:
-    """Checksum of the points at rest; those that are moved in Edit Mode count as if they stayed."""
-    return fingerprint(obj, glance, left_out=constraints.moved[edited_rows(obj, constraints)])
 
 
 def settings_text(obj) -> str:
@@ -178,40 +199,53 @@ def stale_reason(obj, glance=False, trusting=False) -> str:
     settings = obj.meshfree.deform
     count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
     if is_baked(obj):
-        return "Its animation is baked. Delete the bake to let it follow the handles again"
+        return Phrase("Its animation is baked. Delete the bake to let it follow the handles again")
     original = copied_from(obj)
     if original is not None and original.data == obj.data:
-        return f'It shares its mesh with "{original.name}", whose handles move both'
+        return Phrase('It shares its mesh with "{other}", whose handles move both', other=original.name)
     if original is not None:
-        return f'It has no handles of its own, "{original.name}" has them. Bind again to get copies of them'
+        return Phrase(
+            'It has no handles of its own, "{other}" has them. Bind again to get copies of them', other=original.name
+        )
     if count != settings.point_count:
-        return f"It had {settings.point_count:,} points and has {count:,} now. Bind again"
+        return Phrase(
+            "It had {before:,} points and has {count:,} now. Bind again", before=settings.point_count, count=count
+        )
     gone = [item.name for item in settings.handle_items if item.has_empty and not is_there(item.empty)]
     if gone:
-        return f"The empty of {', '.join(gone)} was deleted. Bind again to get a new one"
+        return Phrase("The empty of {names} was deleted. Bind again to get a new one", names=", ".join(gone))
     if find_deform(obj) is None:
-        return 'The modifier "Mesh-Free Deform" was removed. Bind again'
+        return Phrase('The modifier "Mesh-Free Deform" or an input of its nodes was removed. Bind again')
     if settings.settings_used != settings_text(obj):
-        return "Settings changed. Bind again"
+        return Phrase("Settings changed. Bind again")
     others = [other.name for other in sharing_objects(obj) if is_bound(other) and copied_from(other) != obj]
     if others:
-        return f'It shares its mesh with "{others[0]}", which is bound, too. Make it a single user'
+        return Phrase('It shares its mesh with "{other}", which is bound, too. Make it a single user', other=others[0])
     if in_edit_mesh(obj):  # groups and positions are only known to be right when one leaves it
         return ""
     if any(obj.data.attributes.get(name) is None for name in WRITES):
-        return f"The attributes {' and '.join(WRITES)} were removed. Bind again"
-    constraints, groups = _glance(obj, glance, trusting)
-    if settings.groups_used != groups:
-        return "The groups of handles or anchors changed. Bind again"
-    known = rest_fingerprint(obj, constraints, glance)
+        return Phrase("The attributes {first} and {second} were removed. Bind again", first=WRITES[0], second=WRITES[1])
+    groups = _groups_now(obj, glance, trusting)
+    if groups is None:
+        return ""
+    checksum, edited = groups
+    if settings.groups_used != checksum:
+        return Phrase("The groups of handles or anchors changed. Bind again")
+    known = fingerprint(obj, glance, left_out=edited)
     if known and settings.fingerprint != known:
-        return "The points at rest were moved. Bind again"
+        return Phrase("The points at rest were moved. Bind again")
     return ""
 
 
-def is_there(empty) -> bool:
-    """Whether an empty is still in some scene."""
-    return empty is not None and empty.users_scene
+def is_there(obj, scene=None) -> bool:
+    """Whether an object, such as the empty of a handle, is still in a scene, or in some scene."""
+    if obj is None:
+        return False
+    scenes = bpy.data.scenes if scene is None else [scene]
+    if any(obj.visible_get(view_layer=layer) for each in scenes for layer in each.view_layers):
+        return True
+    found = obj.users_scene  # takes 1 ms for 5,000 objects
+    return scene in found if scene is not None else bool(found)
 
 
 def in_edit_mesh(obj) -> bool:
@@ -226,7 +260,8 @@ def relative_matrix(obj, empty, depsgraph=None):
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     if not np.linalg.cond(matrix[:3, :3]) < 1e6:
         raise PointCloudError(
-            f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
+            '"{object}" is scaled to nothing along an axis. Give it a scale above zero along each axis.',
+            object=obj.name,
         )
     return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
 
@@ -311,7 +346,8 @@ def record(obj, rest, matrix, constraints, empties):
 def renew(obj, constraints):
     """Take the points of a bound object as they are now as the ones at rest, which `lb_rest` holds."""
     settings = obj.meshfree.deform
-    settings.fingerprint = rest_fingerprint(obj, constraints)
+    # Points that are moved in Edit Mode count as if they stayed.
+    settings.fingerprint = fingerprint(obj, left_out=constraints.moved[edited_rows(obj, constraints)])
     settings.binding_id = uuid4().hex
 
 

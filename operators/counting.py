@@ -26,10 +26,36 @@ _MOST = 50  # objects that are remembered
 
 
 class Members(NamedTuple):
-    """How many points a group holds, and a checksum of which."""
+    """Which points a group gives a weight above zero.
 
-    count: int
-    checksum: int
+    Attributes
+    ----------
+    count : int
+        How many.
+    checksum, weighted : int
+        Checksum of which ones, and one that their weights count in, too.
+    bits : bytes
+        One for each point, packed.
+    """
+
+    count: int = 0
+    checksum: int = 0
+    weighted: int = 0
+    bits: bytes = b""
+
+    @property
+    def rows(self):
+        """Indices of the points, (count,)."""
+        return np.flatnonzero(np.unpackbits(np.frombuffer(self.bits, np.uint8)))
+
+
+def summarize(weights) -> Members:
+    """Tell which points have a weight above zero, given all, (n,)."""
+    inside = weights > 0.0
+    if not inside.any():
+        return Members()
+    weighted = zlib.crc32(np.where(inside, weights, 0.0).astype(np.float32))
+    return Members(np.count_nonzero(inside), zlib.crc32(inside), weighted, np.packbits(inside).tobytes())
 
 
 @dataclass
@@ -46,7 +72,7 @@ class _Pass:
     """One pass over the vertices of an object, to count some groups; undo does not reach it."""
 
     names: list
-    inside: np.ndarray
+    weights: np.ndarray
     place: int = 0
     seconds: float = 0.0
 
@@ -56,8 +82,8 @@ _wanted = {}  # names of groups to count, by session_uid
 _passes = {}  # by session_uid
 
 
-def members(obj, name: str, glance=False) -> Members | None:
-    """Count the points to which a group gives a weight above zero.
+def members(obj, name: str, glance=False, trusting=False) -> Members | None:
+    """Tell to which points a group gives a weight above zero.
 
     Parameters
     ----------
@@ -66,13 +92,16 @@ def members(obj, name: str, glance=False) -> Members | None:
         The group; one that is missing has no points.
     glance : bool
         Be quick: a change may be missed for some seconds, and what was never counted is None until it is.
+    trusting : bool
+        Be quicker: for a glance take what was counted last, however long ago, unless it was undone or changed by us.
     """
     if not has_group(obj, name):
-        return Members(0, 0)
+        return Members()
     if obj.type != "MESH":
-        return _counted(group_weights(obj, name) > 0.0)
+        return summarize(group_weights(obj, name))
     known = _recall(obj)
-    if glance and name in known.members and perf_counter() < known.until.get(name, 0.0):
+    until = known.until.get(name, 0.0)
+    if glance and name in known.members and until and (trusting or perf_counter() < until):
         return known.members[name]
     if glance and not bpy.app.background and point_count(obj.data) > _AT_ONCE:
         _wanted.setdefault(obj.session_uid, set()).add(name)
@@ -80,7 +109,7 @@ def members(obj, name: str, glance=False) -> Members | None:
             bpy.app.timers.register(_tick, first_interval=_PAUSE)
         return known.members.get(name)
     began = perf_counter()
-    known.members[name] = _counted(group_weights(obj, name) > 0.0)
+    known.members[name] = summarize(group_weights(obj, name))
     known.until[name] = perf_counter() + _PATIENCE * (perf_counter() - began)
     return known.members[name]
 
@@ -90,10 +119,6 @@ def renew_counts(obj):
     _passes.pop(obj.session_uid, None)
     if obj.session_uid in _known:
         _known[obj.session_uid].until.clear()
-
-
-def _counted(inside):
-    return Members(int(np.count_nonzero(inside)), zlib.crc32(inside))
 
 
 def _recall(obj):
@@ -124,29 +149,30 @@ def _go_on(obj) -> bool:
     """Count a bit more of an object; return whether all is counted."""
     uid, count = obj.session_uid, point_count(obj.data)
     work = _passes.get(uid)
-    if work is None or work.inside.shape[1] != count or any(not has_group(obj, name) for name in work.names):
+    if work is None or work.weights.shape[1] != count or any(not has_group(obj, name) for name in work.names):
         names = [name for name in _wanted[uid] if has_group(obj, name)]
-        work = _passes[uid] = _Pass(names, np.zeros((len(names), count), dtype=bool))
+        work = _passes[uid] = _Pass(names, np.zeros((len(names), count), np.float32))
     rows = {obj.vertex_groups[name].index: row for row, name in enumerate(work.names)}
     began = perf_counter()
     while work.place < count and perf_counter() < began + _BIT:
         chunk = obj.data.vertices[work.place : work.place + _CHUNK]
         held = [
-            (rows[item.group], index)
+            (rows[item.group], index, item.weight)
             for index, vertex in enumerate(chunk, start=work.place)
             for item in vertex.groups
             if item.group in rows and item.weight > 0.0
         ]
         if held:
-            work.inside[tuple(np.transpose(held))] = True
+            row, index, weight = zip(*held, strict=True)
+            work.weights[row, index] = weight
         work.place += len(chunk)
     work.seconds += perf_counter() - began
     if work.place < count:
         return False
     del _passes[uid]
     known = _recall(obj)
-    for name, inside in zip(work.names, work.inside, strict=True):
-        known.members[name] = _counted(inside)
+    for name, weights in zip(work.names, work.weights, strict=True):
+        known.members[name] = summarize(weights)
         known.until[name] = perf_counter() + _PATIENCE * work.seconds
     _wanted[uid] -= set(work.names)
     _wanted[uid] = {name for name in _wanted[uid] if has_group(obj, name)}

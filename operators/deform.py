@@ -6,6 +6,7 @@ from bpy.props import BoolProperty
 from mathutils import Matrix, Vector
 
 from ..core import PointCloudError
+from ..core.phrases import Phrase
 from . import live
 from .application import ApplicationOperator
 from .attributes import REST, own_positions, point_count, read_attribute, write_own_positions
@@ -29,12 +30,14 @@ from .binding import (
 )
 from .deform_nodes import add_deform, find_deform, is_baked, show_live
 from .groups import HANDLE, assign, check_assignable, has_group
+from .job import busy
 from .modifiers import get_input
 from .positions import add_key, check_movable
 from .reading import read_points, shape_keys
 from .ready import ReadyOperator
 from .result import length_text
 from .selecting import SelectionOperator, groups_changed, selected
+from .translation import translated
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -60,12 +63,20 @@ class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
                 assign(obj, other, chosen, "REMOVE", 1.0)
             assign(obj, name, chosen, "REPLACE", 1.0)
             groups_changed(obj)
-            return f'{np.count_nonzero(chosen):,} points are in the group "{name}"'
+            return Phrase('{count:,} points are in the group "{name}"', count=np.count_nonzero(chosen), name=name)
 
         return change
 
 
-class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
+class HandledOperator(ReadyOperator):
+    """An operator on the active object, or on the one that the active empty moves."""
+
+    @classmethod
+    def subject(cls, context):
+        return handled_object(context.object, context.scene)
+
+
+class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Operator):
     """Prepare the deformation: the points of some groups are moved, those of another stay, and all others follow"""
 
     bl_idname = "meshfree.deform_bind"
@@ -85,8 +96,10 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
         edited = constraints.moved[~np.array(by_empty)[constraints.owner]]
         if len(edited) and (shape_keys(obj) is not None or obj.meshfree.use_modifiers):
             raise PointCloudError(
-                f'The {len(edited)} handles of "{obj.name}" have no empty, and to move them in Edit Mode takes a mesh'
-                " without shape keys whose modifiers are not used. Turn on Add Empties."
+                'The {count} handles of "{object}" have no empty, and to move them in Edit Mode takes a mesh'
+                " without shape keys whose modifiers are not used. Turn on Add Empties.",
+                count=len(edited),
+                object=obj.name,
             )
         if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
             rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
@@ -117,8 +130,18 @@ class MESHFREE_OT_deform_bind(ApplicationOperator, bpy.types.Operator):
         live.update(obj)
         self.warn(made.deformer.notices)
         moved, stay = len(made.constraints.moved), len(made.constraints.kept)
-        way = f'Move "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
-        return f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"
+        way = (
+            Phrase('Move "{empty}"', empty=empties[0][0].name)
+            if empties[0]
+            else Phrase("Move the handles in Edit Mode")
+        )
+        return Phrase(
+            "{object}: {moved:,} handles and {stay:,} anchors are bound. {way}",
+            object=obj.name,
+            moved=moved,
+            stay=stay,
+            way=way,
+        )
 
 
 def _add_empty(context, obj, name, rest, rows):
@@ -146,18 +169,14 @@ def _copy_empty(obj, empty):
     return copy
 
 
-class BoundOperator(ReadyOperator):
-    """An operator on a bound object, or on the one that the active empty moves."""
+class BoundOperator(HandledOperator):
+    """An operator on a bound object."""
 
     works_stale = False  # whether the handles may have lost their hold
 
     @classmethod
-    def subject(cls, context):
-        return handled_object(context.object, context.scene)
-
-    @classmethod
     def obstacle(cls, context):
-        return super().obstacle(context) or not_bound(cls.subject(context))
+        return busy() or super().obstacle(context) or not_bound(cls.subject(context))
 
     def execute(self, context):
         obj = self.subject(context)
@@ -168,25 +187,25 @@ class BoundOperator(ReadyOperator):
                 live.update(obj)  # all steps, should only the first one have been taken
             message = self.change(context, obj)
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, message)
+        self.report({"INFO"}, translated(message))
         return {"FINISHED"}
 
 
 def not_bound(obj) -> str:
     """Say that an object is not bound, and what to do; empty if it is."""
-    return "" if is_bound(obj) else f'"{obj.name}" is not bound. Bind it to its handles first'
+    return "" if is_bound(obj) else Phrase('"{object}" is not bound. Bind it to its handles first', object=obj.name)
 
 
 def check_fresh(obj):
     """Refuse an object that no longer follows its handles."""
     reason = stale_reason(obj)
     if reason:
-        raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
+        raise PointCloudError('"{object}" is not up to date. {reason}.', object=obj.name, reason=reason)
 
 
-class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
+class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.Operator):
     """Let all points follow the handles to where they are now, which happens by itself when they are moved"""
 
     bl_idname = "meshfree.deform_update"
@@ -197,7 +216,7 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        return super().obstacle(context) or not_bound(context.object)
+        return super().obstacle(context) or not_bound(cls.subject(context))
 
     def plan(self, context, obj):
         check_fresh(obj)
@@ -209,9 +228,9 @@ class MESHFREE_OT_deform_update(ApplicationOperator, bpy.types.Operator):
         live.keep(obj, made)
         live.write(obj, made, points, displacement, pose)
         if not made.deformer.converged:
-            self.warn(["The turns of details were still changing. Raise Steps."])
+            self.warn([Phrase("The turns of details were still changing. Raise Steps.")])
         distance = np.linalg.norm(points - made.deformer.points, axis=1)
-        return f"{obj.name}: moved at most by {length_text(distance.max())}"
+        return Phrase("{object}: moved at most by {distance}", object=obj.name, distance=length_text(distance.max()))
 
 
 class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
@@ -230,7 +249,9 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         write_own_positions(obj.data, positions)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
         write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
-        return f"{obj.name}: {len(positions):,} points are at rest where they are now"
+        return Phrase(
+            "{object}: {count:,} points are at rest where they are now", object=obj.name, count=len(positions)
+        )
 
 
 class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
@@ -241,7 +262,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        keyless = "Point clouds have no shape keys. Apply the deformation, or bake it"
+        keyless = Phrase("Point clouds have no shape keys. Apply the deformation, or bake it")
         return super().obstacle(context) or ("" if cls.subject(context).type == "MESH" else keyless)
 
     def change(self, context, obj):
@@ -249,8 +270,9 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
         constraints = read_constraints(obj)
         if edited_rows(obj, constraints).any():
             raise PointCloudError(
-                f'Handles of "{obj.name}" are moved in Edit Mode, which a mesh with shape keys does not allow. Turn on'
-                " Add Empties and bind again."
+                'Handles of "{object}" are moved in Edit Mode, which a mesh with shape keys does not allow. Turn'
+                " on Add Empties and bind again.",
+                object=obj.name,
             )
         key = add_key(obj, "Deform", shown_displacement(obj))
         put_back(context, obj)
@@ -258,7 +280,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
         renew(obj, constraints)
         if known is not None:
             live.keep(obj, known)
-        return f'{obj.name}: the deformation is the shape key "{key.name}"'
+        return Phrase('{object}: the deformation is the shape key "{key}"', object=obj.name, key=key.name)
 
 
 class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
@@ -270,7 +292,7 @@ class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
 
     def change(self, context, obj):
         put_back(context, obj)
-        return f"{obj.name}: handles and points are at rest"
+        return Phrase("{object}: handles and points are at rest", object=obj.name)
 
 
 class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
@@ -296,7 +318,7 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
             for empty in empties:
                 if empty.type == "EMPTY" and empty not in used:
                     bpy.data.objects.remove(empty)
-        return f"{obj.name}: is no longer bound"
+        return Phrase("{object}: is no longer bound", object=obj.name)
 
 
 def shown_displacement(obj):

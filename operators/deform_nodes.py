@@ -3,7 +3,7 @@
 import bpy
 
 from .attributes import DISPLACEMENT, REST
-from .modifiers import DEFORM_TAG, add_node, is_deform, is_display, new_group, set_input
+from .modifiers import DEFORM_TAG, add_input, add_node, is_deform, is_display, is_intact, new_group, set_input
 
 NAME = "Mesh-Free Deform"
 _LIVE, _BAKED = "live", "baked"  # what the custom property of the node groups says
@@ -61,7 +61,8 @@ def show_baked(modifier, cache, first: int, frames: int):
 
 def _group(kind):
     """Return the node group that all deformations of a kind share, or None."""
-    return next((item for item in bpy.data.node_groups if item.get(DEFORM_TAG) == kind and item.library is None), None)
+    known = [item for item in bpy.data.node_groups if item.get(DEFORM_TAG) == kind and item.library is None]
+    return next((item for item in known if is_intact(item)), None)
 
 
 def _live_group():
@@ -75,8 +76,7 @@ def _live_group():
 def _baked_group():
     group, given = _new(f"{NAME} Baked", _BAKED)
     for name, kind in (("Cache", "Object"), ("First Frame", "Int"), ("Frames", "Int")):
-        socket = group.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
-        socket.description = f"{name} of the baked animation"
+        add_input(group, name, kind, f"{name} of the baked animation")
     time = add_node(group, "GeometryNodeInputSceneTime", 0, -300)
     elapsed = add_node(group, "ShaderNodeMath", 1, -300, operation="SUBTRACT")
     last = add_node(group, "ShaderNodeMath", 1, -500, operation="SUBTRACT")
@@ -139,8 +139,7 @@ def _new(name, kind):
     """Add a node group with its strength; return it and the node of what it is given."""
     group = new_group(name, DEFORM_TAG)
     group[DEFORM_TAG] = kind
-    strength = group.interface.new_socket("Strength", in_out="INPUT", socket_type="NodeSocketFloat")
-    strength.description = "Share of the deformation that is shown"
+    strength = add_input(group, "Strength", "Float", "Share of the deformation that is shown")
     strength.subtype = "FACTOR"
     strength.default_value, strength.min_value, strength.max_value = 1.0, 0.0, 1.0
     return group, add_node(group, "NodeGroupInput", 0, 0)

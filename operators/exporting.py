@@ -4,12 +4,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..core import PointCloudError
 from ..core.files import replacing, write_points
+from ..core.phrases import Phrase
 from . import cache
 from .files import analysis_arrays, place_of, point_table, save_arrays
 from .job import JobOperator
@@ -17,18 +17,18 @@ from .options import laplacian_options
 from .reading import read_points
 from .result import EIGENVALUES
 from .stages import Stages
+from .translation import translated
 
 
 class ExportOperator(JobOperator, ExportHelper):
     """An operator that writes one file about the active object; an older file stays if that fails.
 
     A subclass has a method `plan`, which reads all that is needed and returns a function of a path and a progress
-    callback that writes the file, without touching Blender, and returns the numbers that `told` has a place for.
+    callback that writes the file, without touching Blender, and returns a line for the status bar.
     """
 
     bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
     suffix = ""  # of the name in the file browser
-    told = ""  # when it is done: about the object, with some numbers, and the file
 
     @property
     def filename_ext(self):
@@ -45,25 +45,24 @@ class ExportOperator(JobOperator, ExportHelper):
 
     def execute(self, context):
         attended = self.takes_window()
-        self._path = path = Path(bpy.path.abspath(self.filepath))
+        path = Path(bpy.path.abspath(self.filepath))
         try:
             reason = self.obstacle(context)
             if reason:  # since the file browser opened
-                raise PointCloudError(f"{reason}.")
-            self._name = context.object.name
+                raise PointCloudError("{reason}.", reason=reason)
             write = self.plan(context, context.object)
             if attended:
                 return self.start(context, [], lambda progress: write(path, progress))
             with Stages(context.window_manager, self.bl_label) as stages:
                 result = write(path, stages)
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         return self.finish(context, [], result, stages.seconds)
 
     def finish(self, context, objects, results, seconds):
         """Tell what was written."""
-        self.report({"INFO"}, rpt_(self.told).format(self._name, *results, self._path.name))
+        self.report({"INFO"}, translated(results))
         return {"FINISHED"}
 
 
@@ -72,7 +71,6 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_points"
     bl_label = "Export Points"
-    told = "{}: {:,} points written to {}"
 
     filter_glob: StringProperty(
         name="File Filter",
@@ -115,12 +113,14 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
             layout.prop(self, name)
 
     def plan(self, context, obj):
-        table = point_table(context, obj, self.attributes, self.colors)
+        table, name = point_table(context, obj, self.attributes, self.colors), obj.name
 
         def write(path, progress):
             progress("Write", 0.0)
             write_points(path, table, double=not table.single)
-            return (len(table.points),)
+            return Phrase(
+                "{object}: {count:,} points written to {file}", object=name, count=len(table.points), file=path.name
+            )
 
         return write
 
@@ -130,7 +130,6 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_operator"
     bl_label = "Export Laplacian"
-    told = "{}: {:,} weights and {} modes written to {}"
     suffix = ".npz"
 
     filter_glob: StringProperty(
@@ -139,14 +138,20 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
 
     def plan(self, context, obj):
         reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
-        place, count = place_of(obj), len(obj.get(EIGENVALUES, ()))
+        name, place, count = obj.name, place_of(obj), len(obj.get(EIGENVALUES, ()))
 
         def write(path, progress):
             built = cache.build(reading.points, options, reading.rim, progress)
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
             save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))
-            return built.laplacian.stiffness.nnz, count
+            return Phrase(
+                "{object}: {count:,} weights and {modes} modes written to {file}",
+                object=name,
+                count=built.laplacian.stiffness.nnz,
+                modes=count,
+                file=path.name,
+            )
 
         return write
 
@@ -156,7 +161,6 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_eigenvalues"
     bl_label = "Export Eigenvalues"
-    told = "{}: {} eigenvalues written to {}"
     suffix = ".csv"
 
     filter_glob: StringProperty(
@@ -168,16 +172,18 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
         reason = super().obstacle(context)
         if reason or EIGENVALUES in context.object:
             return reason
-        return f'"{context.object.name}" has no eigenvalues. Press Compute Modes first'
+        return Phrase('"{object}" has no eigenvalues. Press Compute Modes first', object=context.object.name)
 
     def plan(self, context, obj):
-        values = np.array(obj[EIGENVALUES])
+        name, values = obj.name, np.array(obj[EIGENVALUES])
 
         def write(path, progress):
             rows = np.stack([np.arange(1, len(values) + 1), values], axis=1)
             with replacing(path) as part:
                 np.savetxt(part, rows, ["%d", "%.17g"], ",", header="mode,eigenvalue", comments="")
-            return (len(values),)
+            return Phrase(
+                "{object}: {count} eigenvalues written to {file}", object=name, count=len(values), file=path.name
+            )
 
         return write
 

@@ -3,15 +3,16 @@
 import numpy as np
 
 from ..core import PointCloudError
+from ..core.phrases import Phrase
 from .attributes import point_count, read_attribute, tag_changed, write_attribute
 
 HANDLE, ANCHOR, FIXED, SOURCE, VALUE, RIM = ROLES = "Handle", "Anchor", "Fixed", "Source", "Value", "Rim"
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
 
 
-def group_kind(obj) -> str:
+def group_kind(obj) -> Phrase:
     """What the groups of an object are called in Blender."""
-    return "vertex group" if obj.type == "MESH" else "attribute"
+    return Phrase("vertex group") if obj.type == "MESH" else Phrase("attribute")
 
 
 def has_group(obj, name: str) -> bool:
@@ -50,7 +51,7 @@ def is_chosen(obj, name: str, default: str) -> bool:
     return bool(name) and (has_group(obj, name) or name != default)
 
 
-def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
+def chosen_weights(obj, name: str, setting: Phrase, least: int = 1, outside=0.0):
     """Read the weights in the group that a setting names.
 
     Parameters
@@ -58,7 +59,7 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
     obj : bpy.types.Object
     name : str
         The group.
-    setting : str
+    setting : Phrase
         What the panel calls the setting, for the texts of errors.
     least : int
         How many points must have a weight above zero.
@@ -76,24 +77,40 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
     """
     kind = group_kind(obj)
     if not has_group(obj, name):
-        weighty = "" if obj.type == "MESH" else " of truth values or numbers on points"
+        if not name:
+            raise PointCloudError(
+                '"{object}" has no {setting} chosen. Choose a group; Assign to Group makes one from the points selected'
+                " in Edit Mode.",
+                object=obj.name,
+                setting=setting,
+            )
         raise PointCloudError(
-            f'"{obj.name}" has no {kind}{weighty} named "{name}". Choose another {setting}, or clear it.'
-            if name
-            else f'"{obj.name}" has no {setting} chosen. Choose a group; Assign to Group makes one from the'
-            " points selected in Edit Mode."
+            '"{object}" has no {kind} named "{name}". Choose another {setting}, or clear it.'
+            if obj.type == "MESH"
+            else '"{object}" has no {kind} of truth values or numbers on points named "{name}". Choose another'
+            " {setting}, or clear it.",
+            object=obj.name,
+            kind=kind,
+            name=name,
+            setting=setting,
         )
     weights = group_weights(obj, name, outside)
     count = np.count_nonzero(weights > 0.0)
     if count < least:
         raise PointCloudError(
-            f'The {kind} "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting} takes'
-            f" at least {least}. Assign points to it in Edit Mode, or clear {setting}."
+            'The {kind} "{name}" gives {held} of {count} points a weight above zero, and {setting} takes at'
+            " least {least}. Assign points to it in Edit Mode, or clear {setting}.",
+            kind=kind,
+            name=name,
+            held=count,
+            count=len(weights),
+            setting=setting,
+            least=least,
         )
     return weights
 
 
-def chosen_members(obj, name: str, setting: str, least: int = 1):
+def chosen_members(obj, name: str, setting: Phrase, least: int = 1):
     """Read which points the group that a setting names gives a weight above zero, (n,) bool; see `chosen_weights`."""
     return chosen_weights(obj, name, setting, least) > 0.0
 
@@ -102,15 +119,25 @@ def check_assignable(obj, name: str, must_exist: bool):
     """Refuse a group that points cannot be assigned to, or removed from."""
     kind, exists = group_kind(obj), has_group(obj, name)
     if must_exist and not exists:
-        raise PointCloudError(f'"{obj.name}" has no {kind} named "{name}" to remove points from. Choose another.')
-    if name in obj.data.attributes and not (exists and obj.type != "MESH"):
-        reason = "vertex groups share their names" if obj.type == "MESH" else "it holds no weights"
         raise PointCloudError(
-            f'"{obj.name}" has an attribute named "{name}", and {reason}. Choose another name, or rename the attribute.'
+            '"{object}" has no {kind} named "{name}" to remove points from. Choose another.',
+            object=obj.name,
+            kind=kind,
+            name=name,
+        )
+    if name in obj.data.attributes and not (exists and obj.type != "MESH"):
+        reason = Phrase("vertex groups share their names") if obj.type == "MESH" else Phrase("it holds no weights")
+        raise PointCloudError(
+            '"{object}" has an attribute named "{name}", and {reason}. Choose another name, or rename the attribute.',
+            object=obj.name,
+            name=name,
+            reason=reason,
         )
     if obj.type == "MESH" and exists and obj.vertex_groups[name].lock_weight:
         raise PointCloudError(
-            f'The vertex group "{name}" of "{obj.name}" is locked. Unlock it, or choose another name.'
+            'The vertex group "{name}" of "{object}" is locked. Unlock it, or choose another name.',
+            name=name,
+            object=obj.name,
         )
 
 

@@ -5,16 +5,17 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ..core import PointCloudError
 from ..core.files import READABLE, read_points
+from ..core.phrases import Phrase
 from . import cache
 from .files import OFFSET, add_object, known_offset, offset_of
 from .job import JobOperator
 from .stages import Stages
+from .translation import translated
 
 LASER = (".las", ".laz")  # listed, so that the error can say what to do with them
 OWN = (".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", *LASER)  # Blender reads the others by itself, too
@@ -83,7 +84,9 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        return "" if context.mode == "OBJECT" else "Points are imported in Object Mode. Switch to Object Mode first"
+        if context.mode == "OBJECT":
+            return ""
+        return Phrase("Points are imported in Object Mode. Switch to Object Mode first")
 
     def invoke(self, context, event):
         self._attended = True
@@ -108,7 +111,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             with Stages(context.window_manager, self.bl_label) as stages:
                 tables = _read_all(paths, stages)
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         return self.finish(context, [], tables, stages.seconds)
 
@@ -116,7 +119,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         """Add an object for each table."""
         reason = self.obstacle(context)
         if reason:  # while the files were read
-            self.report({"ERROR"}, reason)
+            self.report({"ERROR"}, translated(reason))
             return {"CANCELLED"}
         for other in context.selected_objects:
             other.select_set(False)
@@ -140,17 +143,22 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""
         for notice in table.notices:
-            self.report({"WARNING"}, notice)
+            self.report({"WARNING"}, translated(notice))
         offset = offset_of(obj)
         if offset.any():
             shift = ", ".join(f"{-value:.10g}" for value in offset)
-            text = rpt_("{}: {:,} points, shifted by ({})").format(obj.name, len(table.points), shift)
+            text = Phrase(
+                "{object}: {count:,} points, shifted by ({shift})",
+                object=obj.name,
+                count=len(table.points),
+                shift=shift,
+            )
         else:
-            text = rpt_("{}: {:,} points").format(obj.name, len(table.points))
-        self.report({"INFO"}, text)
+            text = Phrase("{object}: {count:,} points", object=obj.name, count=len(table.points))
+        self.report({"INFO"}, translated(text))
         if shared is not None and (offset != shared).any():
-            text = rpt_("{} is too far from the points imported before to share their shift").format(obj.name)
-            self.report({"WARNING"}, text)
+            text = Phrase("{object} is too far from the points imported before to share their shift", object=obj.name)
+            self.report({"WARNING"}, translated(text))
 
 
 def _frame_selected(context):

@@ -1,4 +1,4 @@
-"""Long work beside the window: a thread, the objects it is for, and all that ends it."""
+"""Long work beside the window: a thread or steps, the objects it is for, and all that ends it."""
 
 from concurrent.futures import Future
 from threading import Event, Thread
@@ -6,15 +6,18 @@ from threading import Event, Thread
 import bpy
 from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_tip as tip_
 
 from ..core import Cancelled, PointCloudError
+from ..core.phrases import Phrase
 from .options import settings_values
 from .reading import find_object, fingerprint, metric, obstacle, read_points
 from .ready import ReadyOperator
 from .result import same_lengths
 from .stages import StageTimes, redraw_panels
+from .translation import translated
 
+STOPPED = Phrase("Stopped: nothing was changed")  # by somebody
 _TICK = 0.1  # seconds between two looks at the work
 _PATIENCE = 1.0  # seconds that Blender waits at its end for the thread to stop by itself
 _jobs = []  # the one that runs
@@ -23,6 +26,14 @@ _jobs = []  # the one that runs
 def running():
     """Return the job that runs, or None."""
     return _jobs[0] if _jobs else None
+
+
+def busy() -> str:
+    """Say that a job runs, and what to do; empty if none does."""
+    job = running()
+    if job is None:
+        return ""
+    return Phrase("{label} is running. Wait for it, or press Esc to stop it", label=job.title)
 
 
 class Snapshot:
@@ -46,12 +57,14 @@ class Snapshot:
         """
         obj = self.find()
         if obj is None:
-            raise PointCloudError(f'"{self.name}" was deleted meanwhile')
+            raise PointCloudError('"{object}" was deleted meanwhile', object=self.name)
         reason = obstacle(obj, modes)
         if reason:
-            raise PointCloudError(reason)
+            raise PointCloudError("{reason}", reason=reason)
         if _state(context, obj) != self._state or not same_lengths(self._metric, metric(obj)):
-            raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile. Start it again')
+            raise PointCloudError(
+                'points, scale or settings of "{object}" were changed meanwhile. Start it again', object=obj.name
+            )
         return obj
 
 
@@ -75,9 +88,11 @@ class Job(StageTimes):
 
     Attributes
     ----------
-    reason : str
+    reason : Phrase or ""
         Why it was stopped; empty while nobody did.
     """
+
+    tick = _TICK
 
     def __init__(self, label, snapshots, compute):
         super().__init__()
@@ -85,8 +100,11 @@ class Job(StageTimes):
         self.stage, self.reason, self._stop = "Start", "", Event()
         self._timer, self._shown = None, ""
         self._future = Future()
+        self._begin(compute)
+
+    def _begin(self, compute):
         # Not of a pool: Blender must not wait for it at its end.
-        self._thread = Thread(target=self._run, args=(compute,), name=label, daemon=True)
+        self._thread = Thread(target=self._run, args=(compute,), name=self.label, daemon=True)
         self._thread.start()
 
     def __call__(self, stage, fraction):
@@ -108,7 +126,15 @@ class Job(StageTimes):
         """Whether there is a result or an error, or it was stopped."""
         return bool(self.reason) or self._future.done()
 
-    def stop(self, reason="Stopped: nothing was changed"):
+    @property
+    def title(self):
+        """The label in the language of the interface."""
+        return iface_(self.label, "Operator")
+
+    def go_on(self):
+        """Do what there is to do on Blender's main thread: nothing."""
+
+    def stop(self, reason=STOPPED):
         """End it for everybody; the thread itself ends at its next report of progress, and its result is dropped."""
         self.reason = self.reason or reason
         self._stop.set()
@@ -124,32 +150,84 @@ class Job(StageTimes):
         self._thread.join(seconds)
 
     def show(self, context):
-        """Tell in the status bar how far it is, and let the panel do so too."""
-        text = iface_("{}: {}, {:.0%}    Esc to stop").format(iface_(self.label), iface_(self.stage), self.fraction)
+        """Tell in all windows how far it is, and let Esc end it there."""
+        windows = context.window_manager.windows
+        if not bpy.app.background:
+            for window in windows:  # also such as were opened meanwhile
+                if all(operator.bl_idname != _ESCAPE for operator in window.modal_operators):
+                    with bpy.context.temp_override(window=window):
+                        bpy.ops.meshfree.escape("INVOKE_DEFAULT")
+        text = iface_("{}: {}, {:.0%}    Esc to stop").format(self.title, iface_(self.stage), self.fraction)
         if text != self._shown:
             self._shown = text
-            context.workspace.status_text_set(text)
+            _set_status([window.workspace for window in windows], text)
             redraw_panels(context.window_manager)
 
     def open(self, context):
-        """Begin to show it in the window and to look at it there again and again."""
+        """Begin to show it, and to look at it again and again in the window that it belongs to."""
         _jobs.append(self)
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        self._timer = context.window_manager.event_timer_add(self.tick, window=context.window)
         self.show(context)
 
     def close(self, context):
-        """Leave nothing of it in the window; may be called again."""
+        """Leave nothing of it in any window; may be called again."""
         if self not in _jobs:
             return
         _jobs.remove(self)
         context.window_manager.event_timer_remove(self._timer)
-        for workspace in bpy.data.workspaces:  # another one may be open now than when it was shown
-            workspace.status_text_set(None)
+        if not bpy.app.background:
+            # Later: a window that is being closed must not find another context than it had.
+            bpy.app.timers.register(_clear_status, persistent=True)
         redraw_panels(context.window_manager)
 
 
-def _busy():
-    return f"{running().label} is running. Wait for it, or press Esc to stop it"
+class SteppedJob(Job):
+    """A computation that needs Blender itself, so that it is done in steps on its main thread, one at each look.
+
+    `compute` is a generator function, whose result is what it returns; see `all_steps`.
+    """
+
+    tick = 0.01
+
+    def _begin(self, compute):
+        self._steps = compute(self)
+
+    def go_on(self):
+        """Take a step."""
+        try:
+            next(self._steps)
+        except StopIteration as end:
+            self._future.set_result(end.value)
+        except BaseException as error:  # goes to whoever asks for the result
+            self._future.set_exception(error)
+
+    def wait(self, seconds):
+        """Wait for nothing: no step is taken any more."""
+
+    def close(self, context):
+        super().close(context)
+        self._steps.close()
+
+
+def all_steps(steps):
+    """Take all steps of a generator at once, and return its result."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+
+
+def _clear_status():
+    if running() is None:
+        _set_status(bpy.data.workspaces, None)  # others may be open now than when it was shown
+
+
+def _set_status(workspaces, text):
+    """Set the text in the status bar of workspaces, or clear it by None."""
+    for workspace in workspaces:
+        with bpy.context.temp_override(workspace=workspace):  # which is the one that Blender writes to
+            workspace.status_text_set(text)
 
 
 class JobOperator(ReadyOperator):
@@ -163,55 +241,62 @@ class JobOperator(ReadyOperator):
 
     @classmethod
     def poll(cls, context):
-        if running() is not None:
-            cls.poll_message_set(_busy())
+        if busy():
+            cls.poll_message_set(translated(busy(), tip_))
             return False
         return super().poll(context)
 
-    def start(self, context, objects, compute):
+    def start(self, context, objects, compute, kind=Job):
         """Begin to work for some objects."""
-        if running() is not None:  # since a file browser opened
-            raise PointCloudError(f"{_busy()}.")
-        self._job = Job(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
+        if busy():  # since a file browser opened
+            raise PointCloudError("{reason}.", reason=busy())
+        self._job = kind(self.bl_label, [Snapshot(context, obj) for obj in objects], compute)
         self._job.open(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        job = self._job
-        if event.type == "ESC" and event.value == "PRESS":
-            job.stop()
-        elif event.type != "TIMER":
+        if event.type != "TIMER":
             return {"PASS_THROUGH"}
+        job = self._job
         for snapshot in job.snapshots:
             if snapshot.find() is None:
-                job.stop(f'Stopped because "{snapshot.name}" was deleted: nothing was changed')
+                job.stop(Phrase('Stopped because "{object}" was deleted: nothing was changed', object=snapshot.name))
+        if not job.ended:
+            job.go_on()
         if job.ended:
             job.close(context)
+            self.leave(context)
             return self.complete(context, job)
         job.show(context)
         return {"PASS_THROUGH"}
 
     def cancel(self, context):
         """End the work, if it has begun, with its dialog or the window that shows it."""
-        if self._job is not None:
-            self._job.stop()
-            self._job.close(context)
+        job = self._job
+        if job is not None and job is running():
+            job.stop()
+            job.close(context)
+            self.leave(context)
+
+    def leave(self, context):
+        """Put back what the work itself has changed in Blender: nothing."""
 
     def complete(self, context, job):
         """Find the objects again, and let `finish` use what was computed for them, if they are as they were."""
         try:
             results = job.result()
-        except Cancelled as stop:
-            self.report({"INFO"}, str(stop))
+        except Cancelled:
+            self.report({"INFO"}, translated(job.reason))
             return {"CANCELLED"}
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            self.report({"WARNING"}, rpt_("{} wrote nothing: {}").format(iface_(job.label), change))
+            text = Phrase("{label} wrote nothing: {change}", label=job.title, change=change.text)
+            self.report({"WARNING"}, translated(text))
             return {"CANCELLED"}
         return self.finish(context, objects, results, job.seconds)
 
@@ -225,12 +310,42 @@ class MESHFREE_OT_stop(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if running() is None:
-            cls.poll_message_set("Nothing is running")
+            cls.poll_message_set(translated(Phrase("Nothing is running"), tip_))
         return running() is not None
 
     def execute(self, context):
         running().stop()
         return {"FINISHED"}
+
+
+class MESHFREE_OT_escape(bpy.types.Operator):
+    """Let Esc stop what is running, in the window where it is pressed"""
+
+    bl_idname = "meshfree.escape"
+    bl_label = "Stop by Esc"
+    bl_options = {"INTERNAL"}  # each window has one while something runs
+
+    def invoke(self, context, event):
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        job = running()
+        if job is None:
+            self.cancel(context)
+            return {"CANCELLED", "PASS_THROUGH"}
+        if event.type != "ESC" or event.value != "PRESS":
+            return {"PASS_THROUGH"}
+        job.stop()
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Leave no timer behind, should the window be closed."""
+        context.window_manager.event_timer_remove(self._timer)
+
+
+_ESCAPE = MESHFREE_OT_escape.__name__
 
 
 def attach():
@@ -253,7 +368,7 @@ def detach():
 def _undone(*_):
     job = running()
     if job is not None:
-        job.stop("Stopped by undo: nothing was changed")
+        job.stop(Phrase("Stopped by undo: nothing was changed"))
 
 
 @persistent
@@ -265,4 +380,4 @@ def _abandon(*_):
 
 
 _HANDLERS = {"undo_post": _undone, "redo_post": _undone, "load_pre": _abandon}
-CLASSES = (MESHFREE_OT_stop,)
+CLASSES = (MESHFREE_OT_stop, MESHFREE_OT_escape)

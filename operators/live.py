@@ -16,10 +16,11 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ..core import Cancelled, Deformer, PointCloudError
+from ..core.phrases import Phrase
 from . import binding, cache
-from .job import Job
+from .job import STOPPED, Job, running
 from .options import laplacian_options
-from .reading import TYPES, rim_points
+from .reading import rim_points
 from .stages import redraw_panels
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
@@ -102,7 +103,7 @@ def find(obj):
 
 def keep(obj, live):
     """Keep the factors of an object, and drop those that no object needs."""
-    used = {live_key(other) for other in bpy.data.objects if other.type in TYPES and binding.is_bound(other)}
+    used = {live_key(other) for other in binding.bound_objects()}
     for key in _lives.keys() - used:
         del _lives[key]
     _lives[live_key(obj)] = live
@@ -173,7 +174,7 @@ def write(obj, live, points, displacement, pose, settled=True):
     _troubles.pop(obj.session_uid, None)
 
 
-def update(obj, depsgraph=None, quick=False):
+def update(obj, depsgraph=None, quick=False, waits=True):
     """Let a bound object follow its handles, if they have moved and the binding holds.
 
     Parameters
@@ -183,8 +184,10 @@ def update(obj, depsgraph=None, quick=False):
         Where the handles are read; otherwise as the viewport shows them.
     quick : bool
         Take one step only and leave the rest to the timer; if factors have to be made, all of it.
+    waits : bool
+        If factors have to be made, make them now and do not leave that to the timer.
     """
-    if binding.stale_reason(obj, glance=quick, trusting=quick):
+    if binding.stale_reason(obj, glance=quick or not waits, trusting=quick):
         return
     pose = binding.read_pose(obj, depsgraph)
     written, settled = binding.written_pose(obj)
@@ -192,12 +195,12 @@ def update(obj, depsgraph=None, quick=False):
         if settled:
             _troubles.pop(obj.session_uid, None)  # it was at another pose
         return
-    if not quick:
+    live = find(obj)
+    if not quick and (waits or live is not None):
         live, points, displacement = plan_settled(obj, depsgraph)[0](lambda stage, fraction: None)
         keep(obj, live)
         write(obj, live, points, displacement, pose)
         return
-    live = find(obj)
     if live is not None:
         goal = binding.goal(obj, live.constraints, live.rest, depsgraph)
         points, displacement = displaced(live, goal, steps=1, start=live.last.get(obj.session_uid))
@@ -205,18 +208,18 @@ def update(obj, depsgraph=None, quick=False):
     settle_later(obj)
 
 
-def update_all(scene, depsgraph, quick):
+def update_all(scene, depsgraph, quick, waits=True):
     """Let all bound objects of a scene follow; what goes wrong is for the panel, since nobody called this."""
     with _guarded() as free:
         for obj in _bound_objects(scene) if free else ():
             try:
-                update(obj, depsgraph, quick)
+                update(obj, depsgraph, quick, waits)
             except PointCloudError as error:
-                _troubles[obj.session_uid] = str(error), None
+                _troubles[obj.session_uid] = error.text, None
 
 
 def _bound_objects(scene):
-    return [obj for obj in scene.objects if obj.type in TYPES and binding.is_bound(obj) and obj.data.is_editable]
+    return [obj for obj in binding.bound_objects(scene) if obj.data.is_editable]
 
 
 @contextmanager
@@ -262,7 +265,7 @@ def _tick():
             depsgraph = bpy.context.evaluated_depsgraph_get()
         shown.update((obj.session_uid, (obj, depsgraph)) for obj in _bound_objects(window.scene))
     for uid in _jobs.keys() - shown.keys():
-        _jobs.pop(uid).work.stop()
+        _drop(uid)
     with _guarded():
         waiting = [_attend(obj, depsgraph) for obj, depsgraph in shown.values()]
     if any(waiting):
@@ -276,21 +279,31 @@ def _attend(obj, depsgraph) -> bool:
     job = _jobs.get(uid)
     try:
         if binding.stale_reason(obj, glance=True):
-            if job is not None:
-                _jobs.pop(uid).work.stop()
+            _drop(uid)
             return False
         key, pose = live_key(obj), binding.read_pose(obj, depsgraph)
         if job is None:
             return _start(obj, key, pose, depsgraph)
         if job.work.ended:
             del _jobs[uid]
+            job.work.close(bpy.context)
             _take(obj, job, key, pose)
         elif job.key != key:
-            job.work.stop()
+            _drop(uid)
+        elif job.prepares:
+            job.work.show(bpy.context)
     except PointCloudError as error:
-        _troubles[uid] = str(error), None if job is None else job.pose
+        _troubles[uid] = error.text, None if job is None else job.pose
         return job is not None  # else wait for another pose, not to go wrong again at once
     return True
+
+
+def _drop(uid):
+    """End the thread of an object, if there is one."""
+    job = _jobs.pop(uid, None)
+    if job is not None:
+        job.work.stop()
+        job.work.close(bpy.context)
 
 
 def _start(obj, key, pose, depsgraph):
@@ -301,9 +314,15 @@ def _start(obj, key, pose, depsgraph):
     if binding.same_pose(_troubles.get(obj.session_uid, (None, None))[1], pose):
         return False  # it would go wrong again
     # A setting that is dragged must not start a thread for each value. Before the first factors waiting is of no use.
+    prepares = key not in _lives
+    if prepares and running() is not None:
+        return True
     if perf_counter() >= _due or all(known[0] != key[0] for known in _lives):
         compute, pose = plan_settled(obj, depsgraph)
-        _jobs[obj.session_uid] = _Settling(Job("Deform", [], compute), key, pose, prepares=key not in _lives)
+        job = _jobs[obj.session_uid] = _Settling(Job("Bind", [], compute), key, pose, prepares)
+        if prepares:  # takes long: it is shown as other work is, and Esc ends it
+            with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+                job.work.open(bpy.context)
     return True
 
 
@@ -312,6 +331,8 @@ def _take(obj, job, key, pose):
     try:
         live, points, displacement = job.work.result()
     except Cancelled:
+        if job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
+            _troubles[obj.session_uid] = Phrase("Binding was stopped. Press Update, or move a handle"), job.pose
         return
     if job.key == key:
         keep(obj, live)
@@ -334,12 +355,12 @@ def _on_depsgraph_update(scene, depsgraph):
 @persistent
 def _on_frame_change(scene, depsgraph):
     rendering = bpy.app.background or depsgraph.mode == "RENDER"
-    update_all(scene, depsgraph, quick=not rendering and _is_playing())
+    update_all(scene, depsgraph, quick=not rendering and _is_playing(), waits=rendering)
 
 
 @persistent
 def _on_undo(scene, *_):
-    binding.forget_glances()
+    binding.forget_bound()
     update_all(scene, bpy.context.evaluated_depsgraph_get(), quick=not bpy.app.background)
 
 
@@ -352,11 +373,11 @@ def _on_render(scene, *_):
 @persistent
 def _forget(*_):
     """Forget everything about a file when another one is opened."""
-    for job in _jobs.values():
-        job.work.stop()
-    for known in (_lives, _jobs, _troubles):
+    for uid in [*_jobs]:
+        _drop(uid)
+    for known in (_lives, _troubles):
         known.clear()
-    binding.forget_glances()
+    binding.forget_bound()
 
 
 _HANDLERS = (

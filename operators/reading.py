@@ -6,14 +6,16 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
 from scipy.spatial import cKDTree
 
 from ..core import PointCloudError, check_points
+from ..core.phrases import Phrase
 from ..core.rims import FEWEST
 from .attributes import own_positions, point_count
 from .counting import members
 from .groups import chosen_members
-from .modifiers import is_own
+from .modifiers import is_own, modifier_settings
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 _CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
@@ -24,33 +26,54 @@ def shape_keys(obj):
     return obj.data.shape_keys if obj.type == "MESH" else None
 
 
-def obstacle(obj, modes=("OBJECT",)) -> str:
+def obstacle(obj, modes=("OBJECT",)) -> Phrase | str:
     """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
     if obj is None:
-        return "No active object. Select a mesh with the points of a surface"
+        return Phrase("No active object. Select a mesh with the points of a surface")
     if obj.type == "EMPTY" and obj.instance_collection is not None:
-        return (
-            f'"{obj.name}" shows the collection "{obj.instance_collection.name}". Select an object of that, or use'
-            " Object > Apply > Make Instances Real"
+        return Phrase(
+            '"{object}" shows the collection "{collection}". Select an object of that, or use Object > Apply >'
+            " Make Instances Real",
+            object=obj.name,
+            collection=obj.instance_collection.name,
         )
     if obj.type not in TYPES:
-        kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
-        article = "an" if kind[0] in "AE" else "a"
-        turned = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
-        return f'"{obj.name}" is {article} {kind}, not a Mesh. {turned} a mesh'
+        types = obj.bl_rna.properties["type"]
+        english = types.enum_items[obj.type].name
+        vowel, kind = english[0] in "AE", iface_(english, types.translation_context)
+        if obj.type in _CONVERTIBLE:
+            return Phrase(
+                '"{object}" is an {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
+                if vowel
+                else '"{object}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh',
+                object=obj.name,
+                kind=kind,
+            )
+        return Phrase(
+            '"{object}" is an {kind}, not a Mesh. Select a mesh'
+            if vowel
+            else '"{object}" is a {kind}, not a Mesh. Select a mesh',
+            object=obj.name,
+            kind=kind,
+        )
     if not obj.is_editable or not obj.data.is_editable:
-        return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
+        return Phrase(
+            '"{object}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data',
+            object=obj.name,
+        )
     edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
     if obj.mode not in modes or edited:
-        return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
+        return Phrase('"{object}" is not in Object Mode. Switch to Object Mode first', object=obj.name)
     if not point_count(obj.data):
-        kind = "vertices" if obj.type == "MESH" else "points"
+        kind = Phrase("vertices") if obj.type == "MESH" else Phrase("points")
         if obj.meshfree.point_count:  # it had some: Convert takes what modifiers show, and ours shows points
-            return (
-                f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under Points and'
-                " Groups"
+            return Phrase(
+                '"{object}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under Points'
+                " and Groups",
+                object=obj.name,
+                kind=kind,
             )
-        return f'"{obj.name}" has no {kind}. Add points, or select another object'
+        return Phrase('"{object}" has no {kind}. Add points, or select another object', object=obj.name, kind=kind)
     return ""
 
 
@@ -101,13 +124,21 @@ def read_points(context, obj) -> Reading:
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     if not np.linalg.cond(matrix) < 1e6:
         raise PointCloudError(
-            f'"{obj.name}" is scaled to nothing along an axis, so its {len(positions)} points have no area. Give it a'
-            " scale above zero along each axis."
+            '"{object}" is scaled to nothing along an axis, so its {count} points have no area. Give it a scale'
+            " above zero along each axis.",
+            object=obj.name,
+            count=len(positions),
         )
     notices = []
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
-        notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
+        notices.append(
+            Phrase(
+                "The mesh has {faces} faces: it is taken as its {count} vertices.",
+                faces=faces,
+                count=point_count(obj.data),
+            )
+        )
     return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
 
 
@@ -122,7 +153,7 @@ def seen_positions(context, obj):
 def rim_points(obj):
     """Read which points the rim group of an object holds, (n,) bool; None if the settings name no group."""
     name = obj.meshfree.rim_group
-    return chosen_members(obj, name, "Rim Group", FEWEST) if name else None
+    return chosen_members(obj, name, Phrase("Rim Group"), FEWEST) if name else None
 
 
 def key_positions(key):
@@ -138,8 +169,9 @@ def _evaluated_positions(context, obj):
         evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
         if not evaluated.is_evaluated:
             raise PointCloudError(
-                f'"{obj.name}" is disabled in viewports, so its shape keys and modifiers are not computed. Enable it'
-                " in the Outliner (monitor icon)."
+                '"{object}" is disabled in viewports, so its shape keys and modifiers are not computed. Enable it'
+                " in the Outliner (monitor icon).",
+                object=obj.name,
             )
         if obj.type == "MESH":
             positions = own_positions(evaluated.to_mesh())
@@ -148,8 +180,11 @@ def _evaluated_positions(context, obj):
             positions = own_positions(evaluated.data)
     if len(positions) != point_count(obj.data):
         raise PointCloudError(
-            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)}, instances'
-            " not counted, so results have no place. Apply these modifiers, or turn off Use Modifiers."
+            'The modifiers of "{object}" turn its {count} points into {found}, instances not counted, so results'
+            " have no place. Apply these modifiers, or turn off Use Modifiers.",
+            object=obj.name,
+            count=point_count(obj.data),
+            found=len(positions),
         )
     return positions
 
@@ -178,7 +213,7 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
 
     A glance is quick enough for a panel, some milliseconds for 1 million points, may see a change of the rim group
     some seconds late, and is empty while that has not been counted yet. Of modifiers, if they are used, both see which
-    ones there are, not their settings.
+    ones there are and their settings, not what is in other data that these name.
     """
     positions = own_positions(obj.data)
     positions[np.asarray(left_out, dtype=int)] = 0.0
@@ -191,7 +226,7 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
             checksum = zlib.crc32(key_positions(block), checksum)
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.use_modifiers:
-        state = [(item.name, item.type, item.show_viewport) for item in obj.modifiers if not is_own(item)]
+        state = [modifier_settings(item) for item in obj.modifiers if not is_own(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
     if obj.meshfree.rim_group:
         rim = members(obj, obj.meshfree.rim_group, glance)

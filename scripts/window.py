@@ -252,6 +252,44 @@ class Window:
         """Put the mouse on the 3D view, which then gets the keys."""
         self.move(*self.view_center())
 
+    def open_second(self):
+        """Open another window with the 3D view alone, by *Window > New Window*, on the right half of the screen."""
+        known = self._windows()
+        self.search("New Window")
+        self.wait_until("len(bpy.context.window_manager.windows) == 2")
+        self.settle()
+        half = str(SIZE[0] // 2)
+        for window in self._windows():  # there is no window manager that would place them
+            place = ("0", "0") if window in known else (half, "0")
+            self._xdotool("windowmove", window, *place, "windowsize", window, half, str(SIZE[1]))
+        self.wait_until(f"all(window.width == {half} for window in bpy.context.window_manager.windows)")
+        self.point_at_first()
+
+    def point_at_first(self):
+        """Put the mouse on the view of the first of two windows, which then gets the keys."""
+        self._xdotool("windowfocus", self._windows()[0])
+        self.point_at_view()
+
+    def point_at_second(self):
+        """Put the mouse on the second window, which then gets the keys."""
+        self._xdotool("windowfocus", self._windows()[-1])
+        self.move(0.7 * SIZE[0], 0.5 * SIZE[1])
+
+    def close_second(self):
+        """Close the second window, as a click on its cross does, and let the first have the screen."""
+        self.python(
+            "with bpy.context.temp_override(window=main_window().id_data.windows[1]): bpy.ops.wm.window_close()"
+        )
+        self.wait_until("len(bpy.context.window_manager.windows) == 1")
+        (window,) = self._windows()
+        self._xdotool("windowsize", window, *map(str, SIZE), "windowfocus", window)
+        self.wait_until(f"main_window().width == {SIZE[0]}")
+        self.point_at_view()
+
+    def _windows(self):
+        """Numbers of Blender's windows on the screen, the latest last."""
+        return sorted(self.run("xdotool", "search", "--onlyvisible", "--class", "Blender").decode().split(), key=int)
+
     def new_file(self):
         """Start from an empty scene, with one big 3D view."""
         self.python("bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)")

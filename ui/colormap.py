@@ -5,6 +5,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError
 from ..operators.ready import ReadyOperator
+from ..operators.translation import translated
 from .settings import COLOR_MAPS, RANGE_MODES
 from .show import show_attribute, use_material_preview
 
@@ -65,7 +66,7 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
         try:
             show_attribute(obj, self.attribute, self.radius)
         except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         for name in _SETTINGS:
             if not self.properties.is_property_set(name):

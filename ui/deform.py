@@ -9,6 +9,7 @@ from ..operators.deform_nodes import find_deform, is_baked
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property
 from ..operators.reading import obstacle
+from ..operators.translation import translated
 from .panel import SidebarPanel
 
 _WIDTH = 38  # letters in a line of the panel
@@ -29,7 +30,6 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         layout, obj = self.layout, handled_object(context.object, context.scene)
         if obj != context.object:
             layout.label(text=iface_("Moves handles of {}").format(obj.name), icon="EMPTY_DATA")
-            layout.context_pointer_set("object", obj)  # for which the buttons are
         settings = obj.meshfree.deform
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -39,7 +39,8 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         names = handle_names(obj)
         if len(names) > 1:
             column.label(text=iface_("{} groups of handles").format(len(names)), icon="INFO")
-        layout.operator("meshfree.handle_add")
+        if obj == context.object:  # whose points are selected
+            layout.operator("meshfree.handle_add")
         column = layout.column(align=True)
         column.prop(settings, "add_empties")
         column.prop(settings, "rotation_aware")
@@ -73,12 +74,13 @@ def _draw_state(layout, obj):
     """Draw whether the points follow the handles, and what to do if not."""
     reason, working = stale_reason(obj, glance=True) or live.trouble(obj), live.preparing(obj)
     if reason:
-        state = iface_("Baked. {}") if is_baked(obj) else iface_("Copy. {}") if copied_from(obj) is not None else ""
-        text = (state or iface_("Not up to date. {}")).format(reason)
+        state = "Baked. {}" if is_baked(obj) else "Copy. {}" if copied_from(obj) is not None else "Not up to date. {}"
+        text = iface_(state).format(translated(reason, iface_))
         icon = "INFO" if is_baked(obj) else "ERROR"
     elif working is not None:
         stage, fraction = working
-        text, icon = iface_("Preparing: {}, {:.0%}").format(iface_(stage), fraction), "SORTTIME"
+        text = iface_("Not up to date. Binding: {}, {:.0%}").format(iface_(stage), fraction)
+        icon = "SORTTIME"
     else:
         text, icon = iface_("Bound: follows its handles"), "CHECKMARK"
     column = layout.column(align=True)

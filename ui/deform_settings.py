@@ -12,6 +12,7 @@ from bpy.props import (
 )
 
 from ..operators import live
+from ..operators.binding import forget_bound
 from ..operators.groups import ANCHOR, HANDLE
 
 
@@ -75,7 +76,7 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
     )
 
     # What the object is bound with.
-    is_bound: BoolProperty(name="Bound", description="The object follows its handles")
+    is_bound: BoolProperty(name="Bound", description="The object follows its handles", update=forget_bound)
     handle_items: CollectionProperty(
         type=MESHFREE_PG_handle, name="Handles", description="What moves the groups of handles"
     )

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..operators.modifiers import DISPLAY_TAG, add_node, new_group
+from ..operators.modifiers import DISPLAY_TAG, add_input, add_node, is_intact, new_group
 from . import colormaps
 
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
@@ -17,15 +17,14 @@ _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 def display_group():
     """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
-        if DISPLAY_TAG in group and group.library is None:
+        if DISPLAY_TAG in group and group.library is None and is_intact(group):
             return group
     group = new_group("Mesh-Free Display", DISPLAY_TAG)
-    new_socket = group.interface.new_socket
-    radius = new_socket("Radius", in_out="INPUT", socket_type="NodeSocketFloat", description="Size of the points")
+    radius = add_input(group, "Radius", "Float", "Size of the points")
     radius.subtype = "DISTANCE"
     radius.default_value = 0.01
     radius.min_value = 0.0
-    new_socket("Material", in_out="INPUT", socket_type="NodeSocketMaterial", description="Colors of the points")
+    add_input(group, "Material", "Material", "Colors of the points")
 
     given = add_node(group, "NodeGroupInput", 0, 0)
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)

@@ -10,6 +10,7 @@ from ..operators.job import running
 from ..operators.modifiers import is_own
 from ..operators.reading import obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
+from ..operators.translation import translated
 from .display import find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
 
@@ -57,7 +58,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             return  # the panel of the deformation tells
         if reason:
             column = layout.column(align=True)
-            for sentence in reason.split(". "):
+            for sentence in translated(reason, iface_).split(". "):
                 column.label(text=sentence)
             if context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
@@ -75,7 +76,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
 def _draw_job(layout, job):
     """Draw what is computed, how far it is, and how to stop it."""
     column = layout.column(align=True)
-    column.label(text=iface_("{} (Esc to Stop)").format(iface_(job.label)))
+    column.label(text=iface_("{} (Esc to Stop)").format(job.title))
     row = column.row(align=True)
     row.progress(text=f"{iface_(job.stage)}: {job.fraction:.0%}", factor=job.fraction)
     row.operator("meshfree.stop", text="", icon="X")

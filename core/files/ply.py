@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..phrases import Phrase
 from .table import PointTable, from_columns, to_columns
 
 _NAMES = {
@@ -44,14 +45,18 @@ def read_ply(path) -> PointTable:
         names = [element.name for element in elements]
         if "vertex" not in names:
             raise InvalidPointsError(
-                f"{path} has no vertices, only {', '.join(names) or 'nothing'}. It holds no points."
+                "{path} has no vertices, only {others}. It holds no points.",
+                path=path,
+                others=", ".join(names) or Phrase("nothing"),
             )
         at = names.index("vertex")
         for element in (elements[at], *elements[:at]):
             if None in element.types and (element.count or element.name == "vertex"):
                 raise InvalidPointsError(
-                    f"{path} has lists in its element {element.name}, before or among its points. Save it again with"
-                    " plain vertices first."
+                    "{path} has lists in its element {element}, before or among its points. Save it again with"
+                    " plain vertices first.",
+                    path=path,
+                    element=element.name,
                 )
         vertex = elements[at]
         if order is None:
@@ -65,11 +70,16 @@ def read_ply(path) -> PointTable:
             columns = [np.ascontiguousarray(rows[f"f{i}"]) for i in range(len(vertex.names))]
             columns = [column.astype(column.dtype.newbyteorder("=")) for column in columns]
     table = from_columns(dict(zip(vertex.names, columns, strict=True)), path)
-    others = [
-        f"{element.count} {element.name} elements" for element in elements if element is not vertex and element.count
+    table.notices += [
+        Phrase(
+            "{file}: left out {count} {element} elements. Only points are read.",
+            file=path.name,
+            count=element.count,
+            element=element.name,
+        )
+        for element in elements
+        if element is not vertex and element.count
     ]
-    if others:
-        table.notices.append(f"{path.name}: left out {', '.join(others)}. Only points are read.")
     return table
 
 
@@ -80,14 +90,16 @@ def _record(element, order):
 def _read_header(file, path):
     """Return the byte order, None for text, and the elements; leave the file where the data begin."""
     if file.readline(_LONGEST).strip() != b"ply":
-        raise InvalidPointsError(f"{path} is no PLY file: its first line is not 'ply'. Export it again.")
+        raise InvalidPointsError("{path} is no PLY file: its first line is not 'ply'. Export it again.", path=path)
     order, elements = "", []
     for number in range(2, _LONGEST):
         line = file.readline(_LONGEST).decode(errors="replace").strip()
         match line.split():
             case ["end_header"]:
                 if order == "":
-                    raise InvalidPointsError(f"{path} does not say whether it is text or binary. Export it again.")
+                    raise InvalidPointsError(
+                        "{path} does not say whether it is text or binary. Export it again.", path=path
+                    )
                 return order, elements
             case ["format", kind, *_] if kind in _ORDERS:
                 order = _ORDERS[kind]
@@ -103,9 +115,12 @@ def _read_header(file, path):
                 elements[-1].types.append(_TYPES[kind])
             case _:
                 raise InvalidPointsError(
-                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PLY file."
+                    "{path}, line {number}: {words!r} does not belong into the header of a PLY file.",
+                    path=path,
+                    number=number,
+                    words=line[:60],
                 )
-    raise InvalidPointsError(f"{path} has a header without an end. Export it again.")
+    raise InvalidPointsError("{path} has a header without an end. Export it again.", path=path)
 
 
 def _read_text(file, vertex, before, path):
@@ -130,7 +145,10 @@ def _read_text(file, vertex, before, path):
 
 def _too_short(path, found, count):
     return InvalidPointsError(
-        f"{path} ends after {found} of the {count} points that its header names. Copy or save it again."
+        "{path} ends after {found} of the {count} points that its header names. Copy or save it again.",
+        path=path,
+        found=found,
+        count=count,
     )
 
 
@@ -139,12 +157,18 @@ def _refuse_row(lines, width, path):
     for number, line in enumerate(lines, start=1):
         words = line.split()
         try:
-            wrong = "" if len(words) == width else f"{len(words)} numbers where the header names {width} properties"
+            wrong = (
+                ""
+                if len(words) == width
+                else Phrase("{count} numbers where the header names {width} properties", count=len(words), width=width)
+            )
             [float(word) for word in words]
         except ValueError as error:
             wrong = str(error)
         if wrong:
-            raise InvalidPointsError(f"{path}, point {number}: {wrong}. Correct the file.")
+            raise InvalidPointsError(
+                "{path}, point {number}: {wrong}. Correct the file.", path=path, number=number, wrong=wrong
+            )
 
 
 def write_ply(path, table, double=True):

@@ -53,7 +53,10 @@ def from_columns(columns, path):
     missing = [axis for axis in _AXES if axis not in named]
     if missing:
         raise InvalidPointsError(
-            f"{path} has no {' '.join(missing)} among its columns {', '.join(columns)}. Each point needs x y z."
+            "{path} has no {missing} among its columns {columns}. Each point needs x y z.",
+            path=path,
+            missing=" ".join(missing),
+            columns=", ".join(columns),
         )
     left = dict(columns)
 
@@ -123,11 +126,15 @@ def _free_name(name, columns):
 def check_table(table, path):
     """Refuse a file without points, or with coordinates that are no places, and return it."""
     if len(table.points) == 0:
-        raise TooFewPointsError(f"{path} has no points. Give a file with points.")
+        raise TooFewPointsError("{path} has no points. Give a file with points.", path=path)
     bad = np.flatnonzero(~np.isfinite(table.points).all(axis=1))
     if len(bad):
         raise InvalidPointsError(
-            f"{path}: {len(bad)} of {len(table.points)} points have coordinates that are not finite (NaN or infinity),"
-            f" the first of them is point {bad[0] + 1}. Delete these points from the file."
+            "{path}: {bad} of {count} points have coordinates that are not finite (NaN or infinity), the first of"
+            " them is point {first}. Delete these points from the file.",
+            path=path,
+            bad=len(bad),
+            count=len(table.points),
+            first=bad[0] + 1,
         )
     return table

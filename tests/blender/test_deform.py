@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import textwrap
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -258,6 +259,31 @@ class TestFrames:
         assert_allclose([height[ends].mean() for height in forward], HEIGHTS, atol=1e-4)
         assert_allclose(self.heights(strip, (3, 1, 4, 2)), forward, atol=1e-5)
 
+    def test_a_jump_leaves_factors_to_a_thread_where_it_need_not_wait(self, strip, live, binding, monkeypatch):
+        animate(bind())
+        bpy.context.scene.frame_set(1)
+        live._forget()
+        before = displacement(strip)
+        asked = []
+        monkeypatch.setattr(live, "settle_later", asked.append)
+        handlers = bpy.app.handlers.frame_change_post
+        place = [function.__module__ for function in handlers].index(live.__name__)
+        following = handlers.pop(place)
+        others = bpy.app.handlers.depsgraph_update_post
+        other = [function.__module__ for function in others].index(live.__name__)
+        drawing = others.pop(other)
+        try:
+            bpy.context.scene.frame_set(3)
+            live.update(strip, waits=False)
+            assert asked == [strip]
+            assert_allclose(displacement(strip), before)
+            live.update(strip)  # as a render does
+        finally:
+            handlers.insert(place, following)
+            others.insert(other, drawing)
+        assert binding.written_pose(strip)[1]
+        assert displacement(strip)[:, 2].max() == pytest.approx(1.5, abs=0.01)
+
     def test_lock_interface_is_set(self, strip):
         assert not bpy.context.scene.render.use_lock_interface
         bind()
@@ -380,6 +406,64 @@ class TestBake:
         assert bpy.ops.meshfree.deform_free() == {"FINISHED"}
         assert (len(bpy.data.objects), len(bpy.data.meshes)) == (blocks[0] - 1, blocks[1] - 1)
         assert shown_points(strip)[is_end(local_points(strip)), 2] == pytest.approx(1.0, abs=1e-4)
+
+    def test_what_has_no_keyframe_stays(self, strip):
+        empty = bind()
+        animate(empty)
+        bpy.context.scene.frame_set(3)
+        empty.location.x += 0.25
+        empty.location.z -= 0.5
+        bpy.context.view_layer.update()
+        place, shown = empty.location.copy(), shown_points(strip)
+        bpy.ops.meshfree.deform_bake()
+        bpy.ops.meshfree.deform_free()
+        assert empty.location == place
+        assert_allclose(shown_points(strip), shown, atol=1e-5)
+
+    @pytest.fixture
+    def stepped(self, extension, strip):
+        """A bake in steps, as a window takes them, at frame 3."""
+        animate(bind())
+        bpy.context.scene.frame_set(3)
+        bake = importlib.import_module(f"{extension.__name__}.operators.bake")
+        operator = SimpleNamespace(first=1, last=4, bl_label="Bake", _kept=bake._Kept(bpy.context.scene, strip))
+        operator._frames = lambda progress: bake.MESHFREE_OT_deform_bake._frames(operator, progress)
+        return operator, bake
+
+    def test_stopped_half_way(self, stepped, strip):
+        before = everything(strip)
+        operator, _ = stepped
+        steps = operator._frames(lambda stage, fraction: None)
+        next(steps), next(steps)
+        assert everything(strip) != before
+        operator._kept.put_back()
+        assert everything(strip) == before
+        assert bpy.context.scene.frame_current == 3
+
+    @pytest.mark.parametrize("what", ["handle", "frame"])
+    def test_what_is_changed_meanwhile(self, core, stepped, strip, what):
+        operator, _ = stepped
+        steps = operator._frames(lambda stage, fraction: None)
+        next(steps), next(steps)
+        if what == "handle":
+            bpy.data.objects["Cloud Handle"].rotation_euler.x = 0.5
+        else:
+            bpy.context.scene.frame_set(4)
+        with pytest.raises(core.PointCloudError, match="were changed meanwhile. Nothing was baked"):
+            next(steps)
+        operator._kept.put_back()
+        assert bpy.context.scene.frame_current == 3
+        assert (bpy.data.objects["Cloud Handle"].rotation_euler.x == 0.5) == (what == "handle")
+
+    def test_factors_are_made_first_beside_the_window(self, stepped, strip, live):
+        operator, bake = stepped
+        live._forget()
+        told = []
+        steps = bake.MESHFREE_OT_deform_bake._prepared_frames(operator, lambda *progress: told.append(progress))
+        while live.find(strip) is None:
+            next(steps)
+        assert {stage for stage, _ in told} - {"Frames"}
+        assert len(bake.all_steps(steps)) == 4
 
     def test_frames_in_the_wrong_order(self, strip):
         bind()
@@ -556,6 +640,58 @@ class TestHolding:
         assert [obj.name for obj in bpy.data.objects] == ["Cloud", "Cloud.001"]
         assert len(bpy.data.meshes) == 2
 
+    def test_weights_of_the_groups_count(self, strip, binding):
+        bind(soft=True)
+        strip.vertex_groups["Handle"].add([719], 0.5, "REPLACE")
+        assert "groups of handles or anchors changed" in binding.stale_reason(strip)
+        strip.vertex_groups["Handle"].add([719], 1.0, "REPLACE")
+        assert binding.stale_reason(strip) == ""
+
+    def test_settings_of_modifiers_that_are_used(self, strip, binding):
+        wave = strip.modifiers.new("Displace", "DISPLACE")
+        wave.strength = 0.0
+        strip.meshfree.use_modifiers = True
+        bind()
+        wave.show_expanded = not wave.show_expanded
+        assert binding.stale_reason(strip) == ""
+        wave.strength = 0.5
+        assert "points at rest were moved" in binding.stale_reason(strip)
+        wave.strength = 0.0
+        assert binding.stale_reason(strip) == ""
+
+    def test_inputs_of_nodes_that_are_used(self, strip, binding, modifiers):
+        group = modifiers.new_group("Try", "own")
+        del group["own"]
+        modifiers.add_input(group, "Amount", "Float", "Of something")
+        used = strip.modifiers.new("Try", "NODES")
+        used.node_group = group
+        strip.meshfree.use_modifiers = True
+        group.links.new(
+            modifiers.add_node(group, "NodeGroupInput", 0, 0).outputs["Geometry"],
+            modifiers.add_node(group, "NodeGroupOutput", 1, 0).inputs["Geometry"],
+        )
+        bind()
+        modifiers.set_input(used, "Amount", 2.0)
+        assert "points at rest were moved" in binding.stale_reason(strip)
+
+    def test_an_input_that_somebody_renames_or_removes(self, core, strip, binding, modifiers):
+        empty = bind()
+        modifier = strip.modifiers["Mesh-Free Deform"]
+        sockets = modifier.node_group.interface
+        sockets.items_tree["Strength"].name = "Amount"
+        modifiers.set_input(modifier, "Strength", 0.5)
+        assert modifiers.get_input(modifier, "Strength") == 0.5
+        assert "Strength" in draw()
+        sockets.remove(sockets.items_tree["Amount"])
+        with pytest.raises(core.PointCloudError, match='have no input "Strength" any more. Undo that'):
+            modifiers.get_input(modifier, "Strength")
+        assert "an input of its nodes was removed. Bind again" in binding.stale_reason(strip)
+        assert "Bind Again" in draw()
+        strip.modifiers.remove(modifier)
+        bind()
+        lift(empty, 1.0)
+        assert_allclose(shown_points(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-4)
+
     def test_new_names_do_not_matter(self, strip):
         empty = bind()
         empty.name, strip.name = "Lever", "Strip"
@@ -601,6 +737,64 @@ class TestUndo:
         bpy.context.view_layer.update()
         assert_allclose(shown_points(strip), seen, atol=1e-5)
         assert displacement(strip).max() > 0.5
+
+
+class TestFinding:
+    """Bound objects are found among all others without a look at these."""
+
+    @pytest.fixture
+    def looked(self, binding, monkeypatch):
+        """Count how many objects are looked at."""
+        seen, known = [], binding.is_bound
+        monkeypatch.setattr(binding, "is_bound", lambda obj: seen.append(obj) or known(obj))
+        return seen
+
+    def names(self, binding):
+        return [obj.name for obj in binding.bound_objects(bpy.context.scene)]
+
+    def test_only_once(self, strip, binding, looked):
+        for number in range(50):
+            add_object(local_points(strip)[:3], f"Other {number}")
+        bpy.context.view_layer.objects.active = strip
+        bind()
+        assert self.names(binding) == ["Cloud"]
+        looked.clear()
+        assert self.names(binding) == ["Cloud"]
+        assert looked == []
+
+    def test_after_every_change(self, strip, binding):
+        other = add_object(local_points(strip), "Other")
+        assert self.names(binding) == []
+        bpy.context.view_layer.objects.active = strip
+        bind()
+        assert self.names(binding) == ["Cloud"]
+        strip.name = "Zebra"  # in another place of the list
+        assert self.names(binding) == ["Zebra"]
+        bpy.data.objects.remove(other)
+        assert self.names(binding) == ["Zebra"]
+        copy = strip.copy()
+        assert self.names(binding) == ["Zebra"]  # it is in no scene
+        bpy.context.scene.collection.objects.link(copy)
+        assert self.names(binding) == ["Zebra", "Zebra.001"]
+        copy.hide_viewport = copy.hide_render = True
+        assert self.names(binding) == ["Zebra", "Zebra.001"]
+        copy.meshfree.deform.is_bound = False
+        assert self.names(binding) == ["Zebra"]
+        bpy.ops.ed.undo_push(message="Bound")
+        assert bpy.ops.meshfree.deform_unbind("EXEC_DEFAULT", True) == {"FINISHED"}
+        assert self.names(binding) == []
+        bpy.ops.ed.undo()
+        assert self.names(binding) == ["Zebra"]
+        bpy.ops.wm.read_homefile(use_empty=True)
+        assert self.names(binding) == []
+
+    def test_an_empty_that_is_hidden_is_there_and_a_deleted_one_is_not(self, strip, binding):
+        empty = bind()
+        empty.hide_viewport = True
+        assert binding.is_there(empty)
+        bpy.context.scene.collection.objects.unlink(empty)
+        assert not binding.is_there(empty)
+        assert "empty of Handle was deleted" in binding.stale_reason(strip)
 
 
 class TestMemory:
@@ -782,6 +976,26 @@ class TestPanel:
         bpy.ops.meshfree.deform_bake(first=1, last=2)
         assert "Delete Bake" in draw()
         assert "Baked." in self.texts()
+
+    def test_while_it_binds_and_when_that_was_stopped(self, strip, live):
+        bind()
+        work = SimpleNamespace(stage="Areas", fraction=0.5)
+        live._jobs[strip.session_uid] = live._Settling(work, (), np.zeros(2), prepares=True)
+        try:
+            assert "Not up to date. Binding: Areas, 50%" in self.texts()
+        finally:
+            live._jobs.clear()
+        live._troubles[strip.session_uid] = "Binding was stopped. Press Update, or move a handle", None
+        assert "Not up to date. Binding was stopped. Press Update, or move a handle" in self.texts()
+
+    def test_buttons_for_the_object_of_the_empty(self, strip):
+        empty = bind()
+        strip.meshfree.neighbors = 40
+        bpy.context.view_layer.objects.active = empty
+        assert bpy.ops.meshfree.deform_bind() == {"FINISHED"}
+        lift(empty, 1.0)
+        assert bpy.ops.meshfree.deform_update() == {"FINISHED"}
+        assert displacement(strip)[:, 2].max() == pytest.approx(1.0, abs=0.01)
 
     def test_in_edit_mode(self, strip):
         bind(add_empties=False)

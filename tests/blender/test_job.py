@@ -70,9 +70,9 @@ def operator(jobs, monkeypatch):
     class Operator(jobs.JobOperator):
         bl_label = "Try"
 
-        def __init__(self, objects, compute):
+        def __init__(self, objects, compute, kind=jobs.Job):
             self.reports, self.finished, self.context = [], None, Context()
-            assert self.start(self.context, objects, compute) == {"RUNNING_MODAL"}
+            assert self.start(self.context, objects, compute, kind) == {"RUNNING_MODAL"}
 
         def report(self, kinds, text):
             self.reports.append((*kinds, text))
@@ -83,6 +83,11 @@ def operator(jobs, monkeypatch):
 
         def tick(self, kind="TIMER", value="NOTHING"):
             return self.modal(self.context, event(kind, value))
+
+        def press_escape(self, value="PRESS", heard=frozenset({"RUNNING_MODAL"})):
+            """Let what hears Esc in each window hear it, and look at the work."""
+            assert jobs.MESHFREE_OT_escape.modal(None, self.context, event("ESC", value)) == heard
+            return self.tick()
 
         def end(self):
             """Wait for the thread and look once more."""
@@ -118,7 +123,7 @@ def test_keys_and_the_mouse_go_on_to_blender(operator, obj):
     started = operator([obj], work)
     for kind in ("MIDDLEMOUSE", "Z", "X", "TAB", "LEFTMOUSE", "TIMER"):
         assert started.tick(kind, "PRESS") == {"PASS_THROUGH"}
-    assert started.tick("ESC", "RELEASE") == {"PASS_THROUGH"}
+    assert started.press_escape("RELEASE", {"PASS_THROUGH"}) == {"PASS_THROUGH"}
     work.go_on.set()
     assert started.end() == {"FINISHED"}
 
@@ -127,7 +132,7 @@ def test_esc_ends_it_at_once_though_the_thread_goes_on(operator, jobs, obj):
     work, before = Work(), everything(obj)
     started = operator([obj], work)
     work.began.wait(5.0)
-    assert started.tick("ESC", "PRESS") == {"CANCELLED"}
+    assert started.press_escape() == {"CANCELLED"}
     assert jobs.running() is None
     assert started.reports == [("INFO", "Stopped: nothing was changed")]
     work.go_on.set()
@@ -142,7 +147,7 @@ def test_a_late_result_is_dropped(operator, jobs, obj):
     started = operator([obj], work)
     work.go_on.set()
     started._job.wait(5.0)
-    assert started.tick("ESC", "PRESS") == {"CANCELLED"}
+    assert started.press_escape() == {"CANCELLED"}
     assert started.finished is None
 
 
@@ -152,6 +157,60 @@ def test_the_stop_button(operator, jobs, obj):
     started = operator([obj], Work())
     assert bpy.ops.meshfree.stop() == {"FINISHED"}
     assert started.tick() == {"CANCELLED"}
+
+
+def test_steps_on_the_main_thread(operator, jobs, obj):
+    def compute(progress):
+        for number in range(3):
+            progress("Frames", number / 3)
+            yield
+        return "all"
+
+    started = operator([obj], compute, jobs.SteppedJob)
+    assert [started.tick() for _ in range(3)] == [{"PASS_THROUGH"}] * 3
+    assert (jobs.running().stage, jobs.running().fraction) == ("Frames", 2 / 3)
+    assert started.finished is None
+    assert started.tick() == {"FINISHED"}
+    assert started.finished[1] == "all"
+
+
+@pytest.mark.parametrize("way", ["escape", "stop", "cancel"])
+def test_steps_that_are_stopped_are_put_back(operator, jobs, obj, way):
+    ended, left = [], []
+
+    def compute(progress):
+        try:
+            while True:
+                progress("Frames", 0.5)
+                yield
+        finally:
+            ended.append(True)
+
+    started = operator([obj], compute, jobs.SteppedJob)
+    started.leave = left.append
+    started.tick()
+    if way == "escape":
+        assert started.press_escape() == {"CANCELLED"}
+    elif way == "stop":
+        bpy.ops.meshfree.stop()
+        assert started.tick() == {"CANCELLED"}
+    else:
+        started.cancel(started.context)
+    assert jobs.running() is None
+    assert (ended, len(left)) == ([True], 1)
+    started.cancel(started.context)
+    assert len(left) == 1
+
+
+def test_steps_that_go_wrong(operator, core, jobs, obj):
+    def compute(progress):
+        yield
+        raise core.PointCloudError("No")
+
+    started = operator([obj], compute, jobs.SteppedJob)
+    assert started.tick() == {"PASS_THROUGH"}
+    assert started.tick() == {"CANCELLED"}
+    assert started.reports == [("ERROR", "No")]
 
 
 def test_an_error_is_reported(operator, core, obj):
@@ -173,10 +232,12 @@ def test_an_error_that_nobody_foresaw_is_raised_and_leaves_nothing(operator, job
 
 def test_one_job_at_a_time(operator, obj):
     started = operator([obj], Work())
+    with pytest.raises(RuntimeError, match="Try is running"):
+        bpy.ops.meshfree.deform_bake()
     for call in (bpy.ops.meshfree.analyze, bpy.ops.meshfree.smooth, bpy.ops.meshfree.select_grow):
         with pytest.raises(RuntimeError, match=r"Try is running. Wait for it, or press Esc to stop it"):
             call()
-    started.tick("ESC", "PRESS")
+    started.press_escape()
     assert bpy.ops.meshfree.analyze() == {"FINISHED"}
 
 
@@ -185,7 +246,7 @@ def test_a_file_browser_that_was_open_before_another_job_began(operator, core, j
     with pytest.raises(core.PointCloudError, match="Try is running. Wait for it, or press Esc to stop it"):
         operator([obj], Work())
     assert jobs.running() is started._job
-    started.tick("ESC", "PRESS")
+    started.press_escape()
 
 
 def test_a_dialog_that_is_closed_ends_nothing(operator, jobs):

@@ -26,7 +26,8 @@ def read(path):
 
 
 def operators():
-    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in dir(bpy.ops.meshfree)}
+    names = [name for name in dir(bpy.ops.meshfree) if name != "escape"]  # which nobody presses
+    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in names}
 
 
 def sections(text):

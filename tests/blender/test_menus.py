@@ -5,7 +5,8 @@ import importlib
 import bpy
 import pytest
 
-NOT_IN_MENUS = {"select_group", "apply_preset", "add_preset"}  # they have the name of a group, or a menu of their own
+# They have the name of a group, a menu of their own, or hear Esc.
+NOT_IN_MENUS = {"select_group", "apply_preset", "add_preset", "escape"}
 
 
 class Menu:

@@ -11,9 +11,11 @@ from tests.blender.clouds import add_object, sphere_points
 
 # Words that stay small within a label, and names that are not written as others are.
 SMALL = {"a", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "the", "to", "with"}
-NO_UNDO = {"export_eigenvalues", "export_operator", "export_points", "stop"}  # these change nothing in the scene
-UNLOGGED = {"stop"}  # nothing to repeat
-HIDDEN = {"add_preset"}  # a button beside its menu, as with all presets of Blender
+# These change nothing in the scene.
+NO_UNDO = {"export_eigenvalues", "export_operator", "export_points", "stop", "escape"}
+UNLOGGED = {"stop", "escape"}  # nothing to repeat
+# A button beside its menu, as with all presets of Blender; and what hears Esc.
+HIDDEN = {"add_preset", "escape"}
 # Numbers that may have any sign and size: values given by the user, the matrix of an object and its eigenvalues.
 ANY_SIZE = re.compile(r"\.(low|high|range_low|range_high|metric|matrix|rest)$")
 # Lengths, areas and angles by their name, which Blender shows with a unit.
