@@ -25,6 +25,56 @@ def fibonacci_sphere(count):
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
 
 
+def rough_sphere(points, wavelength, slope, seed=0, waves=60):
+    """Return points of the unit sphere with relief, (count, 3), and the area of the surface that they are on.
+
+    Parameters
+    ----------
+    points : ndarray, (count, 3)
+        On the unit sphere.
+    wavelength : float
+        Shortest wavelength of the relief, in mean spacings of the points.
+    slope : float
+        Root mean square slope of the relief, about.
+    seed, waves : int
+        Of the plane waves of random directions and phases that make it.
+    """
+    rng = np.random.default_rng(seed)
+    direction = rng.normal(size=(waves, 3))
+    frequency = 2.0 * np.pi / (wavelength * np.sqrt(4.0 * np.pi / len(points)))
+    direction *= frequency / np.linalg.norm(direction, axis=1)[:, None]
+    phase = rng.uniform(0.0, 2.0 * np.pi, waves)
+    size = slope / frequency * np.sqrt(3.0 / waves)
+
+    # r = 1 + f over the unit sphere u: the area is the integral of r (r^2 + |grad f|^2)^(1/2).
+    u = fibonacci_sphere(40_000)
+    gradient = -size * np.sin(u @ direction.T + phase) @ direction
+    gradient -= np.einsum("ia,ia->i", gradient, u)[:, None] * u
+    radius = 1.0 + size * np.cos(u @ direction.T + phase).sum(axis=1)
+    area = 4.0 * np.pi * np.mean(radius * np.sqrt(radius**2 + (gradient**2).sum(axis=1)))
+    return points * (1.0 + size * np.cos(points @ direction.T + phase).sum(axis=1))[:, None], area
+
+
+def beaded_sphere(radius, count, body=3000):
+    """Return a unit sphere with a bead on its pole, (n, 3), which points are the bead's, and both exposed areas.
+
+    Parameters
+    ----------
+    radius : float
+        Of the bead, whose middle is 0.6 radii above the pole.
+    count, body : int
+        Points of the whole bead and of the whole sphere.
+    """
+    away = 1.0 + 0.6 * radius
+    middle = np.array([0.0, 0.0, away])
+    sphere, bead = fibonacci_sphere(body), middle + radius * fibonacci_sphere(count)
+    sphere = sphere[np.linalg.norm(sphere - middle, axis=1) > radius]
+    bead = bead[np.linalg.norm(bead, axis=1) > 1.0]
+    seam = (away**2 + 1.0 - radius**2) / (2.0 * away)  # height of the circle where they meet
+    areas = 2.0 * np.pi * (1.0 + seam), 2.0 * np.pi * radius * (radius + away - seam)
+    return np.concatenate([sphere, bead]), np.arange(len(sphere) + len(bead)) >= len(sphere), areas
+
+
 def icosahedral_sphere(frequency):
     """Return an icosahedron's faces divided ``frequency`` times per edge, on the unit sphere: 10 f^2 + 2 points."""
     golden = (1.0 + np.sqrt(5.0)) / 2.0

@@ -67,9 +67,7 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=No
         The points have no sound areas; see `build_laplacian`.
     """
     cloud = read_cloud(points, options, normals, boundary, boundary_distance)
-    distance = cloud.neighborhoods.distance
-    if options.curvature_correction:
-        distance = arc_length(cloud.neighborhoods, cloud.normals)
+    distance = arc_length(cloud) if options.curvature_correction else cloud.neighborhoods.distance
     areas = solve_areas(cloud, distance, options).areas * cloud.scaled.scale**2
     return cloud.scaled.share(areas, NO_AREA)
 

@@ -2,11 +2,14 @@
 
 import numpy as np
 
+from .kernel import SUPPORT
+
 # Irregularity of the spacing, and h / d100: the widest that it needs, the narrowest that it bears.
 _IRREGULARITY = (0.03, 0.12, 0.24, 0.30)
 _WIDEST = (0.35, 0.65, 0.70, 0.76)
 _NARROWEST = (0.30, 0.30, 0.30, 0.45)
 _BEND = 0.33  # h times the principal curvature: how far the kernel may reach around a bend
+_AROUND = np.pi / SUPPORT  # the same, at most: beyond half a turn the kernel would reach what is on the other side
 _ACROSS = 0.4  # h over the depth of the surface, at most: images know of two rims, not of those on the other side
 _TIGHTEST = 1.2  # spacings that h keeps even there
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
@@ -38,8 +41,9 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
         Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
         twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: the same distance
         without what may be chance, times a factor between 0.3 and 0.76 that is as large as the irregularity of the
-        spacing demands and the curvature permits. Where the surface is narrow h stays below 0.4 of the depth, the
-        distance of its middle from the rim, but not below 1.2 spacings.
+        spacing demands and the curvature permits. Where the surface bends most, as on a bead of few points, the kernel
+        reaches no further than half a turn; where it is narrow h stays below 0.4 of the depth, the distance of its
+        middle from the rim; but not below 1.2 spacings.
     """
     distance = _neighbor_distance(nearest.tree, options.neighbors, label)
     if options.bandwidth == "global":
@@ -61,9 +65,11 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
     bend = np.log(_BEND / np.maximum(steepest, 1e-30))
     floor = least + np.maximum(reach, own)
     length = np.maximum(np.clip(bend, least + reach, most + reach), floor)
+    tight = np.exp(_repeat(averaging, bend, _LAST)) * (_AROUND / _BEND)
     if deepest is not None:
-        narrow = np.log(np.maximum(_ACROSS * deepest, _TIGHTEST * nearest.spacing))
-        length, floor = np.minimum(length, narrow), np.minimum(floor, narrow)
+        tight = np.minimum(tight, _ACROSS * deepest)
+    tight = np.log(np.maximum(tight, _TIGHTEST * nearest.spacing))
+    length, floor = np.minimum(length, tight), np.minimum(floor, tight)
     length = np.maximum(_repeat(averaging, length, _LAST), floor)
     return options.bandwidth_factor * np.exp(_repeat(averaging, length, _LAST))
 

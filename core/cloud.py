@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 
 from .bandwidth import depth, smoothing_lengths
 from .components import SMALLEST, label_islands, label_sheets, move_apart
-from .distances import pairs_on_one_sheet
+from .distances import pairs_on_one_sheet, relief
 from .errors import InvalidPointsError, IslandError
 from .nearest import find_nearest
 from .neighbors import Neighborhoods, find_pairs
@@ -41,6 +41,10 @@ class Cloud:
         How far the points were moved to smooth noise.
     mean_bend, gaussian : ndarray, (m,)
         Mean and Gaussian curvature of local quadrics; the latter is zero where the options do not ask for it.
+    spacing : ndarray, (m,)
+        Distance between neighbouring points.
+    relief : ndarray, (m,)
+        Mean squared slope of what is finer than the normals; zero where it is noise.
     rim : Rim
     neighborhoods : Neighborhoods
         Where the operator takes the points to be, smoothing lengths and pairs.
@@ -57,6 +61,8 @@ class Cloud:
     moved: np.ndarray
     mean_bend: np.ndarray
     gaussian: np.ndarray
+    spacing: np.ndarray
+    relief: np.ndarray
     rim: Rim
     neighborhoods: Neighborhoods
     definite: bool
@@ -101,6 +107,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     if lone or label.max() > 0:
         nearest = find_nearest(move_apart(scaled.points, label))
     surface, nearest = _fit(nearest, options)
+    noise = 0.0
     if options.projection == "auto":
         noise = noise_level(nearest.tree, np.median(surface.misfit / nearest.spacing))
         if noise >= LEAST:
@@ -159,6 +166,8 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         moved=moved,
         mean_bend=0.5 * flipped * np.trace(surface.bending, axis1=1, axis2=2),
         gaussian=surface.gaussian if options.curvature_correction else np.zeros(len(own)),
+        spacing=nearest.spacing,
+        relief=np.zeros(len(own)) if noise > 0.0 else relief(nearest, surface.normals),
         rim=rim,
         neighborhoods=pairs,
         definite=definite,

@@ -9,6 +9,8 @@ _BACK = -0.2  # cosine of two oriented normals below which the points lie on two
 
 _PARALLEL = 0.5  # cosine, without its sign, of normals on one sheet where the signs do not tell
 _AGAINST, _BENT = 0.5, 0.25  # turn against the bend, and bend, in radians, that cannot both be true
+_STEPS = 8  # nearest neighbours whose chords tell of relief
+_EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
 _LEANING = 0.3  # what normals within sharp features may be off by, as a share of the distance
 
 
@@ -35,27 +37,61 @@ def projected_distance(neighborhoods, normals):
     return result
 
 
-def arc_length(neighborhoods, normals):
+def arc_length(cloud):
     """Return the length of the arc that joins each pair within the surface, to fourth order.
 
-    ``s^2 = r^2 + (d . (n_j - n_i))^2 / 12``, exact to that order on spheres, cylinders and cones.
+    ``s^2 = r^2 + (d . (n_j - n_i))^2 / 12 + g max(r^2 - a^2, 0)``. The second term is exact to that order on spheres,
+    cylinders and cones. The third one is the way up and down over relief of mean squared slope g, the mean of both
+    ends' `relief`: finer than the normals tell, but shape. Between points one spacing a apart the chord is that way.
 
     Parameters
     ----------
-    neighborhoods : Neighborhoods
-        With p pairs.
-    normals : ndarray, (m, 3)
-        Unit normals. The second is flipped to the first one's side, pair by pair: signs do not matter.
+    cloud : Cloud
+        Of m points, with p pairs. The second normal is flipped to the first one's side, pair by pair: signs do not
+        matter.
 
     Returns
     -------
     ndarray, (p,)
     """
+    neighborhoods = cloud.neighborhoods
     result = np.empty(len(neighborhoods.first))
-    for block, left, right, cosine in _heights(neighborhoods, normals):
+    for block, left, right, cosine in _heights(neighborhoods, cloud.normals):
         turn = np.where(cosine < 0.0, -right, right) - left
-        result[block] = np.sqrt(neighborhoods.distance[block] ** 2 + turn**2 / 12.0)
-    return result
+        result[block] = neighborhoods.distance[block] ** 2 + turn**2 / 12.0
+    if cloud.relief.any():
+        least = neighborhoods.mean(cloud.spacing) ** 2
+        result += neighborhoods.mean(cloud.relief) * np.maximum(neighborhoods.distance**2 - least, 0.0)
+    return np.sqrt(result)
+
+
+def relief(nearest, normals):
+    """Measure what rises and falls between neighbouring points faster than the normals, fitted to many, can tell.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals of any sign.
+
+    Returns
+    -------
+    ndarray, (m,)
+        Mean square of the slope of the chords to the eight nearest neighbours against the mean normal of their ends,
+        averaged over the neighbourhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
+        turn too fast between neighbours to be right, are no relief: arcs make up for them already.
+    """
+    near = slice(1, _STEPS + 1)
+    index, counted = nearest.index[:, near], nearest.weight[:, near] > 0.0
+    chord = nearest.points[index] - nearest.points[:, None]
+    cosine = np.einsum("ikc,ic->ik", normals[index], normals)
+    side = np.where(cosine < 0.0, -1.0, 1.0)
+    height = np.einsum("ikc,ic->ik", chord, normals) + side * np.einsum("ikc,ikc->ik", chord, normals[index])
+    across = counted & (np.abs(cosine) < _EDGE)
+    smooth = counted & ~across & (across.sum(axis=1) < _ACROSS)[:, None]
+    slope = np.where(smooth, (0.5 * height / nearest.distance[:, near]) ** 2, 0.0)
+    return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
 
 
 def pairs_on_one_sheet(neighborhoods, normals, unsure, bending, spacing):

@@ -238,7 +238,7 @@ def build_laplacian(
         )
 
     report("Areas", 0.5)
-    distance = arc_length(pairs, cloud.normals) if options.curvature_correction else pairs.distance
+    distance = arc_length(cloud) if options.curvature_correction else pairs.distance
     solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
     if not solution.converged:
         notices.append(

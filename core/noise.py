@@ -22,7 +22,7 @@ def noise_level(tree, misfit):
     tree : cKDTree
         Of m points.
     misfit : float
-        Of quadrics that keep close sheets apart, in units of the spacing: a sound fit rules noise out.
+        Of quadrics that keep close sheets apart, in units of the spacing: the noise is no more than that.
 
     Returns
     -------
@@ -30,8 +30,6 @@ def noise_level(tree, misfit):
         Median, over a sample of the points, of the misfit of a quadric through 20 neighbours, in units of the spacing;
         zero where a quadric through 60 neighbours fits so much worse that it is shape, not noise, that it misses.
     """
-    if misfit < LEAST:
-        return 0.0
     rows = np.arange(0, tree.n, max(1, tree.n // _SAMPLE))
     if tree.n <= _MANY:
         return 0.0
@@ -41,7 +39,7 @@ def noise_level(tree, misfit):
         np.median(fit_surface(tree.data, index[:, :count], fading_weights(distance[:, :count]), rows).misfit / spacing)
         for count in (_FEW + 1, _MANY + 1)
     )
-    return float(few) if many < _GROWTH * few else 0.0
+    return float(min(few, misfit)) if many < _GROWTH * few else 0.0
 
 
 def project_points(points, method, label=None):

@@ -1,10 +1,30 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import fibonacci_sphere, marching_cubes_sphere, random_sphere, torus_points, uneven_sphere
-from core.areas import TAU, KernelMatrix, bounded_quadratic, constrained_areas, fast_areas, regularized_areas
+from benchmarks.samplings import (
+    closed_plate,
+    fibonacci_sphere,
+    marching_cubes_sphere,
+    noisy_sphere,
+    random_sphere,
+    rough_sphere,
+    torus_points,
+    uneven_sphere,
+)
+from core.areas import (
+    TAU,
+    KernelMatrix,
+    bounded_quadratic,
+    constrained_areas,
+    fast_areas,
+    regularized_areas,
+    solve_areas,
+)
 from core.cloud import read_cloud
+from core.distances import arc_length
 from core.options import LaplacianOptions
 from core.rims import no_rim
 
@@ -53,6 +73,51 @@ def test_density_jump():
     assert np.all(areas > 0.0)
     assert areas.sum() == pytest.approx(SPHERE, rel=1e-2)
     assert areas[points[:, 2] < -0.3].mean() / areas[points[:, 2] > 0.3].mean() == pytest.approx(9.0, rel=0.05)
+
+
+class TestRelief:
+    """Shape finer than the normals tell lengthens the ways along the surface; noise does not."""
+
+    @pytest.mark.parametrize(("wavelength", "slope"), [(5, 0.2), (6, 0.4), (8, 0.4)])
+    @pytest.mark.parametrize("points", [fibonacci_sphere(4000), marching_cubes_sphere(30)], ids=["even", "cubes"])
+    def test_has_its_area(self, points, wavelength, slope):
+        rough, exact = rough_sphere(points, wavelength, slope)
+        cloud = read_cloud(rough, LaplacianOptions())
+
+        def error(relief):
+            changed = replace(cloud, relief=relief)
+            areas = solve_areas(changed, arc_length(changed), LaplacianOptions()).areas * cloud.scaled.scale**2
+            return areas.sum() / exact - 1.0
+
+        assert abs(error(cloud.relief)) < 0.01
+        assert error(np.zeros(len(rough))) < -1.8 * abs(error(cloud.relief))
+
+    def test_is_its_slope_where_normals_are_smooth(self):
+        rough, _ = rough_sphere(fibonacci_sphere(4000), 3, 0.2)
+        measured = read_cloud(rough, LaplacianOptions()).relief.mean()
+        assert 0.4 < measured / (0.5 * 0.2**2) < 1.0  # along a chord it is half of the squared slope
+
+    @pytest.mark.parametrize("points", [fibonacci_sphere(2000), random_sphere(2000)], ids=["even", "random"])
+    def test_of_smooth_surfaces_is_none(self, points):
+        assert read_cloud(points, LaplacianOptions()).relief.max() < 1e-6
+
+    @pytest.mark.parametrize(("side", "thickness", "most"), [(40, 2, 0.01), (20, 8, 0.016), (20, 20, 0.013)])
+    def test_of_sharp_edges_is_little(self, side, thickness, most):
+        box, _, _, area = closed_plate(side, thickness)
+        assert core.estimate_areas(box).sum() == pytest.approx(area, rel=most)
+
+    @pytest.mark.parametrize("level", [0.02, 0.04, 0.2])
+    def test_noise_is_none(self, level):
+        noisy = noisy_sphere(2000, level)
+        assert not read_cloud(noisy, LaplacianOptions()).relief.any()
+        assert read_cloud(noisy, LaplacianOptions(projection="off")).relief.min() > 0.0
+
+    def test_does_not_depend_on_the_signs_of_normals(self):
+        rough, _ = rough_sphere(fibonacci_sphere(2000), 6, 0.3)
+        normals = core.estimate_normals(rough)
+        flipped = normals * np.random.default_rng(0).choice([-1.0, 1.0], len(rough))[:, None]
+        expected = core.build_laplacian(rough, normals).areas
+        np.testing.assert_allclose(core.build_laplacian(rough, flipped).areas, expected, rtol=1e-9)
 
 
 def test_areas_are_the_operators_own():

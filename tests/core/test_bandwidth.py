@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import core
 from benchmarks.samplings import (
+    beaded_sphere,
     fibonacci_sphere,
     random_sphere,
     square_grid,
@@ -49,6 +51,14 @@ class TestAdaptive:
         for points, most in ((random_sphere(2000), 0.15), (uneven_sphere(2500), 0.9)):
             pairs = read_cloud(points, LaplacianOptions()).neighborhoods
             assert np.abs(np.log(pairs.lengths[pairs.first] / pairs.lengths[pairs.second])).max() < most
+
+    def test_reaches_half_a_turn_around_a_bead_of_few_points(self):
+        # The hundredth neighbor of its points lies far off on the sphere.
+        points, bead, areas = beaded_sphere(0.05, 60)
+        laplacian = core.build_laplacian(points)
+        assert np.median(3.0 * laplacian.smoothing_lengths[bead]) < 1.1 * np.pi * 0.05
+        assert laplacian.areas[bead].sum() == pytest.approx(areas[1], rel=0.1)
+        assert laplacian.areas[~bead].sum() == pytest.approx(areas[0], rel=1e-3)
 
     def test_shrinks_with_the_radius_of_curvature(self):
         # The same irregularity; in spacings, thin tubes are narrower than thick ones, and these than the sphere.

@@ -72,7 +72,7 @@ def disc_of_rings(count):
 
 def row_sums(cloud):
     """The kernel's integral around every point, images included, with exact areas of a unit grid."""
-    matrix = KernelMatrix(cloud.neighborhoods, arc_length(cloud.neighborhoods, cloud.normals), cloud.rim)
+    matrix = KernelMatrix(cloud.neighborhoods, arc_length(cloud), cloud.rim)
     return matrix @ cloud_areas(cloud)
 
 

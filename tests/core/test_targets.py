@@ -102,7 +102,7 @@ def test_scan(scans, name):
         pytest.skip(f"needs {path.name} in the folder of scans")
     facts = json.loads((scans / "reference.json").read_text(encoding="utf-8"))[name]
     laplacian = core.build_laplacian(read_ply(path))
-    assert area_error(laplacian, facts["triangle_area"]) < 0.03
+    assert area_error(laplacian, facts["triangle_area"]) < 0.01
     if name in RIM:
         assert np.any(laplacian.boundary) == RIM[name]
 
