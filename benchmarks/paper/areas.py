@@ -2,6 +2,7 @@
 
 import json
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,30 +37,30 @@ def figure_1():
         matrix = KernelMatrix(cloud.neighborhoods, cloud.neighborhoods.distance, cloud.rim)
         unit = cloud.scaled.scale**2
         target = np.ones(len(points))
-        ways = {
-            "eq. (7), rho = 1e-8": lambda: regularized_areas(matrix, target, 1e-8, products=2000),
-            "eq. (7), rho = 1e-3": lambda: regularized_areas(matrix, target, 1e-3),
-            f"eq. (8), {CONSTRAINED} products": lambda: constrained_areas(matrix, target, 1e-3, products=CONSTRAINED),
-            "fast, same kernel": lambda: fast_areas(matrix, target),
-            "default": None,
+        solve = {
+            "eq. (7), rho = 1e-8": partial(regularized_areas, matrix, target, 1e-8, products=2000),
+            "eq. (7), rho = 1e-3": partial(regularized_areas, matrix, target, 1e-3),
+            f"eq. (8), {CONSTRAINED} products": partial(constrained_areas, matrix, target, 1e-3, products=CONSTRAINED),
+            "fast, same kernel": partial(fast_areas, matrix, target),
+            "default": partial(core.estimate_areas, points),
         }
-        for name, solve in ways.items():
+        for name, way in solve.items():
             began = time.perf_counter()
-            areas = core.estimate_areas(points) if solve is None else solve().areas * unit
+            found = way()
             seconds = time.perf_counter() - began
+            areas = found if name == "default" else found.areas * unit
             off = areas.sum() / torus_area(0.8, 0.2) - 1.0
             negative = np.count_nonzero(areas <= 0.0)
             share = areas.std() / areas.mean()
             rows.append([sampling, name, str(negative), f"{share:.2f}", f"{off:+.2%}", f"{seconds:.1f}"])
             if name in ("eq. (7), rho = 1e-8", "default") or name.startswith("eq. (8)"):
                 panels[f"{sampling}, {name}"] = 1e3 * areas
-        del matrix, cloud
     return Table(
         "Figure 1: area elements of a ring torus",
         ["points", "areas", "not positive", "deviation / mean", "total", "seconds"],
         rows,
-        "Radii 0.8 and 0.2, 32,000 points. The kernel of the paper's settings, in which a support holds some 900 points,"
-        " but for the default. The paper does not say how its torus was sampled.",
+        "Radii 0.8 and 0.2, 32,000 points. The kernel of the paper's settings, in which a support holds some 900"
+        " points, but for the default. The paper does not say how its torus was sampled.",
         plots=[plots.histograms("figure01", panels, "area of a point, thousandths")],
     )
 
@@ -97,7 +98,9 @@ def figure_2():
     rows[1:1] = [row + [""] * len(peers) for row in told]
     goals = []
     if SCANS:
-        goals.append(goal(f"Figure 2: area of closed scans, worst ({worst[1]})", "<= 1 %", f"{worst[0]:.3%}", worst[0] <= 0.01))
+        goals.append(
+            goal(f"Figure 2: area of closed scans, worst ({worst[1]})", "<= 1 %", f"{worst[0]:.3%}", worst[0] <= 0.01)
+        )
     return Table(
         "Figure 2: areas",
         ["cloud", "points", "area", "default, error", "seconds", *(METHODS[peer].label for peer in peers)],

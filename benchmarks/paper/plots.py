@@ -9,7 +9,7 @@ from ..peers import METHODS
 
 matplotlib.use("Agg")
 
-from matplotlib import pyplot  # noqa: E402
+from matplotlib import pyplot
 
 DOCUMENTS = Path(__file__).parents[2] / "docs"
 FOLDER = "pictures/results"
@@ -96,7 +96,13 @@ def _style(method):
         return {"color": "gray", "label": method, "marker": "."}
     label = METHODS[known].label + (f", {rest}" if rest else "")
     thick = 2.0 if known.startswith("ours") else 1.0
-    return {"color": _COLORS[known], "label": label, "marker": ".", "linewidth": thick, "linestyle": "--" if rest else "-"}
+    return {
+        "color": _COLORS[known],
+        "label": label,
+        "marker": ".",
+        "linewidth": thick,
+        "linestyle": "--" if rest else "-",
+    }
 
 
 def _save(figure, axes, name, legend=True):

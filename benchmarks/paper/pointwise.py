@@ -63,7 +63,11 @@ def figure_3():
         f" About {AT:,} points: {', '.join(f'{name} {len(sphere(name, AT)[0]):,}' for name in PRINTED)}. The quadric"
         f" normals are the default; the paper has none. With the paper's settings {best['paper']} of the 27 entries are"
         " reached.",
-        goals=[goal("Figure 3: entries below the paper's, default", "27 of 27", f"{best['default']}", best["default"] == 27)],
+        goals=[
+            goal(
+                "Figure 3: entries below the paper's, default", "27 of 27", f"{best['default']}", best["default"] == 27
+            )
+        ],
     )
 
 
@@ -101,6 +105,13 @@ def order(errors_by_count):
     return -2.0 * np.polyfit(np.log(counts), np.log(list(errors_by_count.values())), 1)[0] if len(counts) > 2 else None
 
 
+def cells(errors_by_count):
+    """Return texts for each of the numbers of points, and for the order."""
+    found = {round(np.log2(count / COUNTS[0])): f"{error:.1e}" for count, error in errors_by_count.items()}
+    slope = order(errors_by_count)
+    return [*(found.get(k, "") for k in range(len(COUNTS))), "" if slope is None else f"{slope:.1f}"]
+
+
 def label_of(method):
     """Return what tables call a method and its settings."""
     name, _, rest = method.partition(", ")
@@ -121,7 +132,9 @@ def figure_4():
                 found = {count: error[function][0] for count, error in by_count.items()}
                 slope = order(found)
                 cells = {round(np.log2(count / 1000.0)): f"{error:.1e}" for count, error in found.items()}
-                rows.append([sampling, f"L {function}", label_of(method), *(cells.get(k, "") for k in range(len(COUNTS)))])
+                rows.append(
+                    [sampling, f"L {function}", label_of(method), *(cells.get(k, "") for k in range(len(COUNTS)))]
+                )
                 rows[-1].append("" if slope is None else f"{slope:.1f}")
                 if method.startswith("ours"):
                     orders.append((method, function, slope))
@@ -131,12 +144,16 @@ def figure_4():
         if sampling in UNIFORM:
             for method, title in (("ours", "default"), ("ours, wider", "kernel wider with n")):
                 least, function = min((slope, function) for m, function, slope in orders if m == method)
-                goals.append(
-                    goal(f"Figure 4: order in the spacing, {sampling}, {title}, lowest: L {function}", ">= 2", f"{least:.2f}", least >= 2.0)
-                )
+                quantity = f"Figure 4: order in the spacing, {sampling}, {title}, lowest: L {function}"
+                goals.append(goal(quantity, ">= 2", f"{least:.2f}", least >= 2.0))
         else:
             goals.append(
-                goal(f"Figure 4: best symmetric peer over ours, {sampling}, worst of all", "> 1", f"{worst:.2g}", worst > 1.0)
+                goal(
+                    f"Figure 4: best symmetric peer over ours, {sampling}, worst of all",
+                    "> 1",
+                    f"{worst:.2g}",
+                    worst > 1.0,
+                )
             )
     names = [plots.convergence(f"figure04_{name.replace(' ', '_')}", part) for name, part in panels.items()]
     return Table(
@@ -144,8 +161,8 @@ def figure_4():
         ["sphere", "function", "method", *(f"{count:,}" for count in COUNTS), "order"],
         rows,
         "Relative l2 errors on unit spheres; of the icosahedral one the plots show the maximum norm too. The order is in"
-        " the spacing, fitted to all numbers of points. \"wider\": h grows as the root of the spacing,"
-        " `bandwidth=\"global\"`, 0.35 (n / 2000)^(1/4) of the distance to the 100th neighbor.",
+        ' the spacing, fitted to all numbers of points. "wider": h grows as the root of the spacing,'
+        ' `bandwidth="global"`, 0.35 (n / 2000)^(1/4) of the distance to the 100th neighbor.',
         plots=names,
         goals=goals,
     )
@@ -165,7 +182,9 @@ def figure_5():
             for function in FUNCTIONS:
                 for norm, which in enumerate(("l2", "max")):
                     title = f"L {function}, {which}"
-                    panels.setdefault(title, {}).setdefault(sampling.replace(" ", "\n"), {})[method] = found[function][norm]
+                    panels.setdefault(title, {}).setdefault(sampling.replace(" ", "\n"), {})[method] = found[function][
+                        norm
+                    ]
     header = [f"L {function}, {norm}" for norm in ("l2", "max") for function in FUNCTIONS]
     return Table(
         "Figure 5: pointwise error on 8,000 points",

@@ -47,18 +47,34 @@ def figure_7():
             off = eigenvalue_errors(build(name, points, triangles if METHODS[name].mesh else None, **settings), exact)
             means[label] = off.mean()
             curves.setdefault(sampling, {})[label] = (list(range(1, len(off) + 1)), list(np.maximum(off, 1e-8)))
-            rows.append([sampling, label_of(label), f"{off.mean():.1e}", f"{off.max():.1e}", f"{len(off)} of {MODES - 1}"])
+            rows.append(
+                [sampling, label_of(label), f"{off.mean():.1e}", f"{off.max():.1e}", f"{len(off)} of {MODES - 1}"]
+            )
         groups[sampling.replace(" ", "\n")] = means
         whole = len(curves[sampling]["ours"][0]) == MODES - 1
         goals.append(
-            goal(f"Figure 7: {MODES} eigenvalues, mean, {sampling}", "<= 0.05 %", f"{means['ours']:.4%}", whole and means["ours"] <= 5e-4)
+            goal(
+                f"Figure 7: {MODES} eigenvalues, mean, {sampling}",
+                "<= 0.05 %",
+                f"{means['ours']:.4%}",
+                whole and means["ours"] <= 5e-4,
+            )
         )
         peer = min((mean, label) for label, mean in means.items() if not label.startswith("ours"))
         goals.append(
-            goal(f"Figure 7: best peer over ours, {sampling}: {label_of(peer[1])}", "> 1", f"{peer[0] / means['ours']:.2g}", peer[0] > means["ours"])
+            goal(
+                f"Figure 7: best peer over ours, {sampling}: {label_of(peer[1])}",
+                "> 1",
+                f"{peer[0] / means['ours']:.2g}",
+                peer[0] > means["ours"],
+            )
         )
     pictures = [plots.bars("figure07", {f"first {MODES} eigenvalues, mean error": groups})]
-    pictures.append(plots.convergence("figure07_each", {f"{name}, 8,000 points": part for name, part in curves.items()}, "eigenvalue"))
+    pictures.append(
+        plots.convergence(
+            "figure07_each", {f"{name}, 8,000 points": part for name, part in curves.items()}, "eigenvalue"
+        )
+    )
     return Table(
         "Figures 6 and 7: eigenvalues of the unit sphere on 8,000 points",
         ["sphere", "method", "mean", "max", "resolved"],
@@ -83,13 +99,15 @@ def figure_6():
                 continue
             found = {}
             for count in counts:
-                if count > 8000 and method == "pcl" or count > 32000 and method != "ours":
+                if (count > 8000 and method == "pcl") or (count > 32000 and method != "ours"):
                     continue
                 points = make(count)
                 triangles = sphere(shape.partition(", ")[2], count)[1] if METHODS[method].mesh else None
                 off = eigenvalue_errors(build(method, points, triangles), exact)
                 found[count] = off.mean()
-                rows.append([shape, METHODS[method].label, f"{count:,}", f"{off.mean():.1e}", f"{off.max():.1e}", f"{len(off)}"])
+                rows.append(
+                    [shape, METHODS[method].label, f"{count:,}", f"{off.mean():.1e}", f"{off.max():.1e}", f"{len(off)}"]
+                )
                 slope = 0.0
                 if len(found) > 1:
                     slope = -np.log(found[count] / found[counts[len(found) - 2]]) / np.log(2.0)
@@ -98,7 +116,12 @@ def figure_6():
             if method == "ours" and not shape.endswith("random"):
                 whole = 2.0 * np.log(found[counts[0]] / found[counts[-1]]) / np.log(counts[-1] / counts[0])
                 goals.append(
-                    goal(f"Figure 6: order of the eigenvalues, {shape}, {counts[0]:,} to {counts[-1]:,}", ">= 4", f"{whole:.2f}", whole >= 4.0)
+                    goal(
+                        f"Figure 6: order of the eigenvalues, {shape}, {counts[0]:,} to {counts[-1]:,}",
+                        ">= 4",
+                        f"{whole:.2f}",
+                        whole >= 4.0,
+                    )
                 )
     return Table(
         "Figure 6: eigenvalues against the number of points",
@@ -118,7 +141,10 @@ def neighbors():
         points = sphere(sampling, AT)[0]
         for count in (50, 100):
             for title, options in (
-                ("paper's settings", core.LaplacianOptions(**{**vars(core.LaplacianOptions.paper()), "neighbors": count})),
+                (
+                    "paper's settings",
+                    core.LaplacianOptions(**{**vars(core.LaplacianOptions.paper()), "neighbors": count}),
+                ),
                 ("default", core.LaplacianOptions(neighbors=count)),
             ):
                 if title != "default" and sampling == "random":
@@ -128,7 +154,15 @@ def neighbors():
                 off = eigenvalue_errors(operator, exact)
                 seconds = time.perf_counter() - began
                 rows.append(
-                    [sampling, title, str(count), f"{off.mean():.1e}", f"{off.max():.1e}", str(len(off)), f"{seconds:.1f}"]
+                    [
+                        sampling,
+                        title,
+                        str(count),
+                        f"{off.mean():.1e}",
+                        f"{off.max():.1e}",
+                        str(len(off)),
+                        f"{seconds:.1f}",
+                    ]
                 )
     return Table(
         "50 against 100 neighbors for the spectrum",
@@ -150,7 +184,11 @@ def figure_17():
         best = {}
         for label, name, settings in (
             ("ours", "ours", {}),
-            ("ours, paper, plane", "ours", {"options": core.LaplacianOptions(**{**vars(core.LaplacianOptions.paper()), "projection": "plane"})}),
+            (
+                "ours, paper, plane",
+                "ours",
+                {"options": core.LaplacianOptions(**{**vars(core.LaplacianOptions.paper()), "projection": "plane"})},
+            ),
             *((name, name, {}) for name in METHODS if not name.startswith("ours")),
         ):
             off = eigenvalue_errors(build(name, points, triangles if METHODS[name].mesh else None, **settings), exact)
@@ -170,7 +208,14 @@ def figure_17():
         " radius); relative errors of the first 36 eigenvalues. The methods that need a mesh keep the true triangles of"
         " the points without noise.",
         plots=[plots.convergence("figure17", panels, "noise [spacings]")],
-        goals=[goal(f"Figure 17: best peer over ours at the worst level ({least[1]})", "> 1", f"{least[0]:.2g}", least[0] > 1.0)],
+        goals=[
+            goal(
+                f"Figure 17: best peer over ours at the worst level ({least[1]})",
+                "> 1",
+                f"{least[0]:.2g}",
+                least[0] > 1.0,
+            )
+        ],
     )
 
 
@@ -204,13 +249,31 @@ def race(aim=5e-3, modes=50):
         else:
             rows.append([label_of(label), "none of them", f"{best:.1e}, the best", ""])
     ours = min(seconds for label, seconds in times.items() if label.startswith("ours"))
-    clouds = {label: seconds for label, seconds in times.items() if not label.startswith("ours") and not METHODS[label.partition(", ")[0]].mesh}
+    clouds = {
+        label: seconds
+        for label, seconds in times.items()
+        if not label.startswith("ours") and not METHODS[label.partition(", ")[0]].mesh
+    }
     text = f"{min(clouds.values()) / ours:.2g} times" if clouds else "the only one of those without a mesh"
     meshes = {label: seconds for label, seconds in times.items() if METHODS[label.partition(", ")[0]].mesh}
-    goals = [goal("Eigenvalues to 0.5 %: time of the best peer without a mesh over ours", ">= 10, or the only one", text, not clouds or min(clouds.values()) >= 10.0 * ours)]
+    goals = [
+        goal(
+            "Eigenvalues to 0.5 %: time of the best peer without a mesh over ours",
+            ">= 10, or the only one",
+            text,
+            not clouds or min(clouds.values()) >= 10.0 * ours,
+        )
+    ]
     if meshes:
         ratio = min(meshes.values()) / ours
-        goals.append(goal("Eigenvalues to 0.5 %: time of the cotangent scheme, given the true mesh, over ours", ">= 10", f"{ratio:.2g}", ratio >= 10.0))
+        goals.append(
+            goal(
+                "Eigenvalues to 0.5 %: time of the cotangent scheme, given the true mesh, over ours",
+                ">= 10",
+                f"{ratio:.2g}",
+                ratio >= 10.0,
+            )
+        )
     return Table(
         "Time to eigenvalues within 0.5 %",
         ["method", "points", f"{modes} eigenvalues, mean", "seconds"],
