@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 from scipy.special import jnp_zeros
 
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+SIDES = 1.2, 1.0  # of the parabolic cylinder, so that the modes that the paper shows are simple
 
 
 def random_sphere(count, seed=0):
@@ -311,6 +312,61 @@ def closed_plate(side=40, thickness=2):
     face = np.select([bottom, top], [0, 1], -1)
     outside = bottom | top | (inset == 0.0)
     return points[outside], face[outside], inset[outside], 2.0 * side**2 + 4.0 * side * thickness
+
+
+def parabolic_cylinder(bend, side=21):
+    """Return ``(u, bend u^2, v)`` over a rectangle of sides 1.2 and 1, even along the parabola's arc, (side^2, 3).
+
+    All bends are isometric to each other; zero is the plane. (v runs along y, the height is z.)
+    """
+    along, across = (part.ravel() for part in np.meshgrid(*(np.linspace(-0.5, 0.5, side) * s for s in SIDES)))
+    u = along.copy()
+    if bend:
+        slope = 2.0 * bend
+        for _ in range(30):  # Newton's steps for arc(u) = along
+            t = slope * u
+            root = np.sqrt(1.0 + t * t)
+            u -= (0.5 * (t * root + np.arcsinh(t)) / slope - along) / root
+    return np.column_stack([u, across, bend * u**2])
+
+
+def trimmed_star(count=5000, arms=6, seed=None):
+    """Return points on a closed star with sharp edges: a thick star polygon whose arms end in straight cuts.
+
+    Parameters
+    ----------
+    count : int
+    arms : int
+    seed : int, optional
+        Of random points; without it they are those of a golden-ratio lattice on each face.
+
+    Returns
+    -------
+    ndarray, (count, 3)
+        As many on every face as its area asks for; the tips are 1 from the axis, the thickness is 0.3.
+    """
+    inner, thickness, trim = 0.45, 0.3, 0.12
+    # Corners of one arm from one valley to the next: in the middle the cut, of half width ``trim``.
+    angle = np.pi / arms
+    turns = 2.0 * np.pi * np.arange(arms) / arms
+    arm = np.array([[inner * np.cos(angle), -inner * np.sin(angle)], [1.0, -trim], [1.0, trim]])
+    rotation = np.stack([np.cos(turns), -np.sin(turns), np.sin(turns), np.cos(turns)], axis=1).reshape(-1, 2, 2)
+    outline = np.concatenate([arm @ turn.T for turn in rotation])
+    after = np.roll(outline, -1, axis=0)
+    length = np.linalg.norm(after - outline, axis=1)
+    face = 0.5 * np.abs(outline[:, 0] * after[:, 1] - outline[:, 1] * after[:, 0])  # triangles from the axis
+    weights = np.concatenate([face, face, length * thickness])
+    k = np.arange(count)
+    place = (k + 0.5) / count if seed is None else np.random.default_rng(seed).random(count)
+    ends = np.cumsum(weights / weights.sum())
+    kind = np.minimum(np.searchsorted(ends, place), len(ends) - 1)
+    edge = kind % len(length)
+    t = 1.0 - (ends[kind] - place) * weights.sum() / weights[kind]
+    s = k * GOLDEN % 1.0 if seed is None else np.random.default_rng(seed + 1).random(count)
+    rim = (outline[edge].T * (1.0 - s) + after[edge].T * s).T
+    flat = kind < 2 * len(length)
+    height = np.where(flat, np.where(kind < len(length), 0.5, -0.5), t - 0.5) * thickness
+    return np.column_stack([np.where(flat, np.sqrt(t), 1.0)[:, None] * rim, height])
 
 
 def sausage_bend(count, radius=0.25, length=6.0):

@@ -12,6 +12,7 @@ import numpy as np
 
 import demo
 import package
+import paper_pictures
 import scan_pictures
 import studio
 from studio import row, single
@@ -27,12 +28,6 @@ def coral(noise=0.0):
     points = demo.Coral().sample(demo.POINTS)
     points += noise * SPACING * np.random.default_rng(1).standard_normal(points.shape)
     return studio.make_object(points, "Coral")
-
-
-def tip(obj, direction):
-    """Return which point of an object lies farthest in a direction, (n,) bool."""
-    along = studio.world_points(obj) @ np.array(direction, dtype=float)
-    return np.arange(len(along)) == along.argmax()
 
 
 def result(attribute):
@@ -75,19 +70,8 @@ def mode_shape(path):
 
     The eleven modes of the fifth frequency are any basis of their space, so the harmonic is put together from them.
     """
-    core = studio.part("core")
-    points = demo.spread_directions(8000)
-    x, y, z = points.T
-    exact = z * ((x + 1j * y) ** 4).real  # Y_5^4 up to a factor
-    laplacian = core.build_laplacian(points)
-    modes = laplacian.eigenpairs(36).eigenvectors[:, 25:]
-    found = modes @ (modes.T @ (laplacian.areas * exact))
-    objects = []
-    for values in (found, exact):
-        obj = studio.make_object(core.displace_by_mode(laplacian, values, 0.3), "Sphere")
-        studio.part("operators.attributes").write_attribute(obj.data, "Mode", values / np.abs(values).max())
-        studio.show(obj, "Mode")
-        objects.append(obj)
+    laplacian, (_, harmonic) = paper_pictures.harmonics()
+    objects = [paper_pictures.colored_sphere(laplacian, values, amplitude=0.3) for values in harmonic]
     row(objects, path, legend=objects[0])
 
 
@@ -109,7 +93,7 @@ def distance(path):
     """Distances from one point, with lines of equal distance."""
     obj = coral()
     obj.meshfree.iso_lines, obj.meshfree.coverage = LINES, 100.0
-    studio.group(obj, tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
+    studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
     bpy.ops.meshfree.geodesic_distance()
     single(obj, "lb_distance", path)
 
@@ -118,16 +102,14 @@ def field(path):
     """A harmonic field between the tips of two arms."""
     obj = coral()
     obj.meshfree.iso_lines = LINES
-    for name, direction in (("Low", (-1.0, 0.0, 0.0)), ("High", (1.0, -1.0, 0.0))):
-        studio.group(obj, tip(obj, direction), "VALUE", name, grown=0.5)
-    bpy.ops.meshfree.harmonic_field(values="GROUPS", low_group="Low", high_group="High")
+    studio.harmonic_field(obj, low=(-1.0, 0.0, 0.0), high=(1.0, -1.0, 0.0))
     single(obj, "lb_field", path)
 
 
 def deform(path):
     """An arm bent by its tip."""
     rest, obj = coral(), coral()
-    studio.group(obj, tip(obj, (1.0, -1.0, 0.5)), "HANDLE", grown=0.35)
+    studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.5)), "HANDLE", grown=0.35)
     studio.group(obj, studio.world_points(obj)[:, 2] < -0.7, "ANCHOR")
     studio.deform(obj, move=(0.0, 0.0, 1.0), turn=(-0.5, -0.5, 0.0))
     studio.deformed_row(rest, obj, path)
@@ -169,6 +151,7 @@ PICTURES = {
     "field": field,
     "deform": deform,
     "minimal": minimal,
+    **paper_pictures.PICTURES,
     **scan_pictures.PICTURES,
 }
 

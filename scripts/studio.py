@@ -20,6 +20,7 @@ TOUCHING = 1.6  # radius of points that make a closed surface, in units of their
 CLOSED = 2.0  # without any gap, which would show as dark holes in clay
 SIZE, WIDE = (640, 400), (800, 360)  # of pictures of the manual, in pixels
 SAMPLES = 64  # rays per pixel of these
+LEVELS = 52  # of each color in pictures of many objects: the background stays gray
 CLAY = (0.62, 0.58, 0.52, 1.0)
 HANDLES, ANCHORS = (0.8, 0.05, 0.02, 1.0), (0.03, 0.12, 0.4, 1.0)
 MARKS = 1.1 * CLOSED  # radius of their points
@@ -85,6 +86,7 @@ def set_up(scene, obj, size=(1280, 800), samples=16, view=VIEW, legend=True):
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.image_settings.compression = 100
+    scene.render.dither_intensity = 0.0  # noise that does not compress
     scene.render.image_settings.color_mode = "RGB"
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
@@ -135,9 +137,16 @@ def world_points(obj):
     return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+def picture_axes(view):
+    """Return the directions to the right, upwards and away from the camera, for a direction towards the camera."""
+    forward = -Vector(view).normalized()
+    right = forward.cross(Vector((0.0, 0.0, 1.0))).normalized()
+    return right, right.cross(forward), forward
+
+
 def line_up(objects, view=VIEW, gap=0.2):
     """Move objects into a row from left to right in the picture, with gaps in shares of the first one's width."""
-    right = Vector((0.0, 0.0, 1.0)).cross(Vector(view)).normalized()
+    right = picture_axes(view)[0]
     end = width = 0.0
     for index, obj in enumerate(objects):
         along = world_points(obj) @ np.array(right)
@@ -168,9 +177,7 @@ def aim(scene, points, view, margin=0.05, room=LEGEND_WIDTH):
     mathutils.Matrix
         The camera's rotation.
     """
-    forward = -Vector(view).normalized()
-    right = forward.cross(Vector((0.0, 0.0, 1.0))).normalized()
-    upward = right.cross(forward)
+    right, upward, forward = picture_axes(view)
     axes = np.array([right, upward, forward])
     x, y, depth = axes @ points.T
 
@@ -272,6 +279,29 @@ def row(objects, path, legend, view=VIEW, size=WIDE):
     take(path, legend, view, size)
 
 
+def grid(rows, path, view=VIEW, size=WIDE, gap=0.15):
+    """Render rows of objects as they are shown, in cells of one size with gaps in shares of it, without a legend."""
+    axes = np.array(picture_axes(view)[:2])
+    spans = [[world_points(obj) @ axes.T for obj in objects] for objects in rows]
+    cell = (1.0 + gap) * np.max([np.ptp(span, axis=0) for line in spans for span in line], axis=0)
+    for i, objects in enumerate(rows):
+        for j, obj in enumerate(objects):
+            middle = 0.5 * (spans[i][j].min(axis=0) + spans[i][j].max(axis=0))
+            obj.location += Vector((cell * (j, -i) - middle) @ axes)
+    bpy.context.view_layer.update()
+    take(path, None, view, size)
+    _thin(path)
+
+
+def _thin(path):
+    """Save a picture with so many levels of each color that noise adds little to its size."""
+    image = bpy.data.images.load(str(path))
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    image.pixels.foreach_set(np.rint((LEVELS - 1) * values) / (LEVELS - 1))
+    image.save_render(str(path), scene=bpy.context.scene)
+
+
 def take(path, legend, view=VIEW, size=WIDE):
     """Render all that is in the scene into a picture of the manual."""
     scene = bpy.context.scene
@@ -299,6 +329,19 @@ def group(obj, chosen, role, name="", grown=0.0):
     if grown:
         bpy.ops.meshfree.select_grow(distance=grown)
     bpy.ops.meshfree.group_from_selection(role=role, name=name)
+
+
+def tip(obj, direction):
+    """Return which point of an object lies farthest in a direction, (n,) bool."""
+    along = world_points(obj) @ np.array(direction, dtype=float)
+    return np.arange(len(along)) == along.argmax()
+
+
+def harmonic_field(obj, low, high):
+    """Compute the harmonic field between the tips of an object that lie farthest in two directions."""
+    for name, direction in (("Low", low), ("High", high)):
+        group(obj, tip(obj, direction), "VALUE", name, grown=0.5)
+    bpy.ops.meshfree.harmonic_field(values="GROUPS", low_group="Low", high_group="High")
 
 
 def deform(obj, move, turn=(0.0, 0.0, 0.0)):

@@ -7,15 +7,17 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 
 import core
+from benchmarks.labels import agreement
 from benchmarks.samplings import (
     fibonacci_sphere,
     grid_points,
+    parabolic_cylinder,
     parallel_sheets,
     random_sphere,
     sausage,
     square_random,
+    trimmed_star,
 )
-from benchmarks.segmentation import agreement, parabolic_cylinder, trimmed_star
 from core.graph import near_graph
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
