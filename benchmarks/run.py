@@ -5,6 +5,7 @@ they are until they are named, or ``all``.
 """
 
 import platform
+import re
 import sys
 import time
 from pathlib import Path
@@ -74,12 +75,13 @@ def main(names):
     summary = Table(SUMMARY, ["quantity", "target", "measured", "met"], [goals[key] for key in sorted(goals)], ABOUT)
     head = (
         "# Results\n\nMade by `make benchmark`, on two cores in about a quarter of an hour; the tables after the peers'"
-        ' by their names, such as `make benchmark ARGUMENTS="targets applications"`. Times are of the machine it ran on,'
-        f" compare only those of one table. Python {platform.python_version()}, numpy {numpy.__version__},"
+        ' by their names, such as `make benchmark ARGUMENTS="targets applications"`. Times are of the machine it ran'
+        f" on, compare only those of one table. Python {platform.python_version()}, numpy {numpy.__version__},"
         f" scipy {scipy.__version__}.\n"
     )
-    # The order of those there were, the evaluation first.
-    order = [title for title in tables if title not in known] + list(known)
+    # The figures by their numbers, then the other tables as they stood.
+    number = {title: re.match(r"Figures? (\d+)", title) for title in [*known, *tables]}
+    order = sorted(number, key=lambda title: int(number[title][1]) if number[title] else 100)
     parts = [tables.get(title) or known[title] for title in order]
     path.write_text("\n".join([head, summary.markdown(), *parts]), encoding="utf-8")
     print(summary.markdown(), f"{sum(seconds.values()):.0f} s: {seconds}")

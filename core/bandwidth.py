@@ -13,6 +13,7 @@ _AROUND = np.pi / SUPPORT  # the same, at most: beyond half a turn the kernel wo
 _ACROSS = 0.4  # h over the depth of the surface, at most: images know of two rims, not of those on the other side
 _TIGHTEST = 1.2  # spacings that h keeps even there
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
+_SLOPE = 0.02  # most that h grows along the surface, by its length, where there is room for a wider kernel
 _NOISE = 0.10  # changes of log d100 that may be chance
 _SLOW, _FAST, _LAST = 160, 10, 2  # rounds of averaging over the 40 nearest neighbours
 
@@ -43,7 +44,8 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
         without what may be chance, times a factor between 0.3 and 0.76 that is as large as the irregularity of the
         spacing demands and the curvature permits. Where the surface bends most, as on a bead of few points, the kernel
         reaches no further than half a turn; where it is narrow h stays below 0.4 of the depth, the distance of its
-        middle from the rim; but not below 1.2 spacings.
+        middle from the rim; but not below 1.2 spacings. Where there is room, up to 0.76 of the distance, it is
+        widened so that it grows by no more than 0.02 of the way along the surface.
     """
     distance = _neighbor_distance(nearest.tree, options.neighbors, label)
     if options.bandwidth == "global":
@@ -71,7 +73,25 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
     tight = np.log(np.maximum(tight, _TIGHTEST * nearest.spacing))
     length, floor = np.minimum(length, tight), np.minimum(floor, tight)
     length = np.maximum(_repeat(averaging, length, _LAST), floor)
+    widest = np.minimum(np.minimum(bend, tight), np.log(_WIDEST[-1]) + reach)
+    length = np.log(_gently(nearest, np.exp(length), np.exp(np.maximum(widest, length))))
     return options.bandwidth_factor * np.exp(_repeat(averaging, length, _LAST))
+
+
+def _gently(nearest, length, widest):
+    """Widen h before a place where it is larger, so that it grows gently along the surface, up to the widest, (m,).
+
+    Where h changes within a support neither the areas nor the weights are those of one kernel: the errors of both grow
+    with its slope.
+    """
+    counted = nearest.weight > 1e-12
+    fall = _SLOPE * nearest.distance
+    while True:
+        wider = np.max(length[nearest.index] - fall, axis=1, where=counted, initial=0.0)
+        wider = np.minimum(wider, widest)
+        if np.all(wider <= 1.001 * length):
+            return length
+        length = np.maximum(length, wider)
 
 
 def depth(nearest, inside):

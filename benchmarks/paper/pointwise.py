@@ -160,8 +160,8 @@ def figure_4():
         "Figure 4: pointwise error against the number of points",
         ["sphere", "function", "method", *(f"{count:,}" for count in COUNTS), "order"],
         rows,
-        "Relative l2 errors on unit spheres; of the icosahedral one the plots show the maximum norm too. The order is in"
-        ' the spacing, fitted to all numbers of points. "wider": h grows as the root of the spacing,'
+        "Relative l2 errors on unit spheres; of the icosahedral one the plots show the maximum norm too. The order is"
+        ' in the spacing, fitted to all numbers of points. "wider": h grows as the root of the spacing,'
         ' `bandwidth="global"`, 0.35 (n / 2000)^(1/4) of the distance to the 100th neighbor.',
         plots=names,
         goals=goals,

@@ -52,6 +52,22 @@ class TestAdaptive:
             pairs = read_cloud(points, LaplacianOptions()).neighborhoods
             assert np.abs(np.log(pairs.lengths[pairs.first] / pairs.lengths[pairs.second])).max() < most
 
+    def test_grows_gently_where_there_is_room(self):
+        # Even points, of which one half has four times as many.
+        few, many = fibonacci_sphere(1500), fibonacci_sphere(6000)
+        points = np.concatenate([few[few[:, 2] > 0.0], many[many[:, 2] < 0.0]])
+        pairs = read_cloud(points, LaplacianOptions()).neighborhoods
+        slope = np.abs(pairs.lengths[pairs.first] - pairs.lengths[pairs.second]) / pairs.distance
+        assert np.percentile(slope, 99.0) < 0.03
+        h = lengths(points)
+        assert h[np.abs(points[:, 2] + 0.1) < 0.1].mean() > 1.1 * h[points[:, 2] < -0.9].mean()
+        laplacian = core.build_laplacian(points)
+        x = points[:, 0]
+        error = np.linalg.norm(laplacian.apply(x) + 2.0 * x) / np.linalg.norm(2.0 * x)
+        assert error < 1e-2
+        values = laplacian.eigenpairs(36).eigenvalues[1:] / np.repeat([2.0, 6.0, 12.0, 20.0, 30.0], [3, 5, 7, 9, 11])
+        assert np.abs(values - 1.0).mean() < 1e-3
+
     def test_reaches_half_a_turn_around_a_bead_of_few_points(self):
         # The hundredth neighbor of its points lies far off on the sphere.
         points, bead, areas = beaded_sphere(0.05, 60)
