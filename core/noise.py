@@ -9,7 +9,7 @@ from .surface import fit_surface
 _SAMPLE = 2000  # points at which the noise is measured
 _FEW, _MANY = 20, 60  # neighbours of the two fits that tell noise from shape
 _GROWTH = 1.7  # noise misses both alike; shape misses the wide fit more
-LEAST = 0.05  # noise below this share of the spacing is left alone
+LEAST = 0.02  # noise below this share of the spacing is left alone
 STRONG = 0.25  # noise above this share is smoothed twice
 _NEIGHBORS = 90  # of the fit that points are projected on
 

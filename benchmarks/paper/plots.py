@@ -18,7 +18,7 @@ _SIZE = 3.4  # inches of a panel
 
 
 def convergence(name, panels, label="points"):
-    """Draw errors against the number of points, both logarithmic.
+    """Draw errors on a logarithmic axis against the number of points, as the paper does.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def convergence(name, panels, label="points"):
     figure, axes = _panels(len(panels))
     for axis, (title, curves) in zip(axes, panels.items(), strict=False):
         for method, (counts, errors) in curves.items():
-            axis.loglog(counts, errors, **_style(method))
+            axis.semilogy(counts, errors, **_style(method))
         axis.set_title(title, fontsize=9)
         axis.set_xlabel(label, fontsize=8)
     return _save(figure, axes, name)
@@ -51,7 +51,8 @@ def bars(name, panels):
             heights = [group.get(method, np.nan) for group in groups.values()]
             places = np.arange(len(groups)) + (k - 0.5 * (len(methods) - 1)) * width
             style = _style(method)
-            axis.bar(places, heights, width, color=style["color"], label=style["label"])
+            faint = 0.5 if style["linestyle"] == "--" else 1.0
+            axis.bar(places, heights, width, color=style["color"], label=style["label"], alpha=faint)
         axis.set_yscale("log")
         axis.set_xticks(range(len(groups)), groups, fontsize=7)
         axis.set_title(title, fontsize=9)
@@ -93,7 +94,7 @@ def _panels(count):
 def _style(method):
     known, _, rest = method.partition(", ")
     if known not in METHODS:
-        return {"color": "gray", "label": method, "marker": "."}
+        return {"color": "gray", "label": method, "marker": ".", "linestyle": "-"}
     label = METHODS[known].label + (f", {rest}" if rest else "")
     thick = 2.0 if known.startswith("ours") else 1.0
     return {

@@ -22,6 +22,7 @@ from .clouds import SPHERES, sphere
 from .pointwise import AT, label_of, methods_at
 
 MODES = 100
+HALF = core.LaplacianOptions(bandwidth="global", bandwidth_factor=0.5)
 LARGEST = {"pcl": 8000, "tufted": 32000, "cotangent": 32000}  # points of Figure 6 that do not take minutes
 NOISE = (0.05, 0.1, 0.25, 0.5, 1.0)  # of the spacing
 FIVE_PERCENT = 0.05 / np.sqrt(4.0 * np.pi / AT)  # of the radius, in spacings
@@ -89,30 +90,35 @@ def figure_6():
         "torus, low-discrepancy": (torus_low_discrepancy, torus_eigenvalues(60), (2000, 8000, 32000, 128000)),
     }
     for shape, (make, exact, counts) in shapes.items():
-        for method in ("ours", "pcl", "tufted", "cotangent"):
+        for label in ("ours", "ours, h = d100 / 2", "pcl", "tufted", "cotangent"):
+            method = label.partition(", ")[0]
             if METHODS[method].mesh and not shape.startswith("sphere"):
                 continue
+            settings = {"options": HALF} if label.endswith("2") else {}
             found = {}
             for count in counts:
                 if count > LARGEST.get(method, np.inf):
                     continue
                 points = make(count)
                 triangles = sphere(shape.partition(", ")[2], count)[1] if METHODS[method].mesh else None
-                off = eigenvalue_errors(build(method, points, triangles), exact)
+                off = eigenvalue_errors(build(method, points, triangles, **settings), exact)
                 found[count] = off.mean()
                 last = list(found)[-2:]
                 slope = f"{step_order(found, *last):.2f}" if len(last) > 1 else ""
-                rows.append([shape, METHODS[method].label, f"{count:,}", *summary(off), str(len(off)), slope])
-            panels.setdefault(shape, {})[method] = (list(found), list(found.values()))
+                rows.append([shape, label_of(label), f"{count:,}", *summary(off), str(len(off)), slope])
+            panels.setdefault(shape, {})[label] = (list(found), list(found.values()))
             if method == "ours" and not shape.endswith("random"):
+                way = "default" if label == method else "h = d100 / 2"
                 whole = step_order(found, counts[0], counts[-1])
-                quantity = f"Figure 6: order of the eigenvalues, {shape}, {counts[0]:,} to {counts[-1]:,}"
+                quantity = f"Figure 6: order of the eigenvalues, {shape}, {way}, {counts[0]:,} to {counts[-1]:,}"
                 goals.append(goal(quantity, ">= 4", f"{whole:.2f}", whole >= 4.0))
     return Table(
         "Figure 6: eigenvalues against the number of points",
         ["surface", "method", "n", "mean", "max", "eigenvalues", "order"],
         rows,
-        "Relative errors; the order is in the spacing, from the row before.",
+        "Relative errors; the order is in the spacing, from the row before. The default's kernel holds about 110 points"
+        " of an even cloud and reaches the noise of its sums from 8,000 points on; with twice as many,"
+        ' `bandwidth="global"`, `bandwidth_factor=0.5`, errors are larger and fall as they should.',
         plots=[plots.convergence("figure06", panels)],
         goals=goals,
     )
