@@ -59,7 +59,8 @@ def figure_1():
         ["points", "areas", "not positive", "deviation / mean", "total", "seconds"],
         rows,
         "Radii 0.8 and 0.2, 32,000 points. The kernel of the paper's settings, in which a support holds some 900"
-        f" points, but for the default; each way but the last may take {PRODUCTS} products with A. The paper does not say how its torus was sampled.",
+        f" points, but for the default; each way but the last may take {PRODUCTS} products with A."
+        " The paper does not say how its torus was sampled.",
         plots=[plots.histograms("figure01", panels, "area of a point, thousandths")],
     )
 
