@@ -38,7 +38,7 @@ def figure_8():
             for norm in (0, 1)
         )
         quantity = f"Figure 8: best of COT and PCL over ours, {sampling} torus, at the worst ({ratio[1]})"
-        goals.append(goal(quantity, "> 1", f"{ratio[0]:.2g}", ratio[0] > 1.0))
+        goals.append(goal(quantity, "> 1", f"{ratio[0]:.3g}", ratio[0] > 1.0))
         for norm, which in enumerate(("l2", "max")):
             panels[f"{sampling} torus, {which}"] = {
                 name: (list(errors), [pair[norm] for pair in errors.values()]) for name, errors in found.items()
