@@ -89,7 +89,7 @@ def _gently(nearest, length, widest):
     while True:
         wider = np.max(length[nearest.index] - fall, axis=1, where=counted, initial=0.0)
         wider = np.minimum(wider, widest)
-        if np.all(wider <= 1.001 * length):
+        if not np.any(wider > 1.001 * length):
             return length
         length = np.maximum(length, wider)
 

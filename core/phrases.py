@@ -7,7 +7,7 @@ class Phrase(str):
     Parameters
     ----------
     template : str
-        The text with a field for each value, as `str.format` takes it.
+        The text with a field for each value, as `str.format` takes it; without values, the text as it stands.
     values : object
         What goes into the fields; a value that is a `Phrase` itself can be translated in its turn, and all others are
         names, numbers and the like, in which braces mean nothing.
@@ -20,7 +20,7 @@ class Phrase(str):
 
     def __new__(cls, template, /, **values):
         """Put the values in."""
-        text = super().__new__(cls, template.format(**values))
+        text = super().__new__(cls, template.format(**values) if values else template)
         text.template, text.values = template, values
         return text
 

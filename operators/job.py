@@ -99,7 +99,7 @@ class Job(StageTimes):
         super().__init__()
         self.label, self.snapshots = label, snapshots
         self.stage, self.reason, self._stop = "Start", "", Event()
-        self._timer, self._shown = None, ""
+        self._timer, self._shown, self._begun = None, "", at_once
         self._future = Future()
         self._prepare(compute, at_once)
 
@@ -171,9 +171,10 @@ class Job(StageTimes):
             redraw_panels(context.window_manager)
 
     def open(self, context):
-        """Begin to show it, and to look at it again and again in the window that it belongs to."""
+        """Begin to show it; one that has not begun is looked at again and again in the window that it belongs to."""
         _jobs.append(self)
-        self._timer = context.window_manager.event_timer_add(_FIRST, window=context.window)
+        if not self._begun:
+            self._timer = context.window_manager.event_timer_add(_FIRST, window=context.window)
         self.show(context)
 
     def close(self, context):
@@ -181,7 +182,8 @@ class Job(StageTimes):
         if self not in _jobs:
             return
         _jobs.remove(self)
-        context.window_manager.event_timer_remove(self._timer)
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
         if not bpy.app.background:
             # Later: a window that is being closed must not find another context than it had.
             bpy.app.timers.register(_clear_status, persistent=True)

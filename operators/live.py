@@ -331,8 +331,8 @@ def _take(obj, job, key, pose):
     try:
         live, points, displacement = job.work.result()
     except Cancelled:
-        if job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
-            _troubles[obj.session_uid] = Phrase("Binding was stopped. Press Update, or move a handle"), job.pose
+        if job.prepares and job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
+            _troubles[obj.session_uid] = Phrase("Binding was stopped. Press Update, or move a handle"), pose
         return
     if job.key == key:
         keep(obj, live)

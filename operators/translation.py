@@ -18,4 +18,4 @@ def translated(text, look_up=rpt_) -> str:
         name: translated(value, look_up) if isinstance(value, Phrase) else value
         for name, value in text.values.items()  # an error has them, too
     }
-    return look_up(text.template).format(**values)
+    return look_up(text.template).format(**values) if values else look_up(text.template)

@@ -127,7 +127,12 @@ def _legends(scene):
 
 
 def _is_shared(legend, scene):
-    """Whether another scene, such as a linked copy, has the same legend."""
+    """Whether another scene, such as a linked copy, has the same legend, and this one can do without it alone.
+
+    In a collection that both scenes show it belongs to both.
+    """
+    if legend.name not in scene.collection.children:
+        return False
     return any(legend in other.collection.children_recursive for other in bpy.data.scenes if other != scene)
 
 
