@@ -15,6 +15,7 @@ DOCUMENTS = Path(__file__).parents[2] / "docs"
 FOLDER = "pictures/results"
 _COLORS = dict(zip(METHODS, matplotlib.colormaps["tab10"].colors, strict=False))
 _SIZE = 3.4  # inches of a panel
+_LEGEND = 8.5  # inches of the widest legend
 
 
 def convergence(name, panels, label="points"):
@@ -85,7 +86,9 @@ def steps(name, values, exact, label):
 def _panels(count):
     columns = min(count, 3)
     rows = -(-count // columns)
-    figure, axes = pyplot.subplots(rows, columns, figsize=(_SIZE * columns + 0.6, 0.9 * _SIZE * rows), squeeze=False)
+    figure, axes = pyplot.subplots(
+        rows, columns, figsize=(max(_SIZE * columns + 0.6, _LEGEND), 0.9 * _SIZE * rows), squeeze=False
+    )
     for axis in axes.ravel()[count:]:
         axis.axis("off")
     return figure, axes.ravel()
