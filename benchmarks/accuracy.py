@@ -17,6 +17,11 @@ from .samplings import (
 from .tables import Table
 
 SPHERE = 4.0 * np.pi
+FUNCTIONS = {  # of x on the unit sphere, and what the Laplacian makes of them
+    "x": (lambda x: x, lambda x: -2.0 * x),
+    "x^2": (lambda x: x**2, lambda x: 2.0 - 6.0 * x**2),
+    "e^x": (np.exp, lambda x: np.exp(x) * (1.0 - x**2 - 2.0 * x)),
+}
 
 
 def relative(found, exact):
@@ -27,11 +32,7 @@ def relative(found, exact):
 def sphere_errors(laplacian):
     """Relative l2 errors of L x, L x^2 and L e^x on the unit sphere."""
     x = laplacian.points[:, 0]
-    return (
-        relative(laplacian.apply(x), -2.0 * x),
-        relative(laplacian.apply(x**2), 2.0 - 6.0 * x**2),
-        relative(laplacian.apply(np.exp(x)), np.exp(x) * (1.0 - x**2 - 2.0 * x)),
-    )
+    return tuple(relative(laplacian.apply(function(x)), exact(x)) for function, exact in FUNCTIONS.values())
 
 
 def eigenvalue_errors(laplacian, exact):

@@ -7,16 +7,12 @@ import numpy as np
 
 import core
 
+from ..accuracy import FUNCTIONS, relative
 from ..peers import METHODS, build
 from ..tables import Table, goal
 from . import plots
 from .clouds import SPHERES, UNIFORM, sphere
 
-FUNCTIONS = {
-    "x": (lambda x: x, lambda x: -2.0 * x),
-    "x^2": (lambda x: x**2, lambda x: 2.0 - 6.0 * x**2),
-    "e^x": (np.exp, lambda x: np.exp(x) * (1.0 - x**2 - 2.0 * x)),
-}
 COUNTS = (1000, 2000, 4000, 8000, 16000)
 AT = 8000
 PRINTED = {  # Figure 3, l2, in thousandths: PCA, WPCA, analytic normals
@@ -32,8 +28,8 @@ def errors(operator, points):
     x = points[:, 0]
     found = {}
     for name, (function, exact) in FUNCTIONS.items():
-        off, right = operator.apply(function(x)) - exact(x), exact(x)
-        found[name] = np.linalg.norm(off) / np.linalg.norm(right), np.abs(off).max() / np.abs(right).max()
+        applied, right = operator.apply(function(x)), exact(x)
+        found[name] = relative(applied, right), np.abs(applied - right).max() / np.abs(right).max()
     return found
 
 
@@ -93,8 +89,7 @@ def measured():
         for count in COUNTS:
             points, triangles = sphere(sampling, count)
             for label, name, settings in methods_at(sampling, count):
-                mesh = triangles if METHODS[name].mesh else None
-                found = errors(build(name, points, mesh, **settings), points)
+                found = errors(build(name, points, triangles, **settings), points)
                 result.setdefault(sampling, {}).setdefault(label, {})[len(points)] = found
     return result
 
@@ -130,14 +125,9 @@ def figure_4():
                     panels.setdefault(sampling, {})[f"L {function}, {sampling}, {which}"] = curves
             for method, by_count in methods.items():
                 found = {count: error[function][0] for count, error in by_count.items()}
-                slope = order(found)
-                cells = {round(np.log2(count / 1000.0)): f"{error:.1e}" for count, error in found.items()}
-                rows.append(
-                    [sampling, f"L {function}", label_of(method), *(cells.get(k, "") for k in range(len(COUNTS)))]
-                )
-                rows[-1].append("" if slope is None else f"{slope:.1f}")
+                rows.append([sampling, f"L {function}", label_of(method), *cells(found)])
                 if method.startswith("ours"):
-                    orders.append((method, function, slope))
+                    orders.append((method, function, order(found)))
                 if method in SYMMETRIC:
                     ours = methods["ours"]
                     worst = min(worst, *(error / ours[count][function][0] for count, error in found.items()))

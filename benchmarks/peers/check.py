@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 
+from ..accuracy import SPHERE, sphere_errors
 from ..samplings import fibonacci_sphere, random_sphere, sphere_eigenvalues
 from ..tables import Table
 from . import METHODS, build, sphere_triangles
@@ -27,7 +28,7 @@ REFERENCE = {
 HEADER = ["method", "points", "build s", "area", "L x", "L x^2", "L e^x", "36 eigenvalues, mean", "max", "36 modes, s"]
 
 
-def figures(operator, points):
+def figures(operator):
     """Measure an operator of points on the unit sphere.
 
     Returns
@@ -39,14 +40,8 @@ def figures(operator, points):
     note : str
         What is odd about the eigenvalues.
     """
-    x = points[:, 0]
-    errors = [None if operator.areas is None else operator.areas.sum() / (4.0 * np.pi) - 1.0]
-    for values, exact in (
-        (x, -2.0 * x),
-        (x**2, 2.0 - 6.0 * x**2),
-        (np.exp(x), np.exp(x) * (1.0 - x**2 - 2.0 * x)),
-    ):
-        errors.append(np.linalg.norm(operator.apply(values) - exact) / np.linalg.norm(exact))
+    area = None if operator.areas is None else operator.areas.sum() / SPHERE - 1.0
+    errors = [area, *sphere_errors(operator)]
     began = time.perf_counter()
     modes = operator.eigenpairs(MODES)
     seconds = time.perf_counter() - began
@@ -63,7 +58,7 @@ def rows(count=8000, names=()):
         triangles = sphere_triangles(points)
         for name in names or METHODS:
             operator = build(name, points, triangles)
-            errors, seconds, note = figures(operator, points)
+            errors, seconds, note = figures(operator)
             reference = REFERENCE.get((name, sampling), (None,) * 6) if count == 8000 else (None,) * 6
             cells = [
                 "-" if error is None else f"{error:.1e}" + (f" ({before:.1e})" if before is not None else "")
