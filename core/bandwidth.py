@@ -53,8 +53,7 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
     averaging = nearest.averaging()
     if options.bandwidth == "local":
         return options.bandwidth_factor * _repeat(averaging, distance, 2)
-    # Neighbours on other sheets do not count, nor those as far as the last one, whose weight is zero but for rounding.
-    counted = nearest.weight > 1e-12
+    counted = _counted(nearest)
     own = np.log(distance) - 0.5 * np.log(counted.sum(axis=1) / (counted.shape[1] - 1))
     if inside is not None:
         own = own + 0.5 * np.log(_share_inside(inside / distance[:, None])).sum(axis=1)
@@ -84,11 +83,9 @@ def _gently(nearest, length, widest):
     Where h changes within a support neither the areas nor the weights are those of one kernel: the errors of both grow
     with its slope.
     """
-    counted = nearest.weight > 1e-12
-    fall = _SLOPE * nearest.distance
+    fall = np.where(_counted(nearest), _SLOPE * nearest.distance, np.inf)
     while True:
-        wider = np.max(length[nearest.index] - fall, axis=1, where=counted, initial=0.0)
-        wider = np.minimum(wider, widest)
+        wider = np.minimum((length[nearest.index] - fall).max(axis=1), widest)
         if not np.any(wider > 1.001 * length):
             return length
         length = np.maximum(length, wider)
@@ -98,10 +95,15 @@ def depth(nearest, inside):
     """Return how far from a rim the surface around every point gets, (m,): about half the width of a narrow one."""
     deepest = inside[:, 0]
     if np.isfinite(deepest).any():
-        counted = nearest.weight > 1e-12
+        counted = _counted(nearest)
         for _ in range(_STEPS):
             deepest = np.max(deepest[nearest.index], axis=1, where=counted, initial=0.0)
     return deepest
+
+
+def _counted(nearest):
+    """Tell which neighbours count: not those on other sheets, nor those as far as the last one, of no weight."""
+    return nearest.weight > 1e-12  # zero but for rounding
 
 
 def _neighbor_distance(tree, neighbors, label):
