@@ -15,6 +15,7 @@ from bpy.app.handlers import persistent
 
 from .attributes import point_count
 from .groups import group_weights, has_group
+from .handlers import add_handlers, remove_handlers
 from .stages import redraw_panels
 
 _AT_ONCE = 5_000  # points of which all groups are read when a panel is drawn
@@ -199,14 +200,12 @@ _HANDLERS = {"undo_post": _undone, "redo_post": _undone, "load_pre": _forget}
 
 def attach():
     """Count again what undo has changed, and forget what was counted of another file."""
-    for event, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, event).append(handler)
+    add_handlers(_HANDLERS)
 
 
 def detach():
     """Stop counting, and leave no handler and no timer behind."""
-    for event, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, event).remove(handler)
+    remove_handlers(_HANDLERS)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     _forget()

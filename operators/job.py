@@ -10,6 +10,7 @@ from bpy.app.translations import pgettext_tip as tip_
 
 from ..core import Cancelled, PointCloudError
 from ..core.phrases import Phrase
+from .handlers import add_handlers, remove_handlers
 from .options import settings_values
 from .reading import find_object, fingerprint, metric, obstacle, read_points
 from .ready import ReadyOperator
@@ -356,14 +357,12 @@ _ESCAPE = MESHFREE_OT_escape.__name__
 
 def attach():
     """End the work when its objects become others, by undo or another file."""
-    for event, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, event).append(handler)
+    add_handlers(_HANDLERS)
 
 
 def detach():
     """End the work, and leave no handler behind."""
-    for event, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, event).remove(handler)
+    remove_handlers(_HANDLERS)
     job = running()
     if job is not None:
         _abandon()

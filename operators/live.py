@@ -18,6 +18,7 @@ from bpy.app.handlers import persistent
 from ..core import Cancelled, Deformer, PointCloudError
 from ..core.phrases import Phrase
 from . import binding, cache
+from .handlers import add_handlers, remove_handlers
 from .job import STOPPED, Job, running
 from .options import laplacian_options
 from .reading import rim_points
@@ -380,27 +381,25 @@ def _forget(*_):
     binding.forget_bound()
 
 
-_HANDLERS = (
-    ("depsgraph_update_post", _on_depsgraph_update),
-    ("frame_change_post", _on_frame_change),
-    ("animation_playback_post", _on_frame_change),
-    ("undo_post", _on_undo),
-    ("redo_post", _on_undo),
-    ("render_init", _on_render),
-    ("load_pre", _forget),
-)
+_HANDLERS = {
+    "depsgraph_update_post": _on_depsgraph_update,
+    "frame_change_post": _on_frame_change,
+    "animation_playback_post": _on_frame_change,
+    "undo_post": _on_undo,
+    "redo_post": _on_undo,
+    "render_init": _on_render,
+    "load_pre": _forget,
+}
 
 
 def attach():
     """Begin to follow the handles."""
-    for name, function in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(function)
+    add_handlers(_HANDLERS)
 
 
 def detach():
     """Follow no more: leave no handler, no timer and no thread behind, and give the memory back."""
-    for name, function in _HANDLERS:
-        getattr(bpy.app.handlers, name).remove(function)
+    remove_handlers(_HANDLERS)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     _forget()
