@@ -8,7 +8,7 @@ from numpy.polynomial import chebyshev
 from scipy.special import expit
 
 from .cloud import read_cloud
-from .curvature import kernel_integral
+from .curvature import kernel_integral, uneven
 from .distances import arc_length
 from .errors import AreaError
 from .images import image_excess, mirror, own_images
@@ -23,6 +23,7 @@ _INDEFINITE = (  # where it is not: its least eigenvalue, then steps of each rou
     (-1.0, ((100, 5e-2), (100, 5e-2))),
 )
 _GROWTH = 4.0  # of a squared residual, that only an eigenvalue below the expected least one can cause
+_EVEN = 1e-9  # changes of h, as a share, that are none
 NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
 TAU = 2.0**-52  # the paper's lower bound of eq. (8), in scaled coordinates
 
@@ -98,6 +99,8 @@ def solve_areas(cloud, distance, options, report=lambda: None):
     lengths = cloud.neighborhoods.lengths
     target = kernel_integral(lengths, cloud.gaussian) + image_excess(lengths, cloud.rim)
     matrix = KernelMatrix(cloud.neighborhoods, distance, cloud.rim, report)
+    if options.curvature_correction:
+        target += _gain(matrix, lengths)
     if options.areas == "fast":
         return fast_areas(matrix, target, cloud.definite)
     if options.areas == "constrained":
@@ -114,6 +117,20 @@ def solve_areas(cloud, distance, options, report=lambda: None):
             count=len(target),
         )
     return solution
+
+
+def _gain(matrix, lengths):
+    """Return what h that varies along the surface adds to the integral of the kernel, (m,).
+
+    ``mu2 (h Laplacian(h) / 4 + |grad h|^2 / 8)``, from means over the kernel: that of f is ``f + mu2 h^2 / 4
+    Laplacian(f)``.
+    """
+    if np.ptp(lengths) <= _EVEN * lengths.mean():
+        return np.zeros(len(lengths))
+    density = 1.0 / (matrix @ np.ones(len(lengths)))
+    total = matrix @ density
+    once, twice = ((matrix @ (density * values)) / (total * values) - 1.0 for values in (lengths, lengths**2))
+    return uneven(0.5 * once + 0.25 * twice)
 
 
 class KernelMatrix:

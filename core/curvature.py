@@ -4,6 +4,7 @@ import numpy as np
 
 from .kernel import SECOND_MOMENT
 
+_UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which it is known
 _LARGEST = 0.3  # most that a curvature term may change an area or a weight, where the fit is poor
 
 
@@ -15,6 +16,11 @@ def kernel_integral(lengths, gaussian):
 def weight_factor(lengths, gaussian):
     """Return the factor of the pair weights, ``1 + mu2 h^2 K / 4``, clipped, (m,); a pair takes its ends' mean."""
     return 1.0 + np.clip(SECOND_MOMENT / 4.0 * lengths**2 * gaussian, -_LARGEST, _LARGEST)
+
+
+def uneven(excess):
+    """Return what an integral of the kernel gains where h varies, next to nothing where it varies too fast to tell."""
+    return excess / (1.0 + (excess / _UNEVEN) ** 2)
 
 
 def mean_curvature(laplacian):

@@ -12,6 +12,7 @@ from .distances import arc_length, projected_distance
 from .errors import InvalidPointsError
 from .images import mirror, own_images
 from .kernel import SECOND_MOMENT, SUPPORT, pair_kernel
+from .moments import balance_weights
 from .options import LaplacianOptions
 from .phrases import Phrase
 from .points import check_points
@@ -248,7 +249,9 @@ def build_laplacian(
     report("Operator", 0.8)
     if not options.curvature_correction:
         distance = projected_distance(pairs, cloud.normals)
-    stiffness, natural, fixed = assemble_stiffness(cloud, distance, solution.areas)
+    stiffness, natural, fixed = assemble_stiffness(
+        cloud, distance, solution.areas, balanced=options.curvature_correction
+    )
     return LaplaceBeltrami(
         points=points,
         surface_points=points + scaled.hand_out(cloud.moved * scaled.scale, 0.0),
@@ -270,7 +273,7 @@ def build_laplacian(
     )
 
 
-def assemble_stiffness(cloud, distance, areas):
+def assemble_stiffness(cloud, distance, areas, balanced):
     """Assemble K = -D G D of eq. (10) for the caller's points.
 
     Points at the same place take equal parts of its area and couple as neighbours at distance zero. The image of a
@@ -284,6 +287,8 @@ def assemble_stiffness(cloud, distance, areas):
         Distance of each pair in the mean-normal plane, or along the surface.
     areas : ndarray, (m,)
         Area elements in scaled coordinates.
+    balanced : bool
+        Give the weights around every point the moments of the kernel, by `balance_weights`.
 
     Returns
     -------
@@ -307,6 +312,8 @@ def assemble_stiffness(cloud, distance, areas):
     own_scale = factor / pairs.lengths**4 * areas**2
     # Weights of pairs, and of points with themselves, without images; then those of the images in one rim.
     plain = pair_kernel(distance / lengths) * scale, pair_kernel(0.0) * own_scale
+    if balanced:
+        plain = plain[0] * balance_weights(cloud, distance, plain[0], areas), plain[1]
     natural, fixed = (tuple(np.zeros_like(part) for part in plain) for _ in range(2))
     for part, images, h, units in (
         (0, mirror(pairs, distance, cloud.rim), lengths, scale),

@@ -39,8 +39,9 @@ class LaplacianOptions:
     regularization : float
         rho of eqs. (7) and (8), in coordinates scaled to a root mean square radius of one.
     curvature_correction : bool
-        Measure distances along the surface and correct areas and weights for its Gaussian curvature. Without it,
-        eqs. (6) and (10) as they stand: distances in space for the areas, in the mean-normal plane for the weights.
+        Measure distances along the surface, correct areas and weights for its Gaussian curvature and for h that varies,
+        and give the weights around every point the moments of the kernel. Without it, eqs. (6) and (10) as they stand:
+        distances in space for the areas, in the mean-normal plane for the weights.
     rims : {"auto", "off"}
         "auto": find where the surface ends, unless the rim is given, and mirror the points there. "off": take the
         surface as closed.

@@ -90,7 +90,7 @@ class TestRelief:
             return areas.sum() / exact - 1.0
 
         assert abs(error(cloud.relief)) < 0.01
-        assert error(np.zeros(len(rough))) < -1.8 * abs(error(cloud.relief))
+        assert error(np.zeros(len(rough))) < -1.5 * abs(error(cloud.relief))
 
     def test_is_its_slope_where_normals_are_smooth(self):
         rough, _ = rough_sphere(fibonacci_sphere(4000), 3, 0.2)
@@ -101,7 +101,7 @@ class TestRelief:
     def test_of_smooth_surfaces_is_none(self, points):
         assert read_cloud(points, LaplacianOptions()).relief.max() < 1e-6
 
-    @pytest.mark.parametrize(("side", "thickness", "most"), [(40, 2, 0.01), (20, 8, 0.016), (20, 20, 0.013)])
+    @pytest.mark.parametrize(("side", "thickness", "most"), [(40, 2, 0.01), (20, 8, 0.018), (20, 20, 0.013)])
     def test_of_sharp_edges_is_little(self, side, thickness, most):
         box, _, _, area = closed_plate(side, thickness)
         assert core.estimate_areas(box).sum() == pytest.approx(area, rel=most)
