@@ -6,16 +6,18 @@ from .kernel import SUPPORT
 
 # Irregularity of the spacing, and h / d100: the widest that it needs, the narrowest that it bears.
 _IRREGULARITY = (0.03, 0.12, 0.24, 0.30)
-_WIDEST = (0.35, 0.65, 0.70, 0.76)
-_NARROWEST = (0.30, 0.30, 0.30, 0.45)
+_WIDEST = (0.35, 0.50, 0.58, 0.62)
+_NARROWEST = (0.30, 0.30, 0.30, 0.38)
+_ROOM = 0.76  # h / d100 up to which it is widened before a place where it is larger
 _BEND = 0.33  # h times the principal curvature: how far the kernel may reach around a bend
 _AROUND = np.pi / SUPPORT  # the same, at most: beyond half a turn the kernel would reach what is on the other side
 _ACROSS = 0.4  # h over the depth of the surface, at most: images know of two rims, not of those on the other side
 _TIGHTEST = 1.2  # spacings that h keeps even there
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
 _SLOPE = 0.02  # most that h grows along the surface, by its length, where there is room for a wider kernel
+_EVEN = 0.12  # changes of log d100 over the cloud for which one h serves as well
 _NOISE = 0.10  # changes of log d100 that may be chance
-_SLOW, _FAST, _LAST = 160, 10, 2  # rounds of averaging over the 40 nearest neighbours
+_SLOW, _FAST, _SMOOTH, _LAST = 160, 10, 12, 2  # rounds of averaging over the 40 nearest neighbours
 
 
 def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, deepest=None):
@@ -41,11 +43,12 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
     ndarray, (m,)
         Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
         twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: the same distance
-        without what may be chance, times a factor between 0.3 and 0.76 that is as large as the irregularity of the
-        spacing demands and the curvature permits. Where the surface bends most, as on a bead of few points, the kernel
-        reaches no further than half a turn; where it is narrow h stays below 0.4 of the depth, the distance of its
-        middle from the rim; but not below 1.2 spacings. Where there is room, up to 0.76 of the distance, it is
-        widened so that it grows by no more than 0.02 of the way along the surface.
+        without what may be chance, and without changes over the part that one h serves as well, times a factor between
+        0.3 and 0.62 that is as large as the irregularity of the spacing demands and the curvature permits. Where the
+        surface bends most, as on a bead of few points, the kernel reaches no further than half a turn; where it is
+        narrow h stays below 0.4 of the depth, the distance of its middle from the rim; but not below 1.2 spacings.
+        Where there is room, up to 0.76 of the distance, it is widened so that it grows by no more than 0.02 of the way
+        along the surface, and smoothed.
     """
     distance = _neighbor_distance(nearest.tree, options.neighbors, label)
     if options.bandwidth == "global":
@@ -59,8 +62,8 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
         own = own + 0.5 * np.log(_share_inside(inside / distance[:, None])).sum(axis=1)
     fast = _repeat(averaging, own, _FAST)
     slow = _repeat(averaging, fast, _SLOW)
-    change = fast - slow
-    reach = slow + np.sign(change) * np.maximum(np.abs(change) - _NOISE, 0.0)
+    typical = _typical(slow, label)
+    reach = typical + _all_beyond(slow - typical, _EVEN) + _beyond(fast - slow, _NOISE)
     irregular = irregularity(nearest, averaging)
     least, most = (np.log(np.interp(irregular, _IRREGULARITY, factors)) for factors in (_NARROWEST, _WIDEST))
     bend = np.log(_BEND / np.maximum(steepest, 1e-30))
@@ -72,8 +75,10 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
     tight = np.log(np.maximum(tight, _TIGHTEST * nearest.spacing))
     length, floor = np.minimum(length, tight), np.minimum(floor, tight)
     length = np.maximum(_repeat(averaging, length, _LAST), floor)
-    widest = np.minimum(np.minimum(bend, tight), np.log(_WIDEST[-1]) + reach)
-    length = np.log(_gently(nearest, np.exp(length), np.exp(np.maximum(widest, length))))
+    widest = np.minimum(np.minimum(bend, tight), np.log(_ROOM) + reach)
+    widest = np.maximum(widest, length)
+    length = np.log(_gently(nearest, np.exp(length), np.exp(widest)))
+    length = np.clip(_repeat(averaging, length, _SMOOTH), floor, widest)
     return options.bandwidth_factor * np.exp(_repeat(averaging, length, _LAST))
 
 
@@ -89,6 +94,26 @@ def _gently(nearest, length, widest):
         if not np.any(wider > 1.001 * length):
             return length
         length = np.maximum(length, wider)
+
+
+def _typical(values, label):
+    """Return the median of the part that a point belongs to, (m,)."""
+    if label is None:
+        return np.median(values)
+    order = np.lexsort((values, label))
+    size = np.bincount(label)
+    first = np.cumsum(size) - size
+    return values[order[first + size // 2]][label]
+
+
+def _beyond(values, least):
+    """Return by how much values exceed the least on either side of zero."""
+    return np.sign(values) * np.maximum(np.abs(values) - least, 0.0)
+
+
+def _all_beyond(values, least):
+    """Return values that are twice the least on either side of zero, or more, and less and less of smaller ones."""
+    return np.sign(values) * np.clip(2.0 * (np.abs(values) - least), 0.0, np.abs(values))
 
 
 def depth(nearest, inside):
