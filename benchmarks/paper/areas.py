@@ -21,7 +21,7 @@ from .clouds import SPHERES, ellipsoid, ellipsoid_area, sphere
 from .pointwise import AT
 
 AXES = 1.5, 1.0, 0.6
-PRODUCTS = 600  # with A that each way may take here; eq. (8) needs some thousands
+PRODUCTS = 400  # with A that each way may take here; eq. (8) needs some thousands
 
 
 def figure_1():
