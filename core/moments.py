@@ -1,4 +1,4 @@
-"""The moments of the pair weights: what makes the operator right, point by point, for slopes and bends."""
+"""Moments of the pair weights: those of the kernel make the operator right at every point, for slopes and bends."""
 
 import numpy as np
 from scipy import sparse
@@ -43,17 +43,17 @@ def balance_weights(cloud, distance, weights, areas):
     lengths = pairs.lengths
     free = cloud.rim.distance[:, 0] >= SUPPORT * lengths
     blocks = list(_Block.of(cloud, distance, weights))
-    moment = 4.0 * areas * _second_moment(cloud, weights, areas)
+    moment = 4.0 * areas * _second_moment(cloud, weights, areas)  # its trace
     # Terms of every point: constant, and the linear and quadratic one as complex numbers in the point's own frame.
     constant = np.zeros(len(areas))
     linear, quadratic = (np.zeros(len(areas), dtype=complex) for _ in range(2))
     for _ in range(_ROUNDS):
-        second, first, traceless = (np.zeros(len(areas), dtype=kind) for kind in (float, complex, complex))
+        trace, slope, traceless = (np.zeros(len(areas), dtype=kind) for kind in (float, complex, complex))
         for block in blocks:
-            block.add_moments(constant, linear, quadratic, second, first, traceless)
+            block.add_moments(constant, linear, quadratic, trace, slope, traceless)
         share = np.where(free, 1.0 / moment, 0.0)
-        constant = np.clip(constant + (1.0 - second * share) * free, -_LARGEST, _LARGEST)
-        linear = _bounded(linear - 4.0 * first * lengths * share)
+        constant = np.clip(constant + (1.0 - trace * share) * free, -_LARGEST, _LARGEST)
+        linear = _bounded(linear - 4.0 * slope * lengths * share)
         quadratic = _bounded(quadratic - 2.0 * traceless * share)
     result = np.empty(len(distance))
     for block in blocks:
@@ -120,14 +120,14 @@ class _Block:
             result += 0.5 * (constant[ends] + bend.real * direction.real - bend.imag * direction.imag)
         return result
 
-    def add_moments(self, constant, linear, quadratic, second, first, traceless):
-        """Add the weights' moments at both ends of each pair."""
+    def add_moments(self, constant, linear, quadratic, trace, slope, traceless):
+        """Add the first moment of the weights, and the trace and the rest of the second, at both ends of each pair."""
         lever = self.weights * self.factor(constant, linear, quadratic) * self.distance
         moment = lever * self.distance
-        shape = len(self.start) - 1, len(second)
+        shape = len(self.start) - 1, len(trace)
         for total, here, there in (
-            (second, moment, moment),
-            (first, lever * self.here, lever * self.there),
+            (trace, moment, moment),
+            (slope, lever * self.here, lever * self.there),
             (traceless, moment * self.here**2, moment * self.there**2),
         ):
             total[self.points] += sparse.csr_array((here, self.second, self.start), shape=shape).sum(axis=1)

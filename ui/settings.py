@@ -137,8 +137,8 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     curvature_correction: BoolProperty(
         name="Curvature Correction",
-        description="Measure distances along the surface and correct areas and weights for its Gaussian curvature,"
-        " which is 0 everywhere without this",
+        description="Measure distances along the surface, correct areas and weights for its Gaussian curvature, which"
+        " is 0 everywhere without this, and balance the weights around each point",
         default=DEFAULTS.curvature_correction,
     )
     symbol_correction: BoolProperty(
