@@ -250,7 +250,7 @@ def build_laplacian(
     if not options.curvature_correction:
         distance = projected_distance(pairs, cloud.normals)
     stiffness, natural, fixed = assemble_stiffness(
-        cloud, distance, solution.areas, balanced=options.curvature_correction
+        cloud, distance, solution.areas, options.curvature_correction, lambda: report("Operator", 0.8)
     )
     return LaplaceBeltrami(
         points=points,
@@ -273,7 +273,7 @@ def build_laplacian(
     )
 
 
-def assemble_stiffness(cloud, distance, areas, balanced):
+def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: None):
     """Assemble K = -D G D of eq. (10) for the caller's points.
 
     Points at the same place take equal parts of its area and couple as neighbours at distance zero. The image of a
@@ -289,6 +289,8 @@ def assemble_stiffness(cloud, distance, areas, balanced):
         Area elements in scaled coordinates.
     balanced : bool
         Give the weights around every point the moments of the kernel, by `balance_weights`.
+    report : callable
+        Called now and then while that is done; may raise `Cancelled`.
 
     Returns
     -------
@@ -313,7 +315,7 @@ def assemble_stiffness(cloud, distance, areas, balanced):
     # Weights of pairs, and of points with themselves, without images; then those of the images in one rim.
     plain = pair_kernel(distance / lengths) * scale, pair_kernel(0.0) * own_scale
     if balanced:
-        plain = plain[0] * balance_weights(cloud, distance, plain[0], areas), plain[1]
+        plain = plain[0] * balance_weights(cloud, distance, plain[0], areas, report), plain[1]
     natural, fixed = (tuple(np.zeros_like(part) for part in plain) for _ in range(2))
     for part, images, h, units in (
         (0, mirror(pairs, distance, cloud.rim), lengths, scale),

@@ -11,7 +11,7 @@ _BLOCK = 1 << 16  # pairs, at least, worked on at one time, so that their tempor
 _LARGEST = 0.1  # most that each term may change a weight
 
 
-def balance_weights(cloud, distance, weights, areas):
+def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     """Find factors of the pair weights that give them the moments of the kernel.
 
     For the operator to be right on every function that is quadratic along the surface, the weights of a point i must
@@ -34,6 +34,8 @@ def balance_weights(cloud, distance, weights, areas):
         Pair weights, areas of both ends included.
     areas : ndarray, (m,)
         Area elements.
+    report : callable
+        Called before each block of pairs; may raise `Cancelled`.
 
     Returns
     -------
@@ -42,7 +44,7 @@ def balance_weights(cloud, distance, weights, areas):
     pairs = cloud.neighborhoods
     lengths = pairs.lengths
     free = cloud.rim.distance[:, 0] >= SUPPORT * lengths
-    blocks = list(_Block.of(cloud, distance, weights))
+    blocks = list(_Block.of(cloud, distance, weights, report))
     moment = 4.0 * areas * _second_moment(cloud, weights, areas)  # its trace
     # Terms of every point: constant, and the linear and quadratic one as complex numbers in the point's own frame.
     constant = np.zeros(len(areas))
@@ -50,6 +52,7 @@ def balance_weights(cloud, distance, weights, areas):
     for _ in range(_ROUNDS):
         trace, slope, traceless = (np.zeros(len(areas), dtype=kind) for kind in (float, complex, complex))
         for block in blocks:
+            report()
             block.add_moments(constant, linear, quadratic, trace, slope, traceless)
         share = np.where(free, 1.0 / moment, 0.0)
         constant = np.clip(constant + (1.0 - trace * share) * free, -_LARGEST, _LARGEST)
@@ -83,7 +86,7 @@ class _Block:
     """The pairs of some points in a row."""
 
     @classmethod
-    def of(cls, cloud, distance, weights):
+    def of(cls, cloud, distance, weights, report):
         """Yield all pairs, block by block."""
         pairs = cloud.neighborhoods
         start = pairs.half(weights).indptr
@@ -94,6 +97,7 @@ class _Block:
         vectors = [np.ascontiguousarray(rows.T) for rows in (pairs.points, cloud.normals, *frames)]
         cuts = np.searchsorted(start, np.arange(0, start[-1], max(_BLOCK, len(start))))
         for low, high in zip(cuts, [*cuts[1:], len(start) - 1], strict=True):
+            report()
             yield cls(cloud, distance, weights, start[low : high + 1], slice(low, high), *vectors)
 
     def __init__(self, cloud, distance, weights, start, rows, points, normals, *frames):
