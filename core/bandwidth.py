@@ -6,7 +6,7 @@ from .kernel import SUPPORT
 
 # Irregularity of the spacing, and h / d100: the widest that it needs, the narrowest that it bears.
 _IRREGULARITY = (0.03, 0.12, 0.24, 0.30)
-_WIDEST = (0.35, 0.50, 0.58, 0.62)
+_WIDEST = (0.37, 0.50, 0.55, 0.58)
 _NARROWEST = (0.30, 0.30, 0.30, 0.38)
 _ROOM = 0.76  # h / d100 up to which it is widened before a place where it is larger
 _BEND = 0.33  # h times the principal curvature: how far the kernel may reach around a bend
@@ -44,7 +44,7 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
         Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
         twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: the same distance
         without what may be chance, and without changes over the part that one h serves as well, times a factor between
-        0.3 and 0.62 that is as large as the irregularity of the spacing demands and the curvature permits. Where the
+        0.3 and 0.58 that is as large as the irregularity of the spacing demands and the curvature permits. Where the
         surface bends most, as on a bead of few points, the kernel reaches no further than half a turn; where it is
         narrow h stays below 0.4 of the depth, the distance of its middle from the rim; but not below 1.2 spacings.
         Where there is room, up to 0.76 of the distance, it is widened so that it grows by no more than 0.02 of the way

@@ -28,8 +28,8 @@ def figure_1():
     """Area elements of a ring torus with and without the optimisation."""
     rows, panels = [], {}
     for sampling, points in {
-        "low-discrepancy": torus_low_discrepancy(32000, 0.8, 0.2),
-        "random": torus_points(32000, 0.8, 0.2),
+        "low-discrepancy": torus_low_discrepancy(16000, 0.8, 0.2),
+        "random": torus_points(16000, 0.8, 0.2),
     }.items():
         options = core.LaplacianOptions.paper()
         cloud = read_cloud(points, options)
@@ -60,7 +60,7 @@ def figure_1():
         "Figure 1: area elements of a ring torus",
         ["points", "areas", "not positive", "deviation / mean", "total", "seconds"],
         rows,
-        "Radii 0.8 and 0.2, 32,000 points. The kernel of the paper's settings, in which a support holds some 900"
+        "Radii 0.8 and 0.2, 16,000 points. The kernel of the paper's settings, in which a support holds some 900"
         f" points, but for the default; each way but the last may take {PRODUCTS} products with A."
         " The paper does not say how its torus was sampled.",
         plots=[plots.histograms("figure01", panels, "area of a point, thousandths")],
