@@ -258,7 +258,7 @@ def test_legend_lies_inside_the_picture_and_is_made_once(extension, display, obj
     written = [part.data.body for part in parts if part.type == "FONT"]
     if texts is None:  # the title, and round numbers inside the range
         assert written[:2] == ["Area", "cm²"]
-        numbers, (low, high) = np.array(written[2:], float), bounds(display, obj)
+        numbers, (low, high) = np.array([text.replace(",", "") for text in written[2:]], float), bounds(display, obj)
         assert len(numbers) >= 3
         assert 1e4 * low <= numbers.min() < numbers.max() <= 1e4 * high
     else:
