@@ -1,6 +1,6 @@
 """Run the benchmarks and write docs/results.md: ``python -m benchmarks.run [name ...]``.
 
-Without names: the evaluation of the paper beside the peers, in less than half an hour. The other tables stay as
+Without names: the evaluation of the paper beside the peers, in 20 minutes. The other tables stay as
 they are until they are named, or ``all``.
 """
 
@@ -74,7 +74,7 @@ def main(names):
         print(tables[table.title], f"({seconds[name]:.0f} s)\n", flush=True)
     summary = Table(SUMMARY, ["quantity", "target", "measured", "met"], [goals[key] for key in sorted(goals)], ABOUT)
     head = (
-        "# Results\n\nMade by `make benchmark`, on two cores in less than half an hour; the tables after the peers'"
+        "# Results\n\nMade by `make benchmark`, on two cores in 20 minutes; the tables after the peers'"
         ' by their names, such as `make benchmark ARGUMENTS="targets applications"`. Times are of the machine it ran'
         f" on, compare only those of one table. Python {platform.python_version()}, numpy {numpy.__version__},"
         f" scipy {scipy.__version__}.\n"
