@@ -5,6 +5,7 @@ from scipy import sparse
 
 from .curvature import uneven, weight_factor
 from .kernel import SECOND_MOMENT, SUPPORT
+from .surface import frames
 
 _ROUNDS = 4
 _BLOCK = 1 << 16  # pairs, at least, worked on at one time, so that their temporaries stay in the cache
@@ -90,31 +91,29 @@ class _Block:
         """Yield all pairs, block by block."""
         pairs = cloud.neighborhoods
         start = pairs.half(weights).indptr
-        across = np.cross(cloud.normals, np.eye(3)[np.abs(cloud.normals).argmin(axis=1)])
-        across /= np.linalg.norm(across, axis=1)[:, None]
-        frames = across, np.cross(cloud.normals, across)
+        tangents = np.moveaxis(frames(cloud.normals)[:, :, 1:], 2, 0)
         # Coordinate by coordinate, which is faster than rows of three.
-        vectors = [np.ascontiguousarray(rows.T) for rows in (pairs.points, cloud.normals, *frames)]
+        vectors = [np.ascontiguousarray(rows.T) for rows in (pairs.points, cloud.normals, *tangents)]
         cuts = np.searchsorted(start, np.arange(0, start[-1], max(_BLOCK, len(start))))
         for low, high in zip(cuts, [*cuts[1:], len(start) - 1], strict=True):
             report()
             yield cls(cloud, distance, weights, start[low : high + 1], slice(low, high), *vectors)
 
-    def __init__(self, cloud, distance, weights, start, rows, points, normals, *frames):
-        pairs, self.points = cloud.neighborhoods, rows
+    def __init__(self, cloud, distance, weights, start, points, places, normals, *tangents):
+        pairs, self.points = cloud.neighborhoods, points
         self.rows = slice(start[0], start[-1])
         self.first, self.second = i, j = pairs.first[self.rows], pairs.second[self.rows]
         self.start = start - start[0]
         self.distance = distance[self.rows]
         self.reach = self.distance / (0.5 * (pairs.lengths[i] + pairs.lengths[j]))
         self.weights = weights[self.rows]
-        chord = [values[j] - values[i] for values in points]
+        chord = [values[j] - values[i] for values in places]
         left, right = ([values[ends] for values in normals] for ends in (i, j))
         side = np.where(_dot(left, right) < 0.0, -1.0, 1.0)
         # How far the geodesic bends away from the chord, to third order, within the tangent plane.
         turn = (side * _dot(chord, right) - _dot(chord, left)) / 6.0
-        self.here = _direction([d + side * turn * n for d, n in zip(chord, right, strict=True)], frames, i)
-        self.there = _direction([turn * n - d for d, n in zip(chord, left, strict=True)], frames, j)
+        self.here = _direction([d + side * turn * n for d, n in zip(chord, right, strict=True)], tangents, i)
+        self.there = _direction([turn * n - d for d, n in zip(chord, left, strict=True)], tangents, j)
 
     def factor(self, constant, linear, quadratic):
         """Return the factor of each pair's weight."""
@@ -142,10 +141,10 @@ def _dot(left, right):
     return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
 
 
-def _direction(way, frames, ends):
+def _direction(way, tangents, ends):
     """Return unit vectors in the tangent planes as complex numbers."""
     result = np.empty(len(ends), dtype=complex)
-    x, y = (_dot(way, [values[ends] for values in axes]) for axes in frames)
+    x, y = (_dot(way, [values[ends] for values in axes]) for axes in tangents)
     size = np.maximum(np.sqrt(x * x + y * y), 1e-300)
     result.real, result.imag = x / size, y / size
     return result
