@@ -37,7 +37,7 @@ def mirror(neighborhoods, distance, rim):
     k (d_i + d_j) of their squared distance along the rim; areas grow by as much.
     """
     lengths = neighborhoods.lengths
-    near = rim.distance[:, 0] < SUPPORT * lengths  # further points have no image within reach
+    near = rim.reached(lengths)  # further points have no image within reach
     known = np.isfinite(rim.distance[:, 0])
     first, second = neighborhoods.first, neighborhoods.second
     pairs = np.zeros(0, dtype=np.intp)
@@ -60,7 +60,7 @@ def mirror(neighborhoods, distance, rim):
 
 def own_images(neighborhoods, rim):
     """Return the images that points have within their own reach, as `mirror` does for pairs."""
-    rows = np.flatnonzero(rim.distance[:, 0] < SUPPORT * neighborhoods.lengths)
+    rows = np.flatnonzero(rim.reached(neighborhoods.lengths))
     d = rim.distance[rows]
     return _images(np.isfinite(d), np.zeros(len(rows)), d, d, rim.curvature[rows], neighborhoods.lengths[rows], rows)
 

@@ -11,7 +11,7 @@ from .curvature import weight_factor
 from .distances import arc_length, projected_distance
 from .errors import InvalidPointsError
 from .images import mirror, own_images
-from .kernel import SECOND_MOMENT, SUPPORT, pair_kernel
+from .kernel import SECOND_MOMENT, pair_kernel
 from .moments import balance_weights
 from .options import LaplacianOptions
 from .phrases import Phrase
@@ -260,7 +260,7 @@ def build_laplacian(
         mean_bend=scaled.hand_out(cloud.mean_bend / scaled.scale, 0.0),
         gaussian_curvature=scaled.hand_out(cloud.gaussian / scaled.scale**2, 0.0),
         boundary=scaled.hand_out(cloud.rim.at_rim, False),
-        near_rim=scaled.hand_out(cloud.rim.distance[:, 0] < SUPPORT * pairs.lengths, False),
+        near_rim=scaled.hand_out(cloud.rim.reached(pairs.lengths), False),
         rim_distance=scaled.hand_out(cloud.rim.distance[:, 0] * scaled.scale, np.inf),
         rim_direction=scaled.hand_out(cloud.rim.outward[:, 0], 0.0),
         component=scaled.hand_out(cloud.label, -1),

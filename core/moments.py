@@ -4,7 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from .curvature import uneven, weight_factor
-from .kernel import SECOND_MOMENT, SUPPORT
+from .kernel import SECOND_MOMENT
 from .surface import frames
 
 _ROUNDS = 4
@@ -44,7 +44,7 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     """
     pairs = cloud.neighborhoods
     lengths = pairs.lengths
-    free = cloud.rim.distance[:, 0] >= SUPPORT * lengths
+    free = ~cloud.rim.reached(lengths)
     blocks = list(_Block.of(cloud, distance, weights, report))
     moment = 4.0 * areas * _second_moment(cloud, weights, areas)  # its trace
     # Terms of every point: constant, and the linear and quadratic one as complex numbers in the point's own frame.

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .components import label_connected
+from .kernel import SUPPORT
 from .nearest import fading_weights
 from .sheets import on_sheet
 from .surface import frames
@@ -53,6 +54,10 @@ class Rim:
     distance: np.ndarray
     curvature: np.ndarray
     outward: np.ndarray
+
+    def reached(self, lengths):
+        """Tell from which points a kernel of these smoothing lengths reaches beyond the rim, (m,) bool."""
+        return self.distance[:, 0] < SUPPORT * lengths
 
 
 def no_rim(count):
