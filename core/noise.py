@@ -9,6 +9,7 @@ from .surface import fit_surface
 _SAMPLE = 2000  # points at which the noise is measured
 _FEW, _MANY = 20, 60  # neighbours of the two fits that tell noise from shape
 _GROWTH = 1.7  # noise misses both alike; shape misses the wide fit more
+_NONE = 0.005  # misfit, as a share of the spacing, that is no noise
 LEAST = 0.02  # noise below this share of the spacing is left alone
 STRONG = 0.25  # noise above this share is smoothed twice
 _NEIGHBORS = 90  # of the fit that points are projected on
@@ -28,10 +29,11 @@ def noise_level(tree, misfit):
     -------
     float
         Median, over a sample of the points, of the misfit of a quadric through 20 neighbours, in units of the spacing;
-        zero where a quadric through 60 neighbours fits so much worse that it is shape, not noise, that it misses.
+        zero where it is below a two-hundredth, or where a quadric through 60 neighbours fits so much worse that it is
+        shape, not noise, that it misses.
     """
     rows = np.arange(0, tree.n, max(1, tree.n // _SAMPLE))
-    if tree.n <= _MANY:
+    if misfit < _NONE or tree.n <= _MANY:
         return 0.0
     distance, index = tree.query(tree.data[rows], k=_MANY + 1, workers=-1)
     spacing = spacing_of(distance)
