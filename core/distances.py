@@ -9,6 +9,7 @@ _BACK = -0.2  # cosine of two oriented normals below which the points lie on two
 
 _PARALLEL = 0.5  # cosine, without its sign, of normals on one sheet where the signs do not tell
 _AGAINST, _BENT = 0.5, 0.25  # turn against the bend, and bend, in radians, that cannot both be true
+_ARC = 0.15  # one less the cosine of two normals, at most, that counts for the sixth order of an arc: not sharp edges
 _STEPS = 8  # nearest neighbours whose chords tell of relief
 _EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
 _LEANING = 0.3  # what normals within sharp features may be off by, as a share of the distance
@@ -38,11 +39,12 @@ def projected_distance(neighborhoods, normals):
 
 
 def arc_length(cloud):
-    """Return the length of the arc that joins each pair within the surface, to fourth order.
+    """Return the length of the arc that joins each pair within the surface.
 
-    ``s^2 = r^2 + (d . (n_j - n_i))^2 / 12 + g max(r^2 - a^2, 0)``. The second term is exact to that order on spheres,
-    cylinders and cones. The third one is the way up and down over relief of mean squared slope g, the mean of both
-    ends' `relief`: finer than the normals tell, but shape. Between points one spacing a apart the chord is that way.
+    ``s^2 = r^2 + (d . (n_j - n_i))^2 (1 / 12 + |n_j - n_i|^2 / 90) + g max(r^2 - a^2, 0)``. The second term is exact to
+    sixth order on spheres and cylinders, to fourth order elsewhere and where normals turn by more than 32 degrees. The
+    third one is the way up and down over relief of mean squared slope g, the mean of both ends' `relief`: finer than
+    the normals tell, but shape. Between points one spacing a apart the chord is that way.
 
     Parameters
     ----------
@@ -58,7 +60,8 @@ def arc_length(cloud):
     result = np.empty(len(neighborhoods.first))
     for block, left, right, cosine in _heights(neighborhoods, cloud.normals):
         turn = np.where(cosine < 0.0, -right, right) - left
-        result[block] = neighborhoods.distance[block] ** 2 + turn**2 / 12.0
+        further = np.minimum(1.0 - np.abs(cosine), _ARC) / 45.0
+        result[block] = neighborhoods.distance[block] ** 2 + turn**2 * (1.0 / 12.0 + further)
     if cloud.relief.any():
         least = neighborhoods.mean(cloud.spacing) ** 2
         result += neighborhoods.mean(cloud.relief) * np.maximum(neighborhoods.distance**2 - least, 0.0)
