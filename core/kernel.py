@@ -19,6 +19,9 @@ NORMALIZATION = 7.0 / (478.0 * np.pi)
 SECOND_MOMENT = 2771.0 / 2868.0
 """Integral of |x|^2 W_1 over the plane: ``mu2`` of the symbol's expansion ``s(t) = t^2 - mu2 t^4 / 8 + ...``."""
 
+FOURTH_MOMENT = 27479.0 / 15774.0
+"""Integral of |x|^4 W_1 over the plane, mu4."""
+
 RESOLVED = 2.2
 """Largest ``t = k h`` whose frequency k is recovered from the symbol without multiplying noise by more than 3."""
 

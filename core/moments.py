@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 
-from .curvature import uneven, weight_factor
+from .curvature import second_moment, uneven
 from .kernel import SECOND_MOMENT
 from .surface import frames
 
@@ -46,7 +46,7 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     lengths = pairs.lengths
     free = ~cloud.rim.reached(lengths)
     blocks = list(_Block.of(cloud, distance, weights, report))
-    moment = 4.0 * areas * _second_moment(cloud, weights, areas)  # its trace
+    moment = 4.0 * areas * _trace(cloud, weights, areas)
     # Terms of every point: constant, and the linear and quadratic one as complex numbers in the point's own frame.
     constant = np.zeros(len(areas))
     linear, quadratic = (np.zeros(len(areas), dtype=complex) for _ in range(2))
@@ -65,18 +65,17 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     return result
 
 
-def _second_moment(cloud, weights, areas):
+def _trace(cloud, weights, areas):
     """Return the trace of the weights' second moments over 4 areas, as the integral gives it, (m,).
 
-    ``1 - mu2 h^2 K / 12``, times the factor that weights have for the curvature, and ``1 + mu2 Laplacian(h^2) / 8``
-    where h varies: pairs are as wide as h is in their middle, which is on the side of the wider kernel more often.
+    That of the curved surface, times ``1 + mu2 Laplacian(h^2) / 8`` where h varies: pairs are as wide as h is in their
+    middle, which is on the side of the wider kernel more often.
     """
     pairs, lengths = cloud.neighborhoods, cloud.neighborhoods.lengths
-    bend = weight_factor(lengths, cloud.gaussian) - 1.0
     squared = lengths**2
     gain = pairs.half(weights * (squared[pairs.second] - squared[pairs.first]))
     gain = (gain.sum(axis=1) - gain.sum(axis=0)) * (SECOND_MOMENT / 8.0) / areas
-    return (1.0 + bend) * (1.0 - 4.0 / 3.0 * bend) * (1.0 + uneven(gain))
+    return second_moment(lengths, cloud.gaussian) * (1.0 + uneven(gain))
 
 
 def _bounded(terms):

@@ -13,8 +13,9 @@ def test_kernel_integrates_to_one_over_the_plane():
     assert planar_integral(k.kernel) == pytest.approx(1.0, abs=1e-12)
 
 
-def test_second_moment():
+def test_moments():
     assert planar_integral(lambda r: r**2 * k.kernel(r)) == pytest.approx(k.SECOND_MOMENT, abs=1e-12)
+    assert planar_integral(lambda r: r**4 * k.kernel(r)) == pytest.approx(k.FOURTH_MOMENT, abs=1e-12)
 
 
 def test_support_ends_at_three():
