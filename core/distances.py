@@ -9,7 +9,7 @@ _BACK = -0.2  # cosine of two oriented normals below which the points lie on two
 
 _PARALLEL = 0.5  # cosine, without its sign, of normals on one sheet where the signs do not tell
 _AGAINST, _BENT = 0.5, 0.25  # turn against the bend, and bend, in radians, that cannot both be true
-_ARC = 0.15  # one less the cosine of two normals, at most, that counts for the sixth order of an arc: not sharp edges
+_ARC = 0.15  # most that the turn of two normals counts for an arc's sixth order, as 1 - cosine: more is a sharp edge
 _STEPS = 8  # nearest neighbours whose chords tell of relief
 _EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
 _LEANING = 0.3  # what normals within sharp features may be off by, as a share of the distance

@@ -47,6 +47,7 @@ def bars(name, panels):
     figure, axes = _panels(len(panels))
     for axis, (title, groups) in zip(axes, panels.items(), strict=False):
         methods = list(dict.fromkeys(method for group in groups.values() for method in group))
+        methods.sort(key=lambda method: not method.startswith("ours"))  # side by side
         width = 0.85 / len(methods)
         for k, method in enumerate(methods):
             heights = [group.get(method, np.nan) for group in groups.values()]
