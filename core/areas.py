@@ -166,9 +166,10 @@ def fast_areas(matrix, target, definite=True):
     are shorter, make up for what that changes at large. A fixed number of linear steps, unlike conjugate gradients,
     does not amplify rounding: the result is the same to 1e-10 for any order of the points.
 
-    Where pairs were left out, between close sheets, or images added, next to rims, M has negative eigenvalues too, most
-    often next to none. What belongs to them, and to positive ones as small, is no smooth part: p leaves it alone. Where
-    they turn out to lie lower than expected, the solution starts anew with less resolved; none lies below -1.
+    Where pairs were left out, between close sheets, or images added, next to rims, or distances are those of noisy
+    points, M has negative eigenvalues too, most often next to none. What belongs to them, and to positive ones as
+    small, is no smooth part: p leaves it alone. Where they turn out to lie lower than expected, the solution starts
+    anew with less resolved; none lies below -1.
 
     Parameters
     ----------
@@ -177,7 +178,7 @@ def fast_areas(matrix, target, definite=True):
     target : ndarray, (n,)
         b, the integral that the kernel should have at each point (1 on a flat surface).
     definite : bool
-        No pairs were left out, and no images added.
+        There is no noise, no pairs were left out, and no images added.
 
     Returns
     -------

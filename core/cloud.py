@@ -49,8 +49,8 @@ class Cloud:
     neighborhoods : Neighborhoods
         Where the operator takes the points to be, smoothing lengths and pairs.
     definite : bool
-        The kernel matrix is the kernel's alone: no pairs within reach were left out because they lie on different
-        sheets, and there are no images in a rim.
+        The kernel matrix is that of a smooth surface: no noise is in its distances, no pairs within reach were left out
+        because they lie on different sheets, and there are no images in a rim.
     notices : list of str
         What a user should know.
     """
@@ -107,9 +107,8 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     if lone or label.max() > 0:
         nearest = find_nearest(move_apart(scaled.points, label))
     surface, nearest = _fit(nearest, options)
-    noise = 0.0
+    noise = noise_level(nearest.tree, np.median(surface.misfit / nearest.spacing))
     if options.projection == "auto":
-        noise = noise_level(nearest.tree, np.median(surface.misfit / nearest.spacing))
         if noise >= LEAST:
             notices.append(Phrase("Noise of {noise:.2f} of the spacing was smoothed within the operator.", noise=noise))
             for _ in range(2 if noise > STRONG else 1):
@@ -150,7 +149,8 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     elif normals is None:
         own = oriented
     flipped = np.sign(np.einsum("ij,ij->i", own, surface.normals))
-    definite = not np.isfinite(rim.distance).any()
+    shape = noise == 0.0 or options.projection != "auto"  # what is finer than the normals
+    definite = noise == 0.0 and not np.isfinite(rim.distance).any()
     report("Neighbors", 0.4)
     if options.sheets:
         same_side = np.sign(np.einsum("ij,ij->i", oriented, surface.normals))
@@ -167,7 +167,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         mean_bend=0.5 * flipped * np.trace(surface.bending, axis1=1, axis2=2),
         gaussian=surface.gaussian if options.curvature_correction else np.zeros(len(own)),
         spacing=nearest.spacing,
-        relief=np.zeros(len(own)) if noise > 0.0 else relief(nearest, surface.normals),
+        relief=relief(nearest, surface.normals) if shape else np.zeros(len(own)),
         rim=rim,
         neighborhoods=pairs,
         definite=definite,

@@ -9,7 +9,7 @@ from .surface import fit_surface
 _SAMPLE = 2000  # points at which the noise is measured
 _FEW, _MANY = 20, 60  # neighbours of the two fits that tell noise from shape
 _GROWTH = 1.7  # noise misses both alike; shape misses the wide fit more
-_NONE = 0.005  # misfit, as a share of the spacing, that is no noise
+_NONE = 5e-4  # misfit, as a share of the spacing, that is no noise
 LEAST = 0.02  # noise below this share of the spacing is left alone
 STRONG = 0.25  # noise above this share is smoothed twice
 _NEIGHBORS = 90  # of the fit that points are projected on
@@ -29,7 +29,7 @@ def noise_level(tree, misfit):
     -------
     float
         Median, over a sample of the points, of the misfit of a quadric through 20 neighbours, in units of the spacing;
-        zero where it is below a two-hundredth, or where a quadric through 60 neighbours fits so much worse that it is
+        zero where it is next to nothing, or where a quadric through 60 neighbours fits so much worse that it is
         shape, not noise, that it misses.
     """
     rows = np.arange(0, tree.n, max(1, tree.n // _SAMPLE))
