@@ -1,7 +1,7 @@
 """Run the benchmarks and write docs/results.md: ``python -m benchmarks.run [name ...]``.
 
-Without names: the evaluation of the paper beside the peers, in 20 minutes. The other tables stay as
-they are until they are named, or ``all``.
+Without names: the evaluation of the paper beside the peers, in 20 minutes. The other tables stay as they are until
+they are named, or ``all``.
 """
 
 import platform

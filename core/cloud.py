@@ -149,7 +149,6 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     elif normals is None:
         own = oriented
     flipped = np.sign(np.einsum("ij,ij->i", own, surface.normals))
-    shape = noise == 0.0 or options.projection != "auto"  # what is finer than the normals
     definite = noise == 0.0 and not np.isfinite(rim.distance).any()
     report("Neighbors", 0.4)
     if options.sheets:
@@ -167,7 +166,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         mean_bend=0.5 * flipped * np.trace(surface.bending, axis1=1, axis2=2),
         gaussian=surface.gaussian if options.curvature_correction else np.zeros(len(own)),
         spacing=nearest.spacing,
-        relief=relief(nearest, surface.normals) if shape else np.zeros(len(own)),
+        relief=np.zeros(len(own)) if noise > 0.0 and options.projection == "auto" else relief(nearest, surface.normals),
         rim=rim,
         neighborhoods=pairs,
         definite=definite,

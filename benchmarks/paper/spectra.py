@@ -23,7 +23,8 @@ from .clouds import SPHERES, UNIFORM, sphere
 from .pointwise import AT, label_of, methods_at
 
 MODES = 100
-WIDE, WIDER = "h = 0.55 d100", core.LaplacianOptions(bandwidth="global", bandwidth_factor=0.55)
+FIXED = core.LaplacianOptions(bandwidth="global", bandwidth_factor=0.55)
+WIDTH = f"h = {FIXED.bandwidth_factor} d100"
 LARGEST = {"pcl": 8000, "tufted": 32000, "cotangent": 32000}  # points of Figure 6 that do not take minutes
 NOISE = (0.05, 0.1, 0.25, 0.5, 1.0)  # of the spacing
 FLATTENED = (0.1, 1.0)  # the levels at which the paper's way is shown
@@ -83,11 +84,11 @@ def figure_6():
         "torus, low-discrepancy": (torus_low_discrepancy, torus_eigenvalues(60), (2000, 8000, 32000, 128000)),
     }
     for shape, (make, exact, counts) in shapes.items():
-        for label in ("ours", f"ours, {WIDE}", "pcl", "tufted", "cotangent"):
+        for label in ("ours", f"ours, {WIDTH}", "pcl", "tufted", "cotangent"):
             method = label.partition(", ")[0]
             if METHODS[method].mesh and shape.startswith("torus"):
                 continue
-            settings = {"options": WIDER} if label.endswith(WIDE) else {}
+            settings = {"options": FIXED} if label.endswith(WIDTH) else {}
             found = {}
             for count in counts:
                 if count > LARGEST.get(method, np.inf):
@@ -101,7 +102,7 @@ def figure_6():
                 rows.append([shape, label_of(label), f"{count:,}", *summary(off), str(len(off)), slope])
             panels.setdefault(shape, {})[label] = (list(found), list(found.values()))
             if method == "ours" and not shape.endswith("random"):
-                way = "default" if label == method else WIDE
+                way = "default" if label == method else WIDTH
                 whole = step_order(found, counts[0], counts[-1])
                 quantity = f"Figure 6: order of the eigenvalues, {shape}, {way}, {counts[0]:,} to {counts[-1]:,}"
                 goals.append(goal(quantity, ">= 4", f"{whole:.2f}", whole >= 4.0))
@@ -111,7 +112,8 @@ def figure_6():
         rows,
         "Relative errors; the order is in the spacing, from the row before. The default's kernel holds about 120 points"
         " of an even cloud and comes to the noise of its sums, below 1e-6, at 32,000 points; with twice as many,"
-        ' `bandwidth="global"`, `bandwidth_factor=0.55`, errors are larger and fall with the fourth order throughout.',
+        f' `bandwidth="global"`, `bandwidth_factor={FIXED.bandwidth_factor}`, errors are larger and fall with the'
+        " fourth order throughout.",
         plots=[plots.convergence("figure06", panels)],
         goals=goals,
     )
