@@ -111,10 +111,8 @@ def solve_areas(cloud, distance, options, report=lambda: None):
     bad = int(np.count_nonzero(solution.areas <= 0.0))
     if bad:
         raise AreaError(
-            "The regularized areas of {bad} of {count} points are not positive. Choose the areas option 'fast' or"
-            " 'constrained', or raise the regularization.",
-            bad=bad,
-            count=len(target),
+            f"The regularized areas of {bad} of {len(target)} points are not positive. Choose the areas option"
+            " 'fast' or 'constrained', or raise the regularization."
         )
     return solution
 

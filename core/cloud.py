@@ -14,7 +14,6 @@ from .neighbors import Neighborhoods, find_pairs
 from .noise import LEAST, STRONG, noise_level, project_points
 from .normals import covariance_normals, orient_normals, unit_normals, unsure_orientation
 from .options import LaplacianOptions
-from .phrases import Phrase
 from .points import ScaledPoints, as_mask, check_distances, check_points, scale_points
 from .rims import FEWEST, Rim, find_rim_points, given_rim, measure_rim, no_rim
 from .sheets import fit_sheets
@@ -96,9 +95,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     scaled = scale_points(points, options.neighbors + 1)
     notices = []
     if scaled.duplicates:
-        notices.append(
-            Phrase("Points that lie exactly on another one: {count}. They share one area.", count=scaled.duplicates)
-        )
+        notices.append(f"Points that lie exactly on another one: {scaled.duplicates}. They share one area.")
     nearest = find_nearest(scaled.points)
     label = label_islands(nearest)
     lone = np.count_nonzero(label < 0)
@@ -110,7 +107,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     noise = noise_level(nearest.tree, np.median(surface.misfit / nearest.spacing))
     if options.projection == "auto":
         if noise >= LEAST:
-            notices.append(Phrase("Noise of {noise:.2f} of the spacing was smoothed within the operator.", noise=noise))
+            notices.append(f"Noise of {noise:.2f} of the spacing was smoothed within the operator.")
             for _ in range(2 if noise > STRONG else 1):
                 nearest = find_nearest(project_points(nearest.points, "quadric", label))
             surface, nearest = _fit(nearest, options)
@@ -125,7 +122,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
             scaled, label = _leave_out(scaled, sheets, options)
             surface, nearest = _fit(find_nearest(move_apart(scaled.points, label) + moved), options)
     if lone:
-        notices.append(Phrase("Points that lie apart from the rest, left out of the operator: {lone}.", lone=lone))
+        notices.append(f"Points that lie apart from the rest, left out of the operator: {lone}.")
 
     own = surface.normals if normals is None else unit_normals(normals, len(points))[scaled.first]
     oriented = orient_normals(nearest, own)
@@ -136,10 +133,8 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     lengths = smoothing_lengths(nearest, options, label, surface.steepest, rim.distance, deepest)
     if np.mean(lengths > _NARROW * deepest) > _MANY:
         notices.append(
-            Phrase(
-                "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off"
-                " by 10 % and more. Add points."
-            )
+            "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be"
+            " off by 10 % and more. Add points."
         )
     found = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3))
     pairs = Neighborhoods(nearest.points, lengths, *found)
@@ -211,9 +206,7 @@ def _rim(nearest, normals, options, scaled, boundary, boundary_distance):
         at_rim = as_mask(boundary, len(scaled.inverse))[scaled.first]
         if 0 < np.count_nonzero(at_rim) < FEWEST:
             raise InvalidPointsError(
-                "The rim is given by {count} different points. Give at least {fewest}, or none.",
-                count=np.count_nonzero(at_rim),
-                fewest=FEWEST,
+                f"The rim is given by {np.count_nonzero(at_rim)} different points. Give at least {FEWEST}, or none."
             )
     elif options.rims == "auto":
         at_rim = find_rim_points(nearest, normals)
@@ -236,10 +229,8 @@ def _leave_out(scaled, label, options):
     count, left = np.count_nonzero(out), np.count_nonzero(~out)
     if left < max(options.neighbors + 1, count):
         raise IslandError(
-            "{lone} of {count} points lie apart from each other, in islands of too few points. Use points of a"
-            " surface, or delete the lone ones.",
-            lone=count,
-            count=len(label),
+            f"{count} of {len(label)} points lie apart from each other, in islands of too few points. Use points"
+            " of a surface, or delete the lone ones."
         )
     return scaled.leave_out(out), label[~out]
 

@@ -5,7 +5,6 @@ from scipy import sparse
 
 from .dissection import dissection_order
 from .errors import InvalidPointsError, PointCloudError
-from .phrases import Phrase
 from .points import as_indices
 from .rotations import nearest_rotations
 from .solvers import drop_faint_pairs, factorize, narrow_laplacian
@@ -90,8 +89,8 @@ class Deformer:
         report = progress or (lambda stage, fraction: None)
         n = len(laplacian.points)
         self.points = laplacian.points
-        self.handles = as_indices(handles, n, Phrase("handles"))
-        self.anchors = as_indices(anchors, n, Phrase("anchors"))
+        self.handles = as_indices(handles, n, "handles")
+        self.anchors = as_indices(anchors, n, "anchors")
         self.rotation_aware = bool(rotation_aware)
         self.steps, self.converged, self.notices = 0, True, []
         held = np.concatenate([self.handles, self.anchors])
@@ -171,7 +170,7 @@ class Deformer:
             Positions of the wrong shape or type, or not finite.
         """
         report = progress or (lambda stage, fraction: None)
-        target = _check_positions(handle_positions, len(self.handles), Phrase("handle positions"), Phrase("handle"))
+        target = _check_positions(handle_positions, len(self.handles), ("handle positions"), "handle")
         target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
         result = self.points.copy()
         loose = self._row < 0
@@ -196,7 +195,7 @@ class Deformer:
         if start is None or not self.rotation_aware or steps < 1:
             now = place(0.0)
         else:
-            now = _check_positions(start, len(self.points), Phrase("starting points"), Phrase("point"))[self._moving]
+            now = _check_positions(start, len(self.points), ("starting points"), "point")[self._moving]
         step, converged = 0, True
         if self.rotation_aware and steps > 0:
             at_rest = self._turned(turn, self._differential)
@@ -251,7 +250,7 @@ class Deformer:
         both = len(held) - len(np.unique(held))
         if both:
             raise PointCloudError(
-                "{both} points are handles and anchors at once. Take them out of one of the two sets.", both=both
+                f"{both} points are handles and anchors at once. Take them out of one of the two sets."
             )
 
     def _choose_moving(self, component, held, weights):
@@ -265,19 +264,13 @@ class Deformer:
         parts = len(np.unique(component[component >= 0])) - len(known)
         if lone:
             self.notices.append(
-                Phrase(
-                    "{lone} points belong to no surface. They stay where they are, unless they are handles.", lone=lone
-                )
+                f"{lone} points belong to no surface. They stay where they are, unless they are handles."
             )
         if parts:
             free = len(component) - lone - len(self._moving)
             self.notices.append(
-                Phrase(
-                    "{parts} connected parts with {free} points have neither handles nor anchors. They stay where"
-                    " they are.",
-                    parts=parts,
-                    free=free,
-                )
+                f"{parts} connected parts with {free} points have neither handles nor anchors. They stay where"
+                " they are."
             )
 
 
@@ -315,15 +308,12 @@ def _check_weights(weights, count):
     given = np.asarray(weights)
     if given.dtype.kind not in "iuf" or given.shape not in ((), (count,)):
         raise PointCloudError(
-            "Weights have the shape {shape} and type {type}. Give one number, or {count}: one per handle, then"
-            " one per anchor.",
-            shape=given.shape,
-            type=given.dtype,
-            count=count,
+            f"Weights have the shape {given.shape} and type {given.dtype}. Give one number, or {count}: one per"
+            " handle, then one per anchor."
         )
     bad = int(np.count_nonzero(~(given >= 0.0)))
     if bad:
-        raise PointCloudError("{bad} weights are negative or NaN. Use numbers from zero to infinity.", bad=bad)
+        raise PointCloudError(f"{bad} weights are negative or NaN. Use numbers from zero to infinity.")
     if not given.any():
         raise PointCloudError("All weights are zero, so nothing holds the surface. Use some above zero.")
     return np.broadcast_to(given.astype(np.float64), (count,))
@@ -334,29 +324,17 @@ def _check_positions(positions, count, name, singular):
     try:
         given = np.asarray(positions)
     except ValueError as error:
-        raise InvalidPointsError(
-            "The {name} must be an array of shape ({count}, 3): {error}.", name=name, count=count, error=str(error)
-        ) from error
+        raise InvalidPointsError(f"The {name} must be an array of shape ({count}, 3): {error}.") from error
     if given.shape != (count, 3) or given.dtype.kind not in "iuf":
         raise InvalidPointsError(
-            "The {name} have the shape {shape} and type {type}, not ({count}, 3) real numbers. Give x, y, z for"
-            " each {singular}.",
-            name=name,
-            shape=given.shape,
-            type=given.dtype,
-            count=count,
-            singular=singular,
+            f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers."
+            f" Give x, y, z for each {singular}."
         )
     bad = int(np.count_nonzero(~(np.abs(given) < _HUGE).all(axis=1)))
     if bad:
         raise InvalidPointsError(
-            "{bad} of {count} {name} are not finite (NaN or infinity), or beyond {huge:g}. Give a place for each"
-            " {singular}.",
-            bad=bad,
-            count=count,
-            name=name,
-            huge=_HUGE,
-            singular=singular,
+            f"{bad} of {count} {name} are not finite (NaN or infinity), or beyond {_HUGE:g}. Give a place for"
+            f" each {singular}."
         )
     return given.astype(np.float64)
 

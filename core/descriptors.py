@@ -3,7 +3,6 @@
 import numpy as np
 
 from .errors import PointCloudError
-from .phrases import Phrase
 
 _ZERO = 1e-8  # eigenvalues below this share of 4 pi / area belong to constants
 _RANGE = 4.0 * np.log(10.0)  # of eigenvalue times time: what is left at its end is 1e-4
@@ -71,12 +70,10 @@ def heat_kernel_signature(spectrum, times=None, count=100, normalized=False):
     ----------
     Sun, Ovsjanikov, Guibas. A concise and provably informative multi-scale signature based on heat diffusion. 2009.
     """
-    times = signature_times(spectrum, count) if times is None else _numbers(times, Phrase("Times"))
+    times = signature_times(spectrum, count) if times is None else _numbers(times, "Times")
     if np.any(times < 0.0):
         raise PointCloudError(
-            "{bad} of {count} times are negative. Use times from 0 up.",
-            bad=np.count_nonzero(times < 0.0),
-            count=len(times),
+            f"{np.count_nonzero(times < 0.0)} of {len(times)} times are negative. Use times from 0 up."
         )
     decay = np.exp(-np.outer(spectrum.eigenvalues, times))
     if normalized:
@@ -113,7 +110,7 @@ def wave_kernel_signature(spectrum, energies=None, count=100):
     ----------
     Aubry, Schlickewei, Cremers. The wave kernel signature: a quantum mechanical approach to shape analysis. 2011.
     """
-    energies = signature_energies(spectrum, count) if energies is None else _numbers(energies, Phrase("Energies"))
+    energies = signature_energies(spectrum, count) if energies is None else _numbers(energies, "Energies")
     constant, values = _nonzero(spectrum)
     width = _window(spectrum)[2]
     exponent = -((energies - np.log(values)[:, None]) ** 2) / (2.0 * width**2)
@@ -128,8 +125,7 @@ def _nonzero(spectrum):
     constant = int(np.searchsorted(values, _ZERO * 4.0 * np.pi * inverse_area))
     if constant == len(values):
         raise PointCloudError(
-            "The {count} modes of the spectrum are constants, which tell no points apart. Compute more modes.",
-            count=len(values),
+            f"The {len(values)} modes of the spectrum are constants, which tell no points apart. Compute more modes."
         )
     return constant, values[constant:]
 
@@ -140,7 +136,7 @@ def _window(spectrum):
     low, high = logarithms[0], logarithms[-1]
     if high - low < 1e-6:
         raise PointCloudError(
-            "The {count} modes above the constants have the same eigenvalue. Compute more modes.", count=len(logarithms)
+            f"The {len(logarithms)} modes above the constants have the same eigenvalue. Compute more modes."
         )
     return low, high, _WIDTH * (high - low)
 
@@ -149,17 +145,12 @@ def _numbers(given, name):
     values = np.asarray(given)
     if values.ndim != 1 or values.size == 0 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
         raise PointCloudError(
-            "{name} have the shape {shape} and type {type}. Give a row of finite numbers, at least one.",
-            name=name,
-            shape=values.shape,
-            type=values.dtype,
+            f"{name} have the shape {values.shape} and type {values.dtype}. Give a row of finite numbers, at least one."
         )
     return values.astype(np.float64)
 
 
 def _at_least_one(count):
     if int(count) != count or count < 1:
-        raise PointCloudError(
-            "{count!r} values per point were asked for. Use a whole number of at least 1.", count=count
-        )
+        raise PointCloudError(f"{count!r} values per point were asked for. Use a whole number of at least 1.")
     return int(count)

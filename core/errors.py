@@ -1,41 +1,8 @@
 """Typed errors of the mathematics: every text says what is wrong, how many points, and what to do."""
 
-from functools import partial
-
-from .phrases import Phrase
-
 
 class PointCloudError(ValueError):
-    """A point cloud, or a question asked of it, that has no sound answer.
-
-    Parameters
-    ----------
-    template : str
-        What to say, with a field for each value.
-    values : object
-        What goes into the fields, as in a `Phrase`.
-    """
-
-    def __init__(self, template, /, **values):
-        super().__init__(Phrase(template, **values))
-
-    def __reduce__(self):  # to copy and pickle it: what it says is no template
-        return partial(type(self), self.template, **self.values), (), self.__dict__
-
-    @property
-    def text(self) -> Phrase:
-        """What it says, which can be translated."""
-        return self.args[0]
-
-    @property
-    def template(self):
-        """What it says, with fields for the values."""
-        return self.text.template
-
-    @property
-    def values(self):
-        """What is in the fields, by name."""
-        return self.text.values
+    """A point cloud, or a question asked of it, that has no sound answer."""
 
 
 class InvalidPointsError(PointCloudError):
@@ -67,8 +34,8 @@ class UnresolvedModesError(PointCloudError):
         How many are resolved, from the lowest on.
     """
 
-    def __init__(self, template, /, *, resolved, **values):
-        super().__init__(template, resolved=resolved, **values)
+    def __init__(self, text, resolved=0):
+        super().__init__(text)
         self.resolved = resolved
 
 

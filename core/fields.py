@@ -154,21 +154,17 @@ def read_values(fixed, values, count):
     given = np.zeros(0) if values is None else np.asarray(values)
     if given.dtype.kind not in "biuf" or (given.shape not in ((), (len(index),))):
         raise InvalidPointsError(
-            "Values have the shape {shape} and type {type} for {count} fixed points. Give one number for each of them.",
-            shape=given.shape,
-            type=given.dtype,
-            count=len(index),
+            f"Values have the shape {given.shape} and type {given.dtype} for {len(index)} fixed points. Give one"
+            " number for each of them."
         )
     given = np.broadcast_to(given.astype(np.float64).ravel(), len(index))
     bad = np.count_nonzero(~np.isfinite(given))
     if bad:
-        raise InvalidPointsError(
-            "{bad} of {count} fixed values are not finite (NaN or infinity). Replace them.", bad=bad, count=len(given)
-        )
+        raise InvalidPointsError(f"{bad} of {len(given)} fixed values are not finite (NaN or infinity). Replace them.")
     index, first, row = np.unique(index, return_index=True, return_inverse=True)
     torn = np.count_nonzero(given != given[first][row])
     if torn:
-        raise InvalidPointsError("{torn} fixed points have two different values. Give each point one value.", torn=torn)
+        raise InvalidPointsError(f"{torn} fixed points have two different values. Give each point one value.")
     return index, given[first]
 
 
@@ -176,16 +172,12 @@ def _read_source(source, count):
     given = np.asarray(source)
     if given.dtype.kind not in "biuf" or given.shape not in ((), (count,)):
         raise InvalidPointsError(
-            "The source has the shape {shape} and type {type}. Give one number for each of the {count} points.",
-            shape=given.shape,
-            type=given.dtype,
-            count=count,
+            f"The source has the shape {given.shape} and type {given.dtype}. Give one number for each of the"
+            f" {count} points."
         )
     bad = np.count_nonzero(~np.isfinite(given))
     if bad:
-        raise InvalidPointsError(
-            "{bad} of {count} values of the source are not finite. Replace them.", bad=bad, count=count
-        )
+        raise InvalidPointsError(f"{bad} of {count} values of the source are not finite. Replace them.")
     return np.broadcast_to(given.astype(np.float64), count)
 
 
@@ -202,11 +194,9 @@ def _without_mean(areas, source, part, rows):
     wrong = np.flatnonzero(np.abs(mean) > _MEAN * size)
     if len(wrong):
         raise PointCloudError(
-            "The source has the mean {mean:.3g} over a connected part of {count} points where nothing is fixed:"
-            " only sources of mean zero have a solution there. Subtract the area-weighted mean of each part, or"
-            " fix a point.",
-            mean=mean[wrong[0]],
-            count=np.count_nonzero(part == part[rows[wrong[0]]]),
+            f"The source has the mean {mean[wrong[0]]:.3g} over a connected part of"
+            f" {np.count_nonzero(part == part[rows[wrong[0]]])} points where nothing is fixed: only sources of"
+            " mean zero have a solution there. Subtract the area-weighted mean of each part, or fix a point."
         )
     result = source.copy()
     result[rows] -= mean

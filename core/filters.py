@@ -25,9 +25,7 @@ def exponential(time):
         [L^2], not negative. Details of a wavelength below about ``6 sqrt(time)`` fade.
     """
     if not 0.0 <= time < np.inf:
-        raise PointCloudError(
-            "The time of an exponential response is {time!r}. Use a number that is not negative.", time=time
-        )
+        raise PointCloudError(f"The time of an exponential response is {time!r}. Use a number that is not negative.")
     return lambda eigenvalues: np.exp(-time * np.asarray(eigenvalues))
 
 
@@ -42,9 +40,9 @@ def fairing(time, order=3):
         1 for the flow of heat, 2 or 3 for a sharper line between what stays and what goes.
     """
     if not 0.0 <= time < np.inf:
-        raise PointCloudError("The time of the fairing is {time!r}. Use a number that is not negative.", time=time)
+        raise PointCloudError(f"The time of the fairing is {time!r}. Use a number that is not negative.")
     if order not in (1, 2, 3):
-        raise PointCloudError("The order of the fairing is {order!r}. Use 1, 2 or 3.", order=order)
+        raise PointCloudError(f"The order of the fairing is {order!r}. Use 1, 2 or 3.")
     return lambda eigenvalues: 1.0 / (1.0 + (time * np.asarray(eigenvalues)) ** order)
 
 
@@ -62,11 +60,8 @@ def band(low, high=np.inf, softness=0.1):
     """
     if not (0.0 <= low < high and softness > 0.0):
         raise PointCloudError(
-            "A band from {low!r} to {high!r} with softness {softness!r} is empty. Use 0 <= low < high and a"
-            " softness above zero.",
-            low=low,
-            high=high,
-            softness=softness,
+            f"A band from {low!r} to {high!r} with softness {softness!r} is empty. Use 0 <= low < high and a"
+            " softness above zero."
         )
 
     def respond(eigenvalues):
@@ -91,7 +86,7 @@ def boost(gain, low, high=np.inf, softness=0.25):
         As for `band`. With an infinite high, noise grows as well.
     """
     if not np.isfinite(gain):
-        raise PointCloudError("The gain of the details is {gain!r}. Use a finite number.", gain=gain)
+        raise PointCloudError(f"The gain of the details is {gain!r}. Use a finite number.")
     part = band(low, high, softness)
     return lambda eigenvalues: 1.0 + (gain - 1.0) * part(eigenvalues)
 
@@ -134,9 +129,7 @@ def spectral_filter(values, spectrum, areas, response, rest=0.0):
     values = check_values(values, n)
     areas = check_values(areas, n)
     if areas.ndim != 1:
-        raise InvalidPointsError(
-            "Areas have the shape {shape}. Give one area for each of the {n} points.", shape=areas.shape, n=n
-        )
+        raise InvalidPointsError(f"Areas have the shape {areas.shape}. Give one area for each of the {n} points.")
     if callable(response):
         factors = respond(response, spectrum.eigenvalues)
     else:
@@ -256,10 +249,8 @@ def _polynomial(response, top, tolerance):
     error = np.abs(np.polynomial.chebyshev.chebval(np.cos(angle), coefficients) - factors).max()
     if error > _ROUGH * largest:
         raise PointCloudError(
-            "The response changes too abruptly for a polynomial: at degree {degree} it is off by {share:.0%}."
-            " Soften it, or compute a spectrum first.",
-            degree=_DEGREE,
-            share=error / largest,
+            f"The response changes too abruptly for a polynomial: at degree {_DEGREE} it is off by"
+            f" {error / largest:.0%}. Soften it, or compute a spectrum first."
         )
     return coefficients
 
@@ -269,21 +260,15 @@ def respond(response, eigenvalues):
     factors = np.asarray(response(eigenvalues))
     if factors.shape not in ((), eigenvalues.shape) or factors.dtype.kind not in "iufb":
         raise PointCloudError(
-            "The response gives an array of shape {shape} and type {type} for {count} eigenvalues. Let it return"
-            " one real number for each.",
-            shape=factors.shape,
-            type=factors.dtype,
-            count=len(eigenvalues),
+            f"The response gives an array of shape {factors.shape} and type {factors.dtype} for"
+            f" {len(eigenvalues)} eigenvalues. Let it return one real number for each."
         )
     factors = np.broadcast_to(factors, eigenvalues.shape).astype(np.float64)
     bad = ~np.isfinite(factors)
     if bad.any():
         raise PointCloudError(
-            "The response is not finite for {bad} of {count} eigenvalues, the first of them {first:.3g}. Let it"
-            " return finite numbers from zero up.",
-            bad=np.count_nonzero(bad),
-            count=len(bad),
-            first=eigenvalues[bad].min(),
+            f"The response is not finite for {np.count_nonzero(bad)} of {len(bad)} eigenvalues, the first of"
+            f" them {eigenvalues[bad].min():.3g}. Let it return finite numbers from zero up."
         )
     return factors
 
@@ -293,17 +278,13 @@ def check_modes(count, spectrum, areas):
     held = len(spectrum.eigenvalues)
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= held:
         raise PointCloudError(
-            "The first {count!r} modes were to be kept, and the spectrum holds {held}. Use a whole number from 1"
-            " to {held}, or compute more modes.",
-            count=count,
-            held=held,
+            f"The first {count!r} modes were to be kept, and the spectrum holds {held}. Use a whole number from"
+            f" 1 to {held}, or compute more modes."
         )
     constant = int(np.count_nonzero(spectrum.eigenvalues < _ZERO * 4.0 * np.pi / areas.sum()))
     if count < constant:
         raise PointCloudError(
-            "The first {constant} modes are the constants of as many separate parts, and {count} of them cannot"
-            " be chosen. Keep at least {constant} modes.",
-            constant=constant,
-            count=count,
+            f"The first {constant} modes are the constants of as many separate parts, and {count} of them cannot"
+            f" be chosen. Keep at least {constant} modes."
         )
     return int(count)

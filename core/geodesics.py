@@ -52,9 +52,8 @@ def geodesic_distance(laplacian, sources, progress=None):
     known = np.flatnonzero(chosen & (laplacian.component >= 0))
     if not len(known):
         raise InvalidPointsError(
-            "All {count} sources are points that the operator left out, because they lie apart from the surface."
-            " Choose points of the surface.",
-            count=np.count_nonzero(chosen),
+            f"All {np.count_nonzero(chosen)} sources are points that the operator left out, because they lie"
+            " apart from the surface. Choose points of the surface."
         )
     report("Lengths", 0.0)
     graph = _lengths_of_pairs(laplacian)

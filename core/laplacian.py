@@ -14,7 +14,6 @@ from .images import mirror, own_images
 from .kernel import SECOND_MOMENT, pair_kernel
 from .moments import balance_weights
 from .options import LaplacianOptions
-from .phrases import Phrase
 from .points import check_points
 from .spectrum import Spectrum, correct_eigenvalues, solve_spectrum
 
@@ -124,9 +123,7 @@ class LaplaceBeltrami:
         values = np.asarray(values, dtype=np.float64)
         if values.ndim not in (1, 2) or len(values) != len(self.areas):
             raise InvalidPointsError(
-                "Values have the shape {shape}, the operator {count} points. Give one row per point.",
-                shape=values.shape,
-                count=len(self.areas),
+                f"Values have the shape {values.shape}, the operator {len(self.areas)} points. Give one row per point."
             )
         areas, lengths = self.areas, self.smoothing_lengths
         if values.ndim == 2:
@@ -232,19 +229,15 @@ def build_laplacian(
     scaled, pairs, notices = cloud.scaled, cloud.neighborhoods, cloud.notices
     if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
         notices.append(
-            Phrase(
-                "The kernel of most points reaches over a third of the object, which is too wide for good results. Add"
-                " points, or lower the number of neighbors."
-            )
+            "The kernel of most points reaches over a third of the object, which is too wide for good results."
+            " Add points, or lower the number of neighbors."
         )
 
     report("Areas", 0.5)
     distance = arc_length(cloud) if options.curvature_correction else pairs.distance
     solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
     if not solution.converged:
-        notices.append(
-            Phrase("The areas stopped after {steps} steps, close to their best values.", steps=solution.products)
-        )
+        notices.append(f"The areas stopped after {solution.products} steps, close to their best values.")
 
     report("Operator", 0.8)
     if not options.curvature_correction:

@@ -10,7 +10,6 @@ from .errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloudE
 from .laplacian import LaplaceBeltrami, build_laplacian
 from .nearest import find_nearest
 from .options import LaplacianOptions
-from .phrases import Phrase
 from .points import as_mask, check_points
 from .rim_curve import RimCurve
 from .rims import FEWEST
@@ -134,10 +133,8 @@ def minimal_surface(
     fixed = as_mask(fixed, len(points))
     if not epsilon >= 0.0 or int(max_steps) != max_steps or max_steps < 0:
         raise InvalidPointsError(
-            "A tolerance of {epsilon!r} and {max_steps!r} steps were asked for. Give a tolerance of at least 0"
-            " and a whole number of steps.",
-            epsilon=epsilon,
-            max_steps=max_steps,
+            f"A tolerance of {epsilon!r} and {max_steps!r} steps were asked for. Give a tolerance of at least 0"
+            " and a whole number of steps."
         )
     options = replace(options, projection="off")
     first = build_laplacian(points, options=options, progress=progress)
@@ -145,7 +142,7 @@ def minimal_surface(
     state = film.state(points, first)
     initial_area, bent = state.area, max(_NECK, state.bent)
     area_history = []
-    reason = Phrase("step limit")
+    reason = "step limit"
     try:
         while len(area_history) < max_steps:
             before = state
@@ -155,14 +152,14 @@ def minimal_surface(
                 break
             area_history.append(state.area)
             if callback is not None and callback(len(area_history), state.points.copy(), state.area) is False:
-                reason = Phrase("stopped")
+                reason = "stopped"
                 break
             settled = state.definite and state.savings <= _SURPLUS * epsilon * state.area
             if settled and abs(state.area - before.area) < epsilon * state.area:
-                reason = Phrase("converged")
+                reason = "converged"
                 break
     except Cancelled:
-        reason = Phrase("cancelled")
+        reason = "cancelled"
     return MinimalSurface(
         points=state.points,
         areas=state.laplacian.areas,
@@ -177,25 +174,18 @@ def minimal_surface(
 
 def _notices(reason, steps):
     texts = {
-        "step limit": Phrase(
-            "The surface had not settled after {steps} steps. Allow more steps, or a larger tolerance.", steps=steps
+        "step limit": (f"The surface had not settled after {steps} steps. Allow more steps, or a larger tolerance."),
+        "stopped": (f"The iteration was stopped after {steps} steps, before the surface had settled."),
+        "pinching": (
+            f"The surface pinches: after {steps} steps the points no longer resolve its neck. These rims"
+            " span no surface in one piece; move them closer together. The last sound step was kept."
         ),
-        "stopped": Phrase(
-            "The iteration was stopped after {steps} steps, before the surface had settled.", steps=steps
+        "unresolved": (
+            f"After {steps} steps the points no longer resolve the surface. Use more points, or spread"
+            " them more evenly. The last sound step was kept."
         ),
-        "pinching": Phrase(
-            "The surface pinches: after {steps} steps the points no longer resolve its neck. These rims span no"
-            " surface in one piece; move them closer together. The last sound step was kept.",
-            steps=steps,
-        ),
-        "unresolved": Phrase(
-            "After {steps} steps the points no longer resolve the surface. Use more points, or spread them more"
-            " evenly. The last sound step was kept.",
-            steps=steps,
-        ),
-        "stalled": Phrase(
-            "After {steps} steps no further one lowered the area. Use more points, or spread them more evenly.",
-            steps=steps,
+        "stalled": (
+            f"After {steps} steps no further one lowered the area. Use more points, or spread them more evenly."
         ),
     }
     texts["cancelled"] = texts["stopped"]
@@ -254,9 +244,7 @@ class _Film:
         )
         torn = np.count_nonzero(laplacian.component[self.free] < 0)
         if torn or laplacian.component.max() > self.parts:
-            raise NotASurfaceError(
-                "The surface came apart; {torn} points lie apart from the rest. Use more points.", torn=torn
-            )
+            raise NotASurfaceError(f"The surface came apart; {torn} points lie apart from the rest. Use more points.")
         return self._with_step(points, laplacian, foot)
 
     def _with_step(self, points, laplacian, foot):
@@ -298,7 +286,7 @@ class _Film:
             Why there is none.
         """
         for halving in range(_HALVINGS + 1):
-            failure = Phrase("unresolved") if before.definite else Phrase("pinching")
+            failure = "unresolved" if before.definite else "pinching"
             try:
                 state = self.state(before.points + 0.5**halving * before.step, before.laplacian)
             except PointCloudError:
@@ -307,7 +295,7 @@ class _Film:
                 continue
             if state.area <= (1.0 + _RISE) * before.area:
                 return state, ""
-            failure = Phrase("stalled")
+            failure = "stalled"
         return before, failure
 
 
@@ -317,29 +305,22 @@ def _rim_points(laplacian, fixed):
     rows = np.flatnonzero(fixed)
     if len(np.unique(points[rows], axis=0)) < FEWEST or len(rows) == len(points):
         raise InvalidPointsError(
-            "{fixed} of {count} points are fixed. Fix the points of the rim, at least {fewest} different ones,"
-            " and leave the others free.",
-            fixed=len(rows),
-            count=len(points),
-            fewest=FEWEST,
+            f"{len(rows)} of {len(points)} points are fixed. Fix the points of the rim, at least {FEWEST}"
+            " different ones, and leave the others free."
         )
     loose = np.setdiff1d(component[component >= 0], component[rows])
     if len(loose):
         raise InvalidPointsError(
-            "{bad} of {count} points are in parts of the surface without fixed points, which would shrink to"
-            " nothing. Fix their rims, or delete them.",
-            bad=np.count_nonzero(np.isin(component, loose)),
-            count=len(points),
+            f"{np.count_nonzero(np.isin(component, loose))} of {len(points)} points are in parts of the surface"
+            " without fixed points, which would shrink to nothing. Fix their rims, or delete them."
         )
     nearest = find_nearest(points)
     tree = cKDTree(points[rows])
     edge = np.count_nonzero(tree.query(points[found])[0] > _FREE_EDGE * nearest.spacing[found]) if found.any() else 0
     if edge > _FEW:
         raise InvalidPointsError(
-            "The surface also ends at {edge} points that are far from the {fixed} fixed ones. Such an edge would"
-            " only shrink: fix it too.",
-            edge=edge,
-            fixed=len(rows),
+            f"The surface also ends at {edge} points that are far from the {len(rows)} fixed ones. Such an edge"
+            " would only shrink: fix it too."
         )
     sure = np.flatnonzero(fixed & found)
     if len(np.unique(points[sure], axis=0)) >= FEWEST:

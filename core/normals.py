@@ -23,18 +23,13 @@ def unit_normals(normals, count):
     normals = np.asarray(normals)
     if normals.shape != (count, 3) or normals.dtype.kind not in "iuf":
         raise InvalidPointsError(
-            "Normals of shape {shape} and type {type} do not fit {count} points. Give three real numbers for each"
-            " point.",
-            shape=normals.shape,
-            type=normals.dtype,
-            count=count,
+            f"Normals of shape {normals.shape} and type {normals.dtype} do not fit {count} points. Give three"
+            " real numbers for each point."
         )
     length = np.linalg.norm(normals.astype(np.float64), axis=1)
     bad = int(np.count_nonzero(~(np.isfinite(length) & (length > 0.0))))
     if bad:
-        raise InvalidPointsError(
-            "{bad} of {count} normals are zero or not finite. Leave the normals to be estimated.", bad=bad, count=count
-        )
+        raise InvalidPointsError(f"{bad} of {count} normals are zero or not finite. Leave the normals to be estimated.")
     return normals / length[:, None]
 
 
@@ -78,10 +73,8 @@ def covariance_normals(neighborhoods, weighted=True):
     curve = np.count_nonzero(variances[:, 1] < 5e-3 * variances[:, 2])
     if curve > 0.01 * len(points):
         raise NotASurfaceError(
-            "Around {curve} of {count} points the neighbors lie along a curve, so there is no tangent plane. Use"
-            " points of a surface.",
-            curve=curve,
-            count=len(points),
+            f"Around {curve} of {len(points)} points the neighbors lie along a curve, so there is no tangent"
+            " plane. Use points of a surface."
         )
     return np.ascontiguousarray(directions[:, :, 0])
 

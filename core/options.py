@@ -71,29 +71,18 @@ class LaplacianOptions:
         for name, choices in _CHOICES.items():
             value = getattr(self, name)
             if value not in choices:
-                raise PointCloudError(
-                    "Option {name} is {value!r}. Choose one of {choices}.",
-                    name=name,
-                    value=value,
-                    choices=", ".join(choices),
-                )
+                raise PointCloudError(f"Option {name} is {value!r}. Choose one of {', '.join(choices)}.")
         if int(self.neighbors) != self.neighbors or self.neighbors < 6:
-            raise PointCloudError(
-                "Option neighbors is {neighbors!r}. Use a whole number of at least 6.", neighbors=self.neighbors
-            )
+            raise PointCloudError(f"Option neighbors is {self.neighbors!r}. Use a whole number of at least 6.")
         for name in ("bandwidth_factor", "regularization"):
             if not getattr(self, name) > 0.0:
-                raise PointCloudError(
-                    "Option {name} is {value!r}. Use a number above zero.", name=name, value=getattr(self, name)
-                )
+                raise PointCloudError(f"Option {name} is {getattr(self, name)!r}. Use a number above zero.")
         # About 9 factor^2 neighbors points share a support of 3 h on an even sample; ten keep a plane well determined.
         narrow = 0.3 if self.bandwidth == "adaptive" else 1.0
         if 9.0 * (narrow * self.bandwidth_factor) ** 2 * self.neighbors < 10.0:
             raise PointCloudError(
-                "A bandwidth factor of {factor:g} with {neighbors} neighbors leaves fewer than 10 points inside"
-                " the kernel. Raise one of them.",
-                factor=self.bandwidth_factor,
-                neighbors=self.neighbors,
+                f"A bandwidth factor of {self.bandwidth_factor:g} with {self.neighbors} neighbors leaves fewer"
+                " than 10 points inside the kernel. Raise one of them."
             )
 
     @classmethod

@@ -31,33 +31,27 @@ def check_points(points):
     try:
         given = np.asarray(points)
     except ValueError as error:
-        raise InvalidPointsError("Points must be an array of shape (n, 3): {error}.", error=str(error)) from error
+        raise InvalidPointsError(f"Points must be an array of shape (n, 3): {error}.") from error
     if given.ndim != 2 or given.shape[1] != 3:
-        raise InvalidPointsError(
-            "Points must have the shape (n, 3), not {shape}. Give x, y, z for each point.", shape=given.shape
-        )
+        raise InvalidPointsError(f"Points must have the shape (n, 3), not {given.shape}. Give x, y, z for each point.")
     if given.dtype.kind not in "iuf":
-        raise InvalidPointsError("Points must be real numbers, not {type}. Convert them to float64.", type=given.dtype)
+        raise InvalidPointsError(f"Points must be real numbers, not {given.dtype}. Convert them to float64.")
     if len(given) == 0:
         raise TooFewPointsError("There are no points. Add points, or choose another object.")
     result = given.astype(np.float64, copy=False)
     bad = int(np.count_nonzero(~np.isfinite(result).all(axis=1)))
     if bad:
         raise InvalidPointsError(
-            "{bad} of {count} points have coordinates that are not finite (NaN or infinity). Delete these points.",
-            bad=bad,
-            count=len(result),
+            f"{bad} of {len(result)} points have coordinates that are not finite (NaN or infinity). Delete these"
+            " points."
         )
     extent = np.ptp(result, axis=0).max()
     largest = np.abs(result).max()
     if given.dtype.kind == "f" and extent < 8192.0 * np.finfo(given.dtype).eps * largest:
         raise InvalidPointsError(
-            "The {count} points lie {largest:.3g} from the origin but span only {extent:.3g}: {type} coordinates"
-            " cannot tell them apart there. Move them to the origin before they are stored.",
-            count=len(result),
-            largest=largest,
-            extent=extent,
-            type=given.dtype,
+            f"The {len(result)} points lie {largest:.3g} from the origin but span only {extent:.3g}:"
+            f" {given.dtype} coordinates cannot tell them apart there. Move them to the origin before they are"
+            " stored."
         )
     return result
 
@@ -134,21 +128,15 @@ def scale_points(points, needed):
         centered, axis=0, return_index=True, return_inverse=True, return_counts=True
     )
     if len(distinct) < needed:
+        among = f" among {len(points)}" if len(distinct) < len(points) else ""
         raise TooFewPointsError(
-            "The neighborhoods need {needed} different points, and there are {distinct}. Add points, or lower the"
-            " number of neighbors."
-            if len(distinct) == len(points)
-            else "The neighborhoods need {needed} different points, and there are {distinct} among {count}. Add points,"
-            " or lower the number of neighbors.",
-            needed=needed,
-            distinct=len(distinct),
-            count=len(points),
+            f"The neighborhoods need {needed} different points, and there are {len(distinct)}{among}. Add points, or"
+            " lower the number of neighbors."
         )
     spread = np.linalg.eigvalsh(centered.T @ centered / len(centered))
     if spread[1] < 1e-10 * spread[2]:
         raise NotASurfaceError(
-            "All {count} points lie on a straight line, so they have no area. Use points of a surface.",
-            count=len(points),
+            f"All {len(points)} points lie on a straight line, so they have no area. Use points of a surface."
         )
     order = cKDTree(distinct).indices
     rank = np.empty_like(order)
@@ -172,11 +160,8 @@ def as_mask(chosen, count):
         return mask
     if given.ndim != 1 or given.dtype.kind not in "iu" or given.min() < -count or given.max() >= count:
         raise InvalidPointsError(
-            "A set of points has the shape {shape} and type {type}. Give whole numbers below {count}, or {count}"
-            " truth values.",
-            shape=given.shape,
-            type=given.dtype,
-            count=count,
+            f"A set of points has the shape {given.shape} and type {given.dtype}. Give whole numbers below"
+            f" {count}, or {count} truth values."
         )
     mask[given] = True
     return mask
@@ -198,10 +183,7 @@ def as_indices(chosen, count, name):
     twice = len(index) - int(np.count_nonzero(mask))
     if twice:
         raise InvalidPointsError(
-            "{twice} of the {count} {name} are named more than once. Name every point a single time.",
-            twice=twice,
-            count=len(index),
-            name=name,
+            f"{twice} of the {len(index)} {name} are named more than once. Name every point a single time."
         )
     return index
 
@@ -217,11 +199,8 @@ def check_distances(distances, count):
     given = np.asarray(distances)
     if given.shape != (count,) or given.dtype.kind not in "iuf" or not np.all(given >= 0.0):
         raise InvalidPointsError(
-            "Distances to the rim have the shape {shape} and type {type}. Give {count} numbers that are not"
-            " negative, infinity where there is no rim near.",
-            shape=given.shape,
-            type=given.dtype,
-            count=count,
+            f"Distances to the rim have the shape {given.shape} and type {given.dtype}. Give {count} numbers"
+            " that are not negative, infinity where there is no rim near."
         )
     return given.astype(np.float64)
 
@@ -237,22 +216,15 @@ def check_values(values, count, columns=True):
     given = np.asarray(values)
     shapes = (1, 2) if columns else (1,)
     if given.ndim not in shapes or len(given) != count or given.dtype.kind not in "iufb":
+        row = "row of real numbers" if columns else "real number"
         raise InvalidPointsError(
-            "Values have the shape {shape} and type {type}, and there are {count} points. Give one row of real numbers"
+            f"Values have the shape {given.shape} and type {given.dtype}, and there are {count} points. Give one {row}"
             " per point."
-            if columns
-            else "Values have the shape {shape} and type {type}, and there are {count} points. Give one real number per"
-            " point.",
-            shape=given.shape,
-            type=given.dtype,
-            count=count,
         )
     given = given.astype(np.float64)
     bad = int(np.count_nonzero(~np.isfinite(given.reshape(count, -1)).all(axis=1)))
     if bad:
         raise InvalidPointsError(
-            "{bad} of {count} points have values that are not finite (NaN or infinity). Replace them.",
-            bad=bad,
-            count=count,
+            f"{bad} of {count} points have values that are not finite (NaN or infinity). Replace them."
         )
     return given

@@ -63,13 +63,9 @@ def nodal_domains(values, laplacian, threshold=0.02, bridge=0.1, smallest=5):
     values = check_values(values, n, columns=False)
     for name, share in (("threshold", threshold), ("bridge", bridge)):
         if not 0.0 <= share < 1.0:
-            raise PointCloudError(
-                "The {name} of nodal domains is {share!r}. Use a number from 0 to below 1.", name=name, share=share
-            )
+            raise PointCloudError(f"The {name} of nodal domains is {share!r}. Use a number from 0 to below 1.")
     if not smallest >= 1:
-        raise PointCloudError(
-            "The smallest nodal domain is {smallest!r} points. Use a number of at least 1.", smallest=smallest
-        )
+        raise PointCloudError(f"The smallest nodal domain is {smallest!r} points. Use a number of at least 1.")
     graph = near_graph(laplacian, _NEIGHBORS)
     value, part = values[graph.first], laplacian.component[graph.first]
     positive = (value > 0.0).astype(int)
@@ -124,21 +120,16 @@ def segment(laplacian, parts, spectrum=None, progress=None):
     """
     n = len(laplacian.points)
     if isinstance(parts, bool) or not isinstance(parts, (int, np.integer)) or parts < 1:
-        raise TooFewPointsError("{parts!r} parts were asked for. Ask for a whole number of at least 1.", parts=parts)
+        raise TooFewPointsError(f"{parts!r} parts were asked for. Ask for a whole number of at least 1.")
     islands = int(laplacian.component.max()) + 1
     if parts < islands:
         raise IslandError(
-            "{parts} parts were asked for, but the {n} points lie in {islands} connected parts that cannot be"
-            " joined. Ask for at least {islands}, or delete the small ones.",
-            parts=parts,
-            n=n,
-            islands=islands,
+            f"{parts} parts were asked for, but the {n} points lie in {islands} connected parts that cannot be"
+            f" joined. Ask for at least {islands}, or delete the small ones."
         )
     if spectrum is not None and len(spectrum.eigenvectors) != n:
         raise InvalidPointsError(
-            "The spectrum has {given} points, the operator {n}. Compute it for the same operator.",
-            given=len(spectrum.eigenvectors),
-            n=n,
+            f"The spectrum has {len(spectrum.eigenvectors)} points, the operator {n}. Compute it for the same operator."
         )
     report = progress or (lambda stage, fraction: None)
     report("Parts", 0.0)
@@ -195,11 +186,8 @@ def _signature(laplacian, parts, spectrum, progress):
             spectrum = laplacian.eigenpairs(count, progress=progress)
     if count <= constant + parts:
         raise TooFewPointsError(
-            "{parts} parts need {modes} modes, but {points} points resolve {count}. Ask for fewer parts.",
-            parts=parts,
-            modes=constant + parts + 1,
-            points=len(laplacian.points),
-            count=count,
+            f"{parts} parts need {constant + parts + 1} modes, but {len(laplacian.points)} points resolve"
+            f" {count}. Ask for fewer parts."
         )
     values, last = spectrum.eigenvalues[constant : count - 1], spectrum.eigenvalues[count - 1]
     values = np.maximum(values, _WEAK * last)

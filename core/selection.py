@@ -43,9 +43,7 @@ def grow(laplacian, chosen, distance):
     except (TypeError, ValueError):
         reach = np.nan
     if not reach >= 0.0:
-        raise PointCloudError(
-            "The distance to grow by is {distance!r}. Use a number that is not negative.", distance=distance
-        )
+        raise PointCloudError(f"The distance to grow by is {distance!r}. Use a number that is not negative.")
     graph = near_graph(laplacian, _NEIGHBORS)
     start = np.unique(graph.place[mask & (graph.place >= 0)])
     if not len(start):

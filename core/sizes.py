@@ -37,10 +37,8 @@ class SurfaceSize:
             lost = np.abs(along - self.before[:, None]).max(axis=1) > _AGREE * self.before
             if lost.any():
                 raise PointCloudError(
-                    "{bad} of {count} connected parts enclose no volume by their normals. Let the normals point"
-                    " outwards everywhere, or keep the area.",
-                    bad=np.count_nonzero(lost),
-                    count=len(lost),
+                    f"{np.count_nonzero(lost)} of {len(lost)} connected parts enclose no volume by their"
+                    " normals. Let the normals point outwards everywhere, or keep the area."
                 )
 
     def __call__(self, moved):
@@ -97,8 +95,6 @@ def match_size(size, wanted, touched):
         step = np.where(np.isfinite(step), np.clip(step, -0.5 * scale, 0.5 * scale), 0.0)
         last, scale = scale, np.clip(scale - step, 1.0 / _SCALE, _SCALE)
     raise SolverError(
-        "{bad} of {count} connected parts lose too much of their size for a scale to bring it back. Smooth less,"
-        " or do not keep the size.",
-        bad=np.count_nonzero(np.abs(error) >= 1e-9),
-        count=len(wanted),
+        f"{np.count_nonzero(np.abs(error) >= 1e-9)} of {len(wanted)} connected parts lose too much of their size"
+        " for a scale to bring it back. Smooth less, or do not keep the size."
     )

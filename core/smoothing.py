@@ -74,9 +74,7 @@ def smooth_points(
     Vallet, Levy. Spectral geometry processing with manifold harmonics. 2008. Section 4 and Figure 12 of the paper.
     """
     if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
-        raise PointCloudError(
-            "The response is {response!r}. Give a whole number of modes, or a function.", response=response
-        )
+        raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
     blend = PointBlend(laplacian, strength, mask, keep, fixed_rim)
     base = smoothing_base(laplacian, fixed_rim, progress) if base is None else base
     rest = laplacian.points - base
@@ -91,11 +89,8 @@ def smooth_points(
         parts = laplacian.component.max() + 1
         if not fixed_rim and response <= parts:
             raise PointCloudError(
-                "The first {response} modes move {parts} connected part(s) as a whole and have no shape. Keep at"
-                " least {least} modes.",
-                response=response,
-                parts=parts,
-                least=parts + 3,
+                f"The first {response} modes move {parts} connected part(s) as a whole and have no shape. Keep"
+                f" at least {parts + 3} modes."
             )
         filtered = spectral_filter(rest, spectrum, laplacian.areas, response)
     return blend(base + filtered)
@@ -187,14 +182,10 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
     if amplitude is None:
         amplitude = 0.1 * np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))
     if not (np.isfinite(amplitude) and np.isfinite(phase)):
-        raise PointCloudError(
-            "Amplitude {amplitude!r} and phase {phase!r} must be finite numbers.", amplitude=amplitude, phase=phase
-        )
+        raise PointCloudError(f"Amplitude {amplitude!r} and phase {phase!r} must be finite numbers.")
     largest = np.abs(mode).max()
     if largest == 0.0:
-        raise PointCloudError(
-            "The mode is zero at all {count} points, which moves none. Choose another one.", count=len(points)
-        )
+        raise PointCloudError(f"The mode is zero at all {len(points)} points, which moves none. Choose another one.")
     return points + (amplitude * np.cos(phase) / largest) * mode[:, None] * laplacian.normals
 
 
@@ -255,8 +246,7 @@ def rim_places(laplacian):
         return places
     if not len(rim):
         raise PointCloudError(
-            "{count} points are next to a rim that has no points, so that nothing holds it. Name the rim's points.",
-            count=len(rows),
+            f"{len(rows)} points are next to a rim that has no points, so that nothing holds it. Name the rim's points."
         )
     # Parts are searched apart from each other, by a fourth coordinate that divides them.
     far = 4.0 * np.ptp(laplacian.points, axis=0).max()
@@ -297,35 +287,28 @@ class PointBlend:
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         if not np.isfinite(strength):
-            raise PointCloudError(
-                "The strength is {strength!r}. Use a finite number, 1 for the full effect.", strength=strength
-            )
+            raise PointCloudError(f"The strength is {strength!r}. Use a finite number, 1 for the full effect.")
         weights = np.ones(n) if mask is None else check_values(mask, n)
         if weights.ndim != 1 or weights.min() < -1e-6 or weights.max() > 1.0 + 1e-6:
             raise InvalidPointsError(
-                "The mask has the shape {shape} and values from {low:.3g} to {high:.3g}. Give {n} weights from 0 to 1.",
-                shape=weights.shape,
-                low=weights.min(),
-                high=weights.max(),
-                n=n,
+                f"The mask has the shape {weights.shape} and values from {weights.min():.3g} to"
+                f" {weights.max():.3g}. Give {n} weights from 0 to 1."
             )
         weights = np.clip(weights, 0.0, 1.0)
         weights[laplacian.component < 0] = 0.0
         if fixed_rim:
             weights[laplacian.boundary] = 0.0  # also in corners, where the images are not exact
         if not weights.any():
-            raise PointCloudError(
-                "The mask is zero at all {n} points, so that none would move. Choose some points.", n=n
-            )
+            raise PointCloudError(f"The mask is zero at all {n} points, so that none would move. Choose some points.")
         self.mask, self.weights = weights, strength * weights
         if keep not in _KEPT:
-            raise PointCloudError("What to keep is {keep!r}. Choose one of None, 'area', 'volume'.", keep=keep)
+            raise PointCloudError(f"What to keep is {keep!r}. Choose one of None, 'area', 'volume'.")
         if keep is not None and fixed_rim:
             raise PointCloudError("A rim that stays fixes the size already: keep neither area nor volume with it.")
         if keep == "volume" and laplacian.boundary.any():
             parts = len(np.unique(laplacian.component[laplacian.boundary]))
             raise PointCloudError(
-                "Connected parts that have a rim and enclose no volume: {parts}. Keep the area instead.", parts=parts
+                f"Connected parts that have a rim and enclose no volume: {parts}. Keep the area instead."
             )
 
     def __call__(self, filtered):

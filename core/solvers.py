@@ -108,10 +108,8 @@ def factorize(matrix):
         factors = splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError as error:
         raise SolverError(
-            "The equations of {count} points have no single solution ({error}). Fix some points on every"
-            " connected part.",
-            count=matrix.shape[0],
-            error=str(error),
+            f"The equations of {matrix.shape[0]} points have no single solution ({error}). Fix some points"
+            " on every connected part."
         ) from error
     return factors.solve
 
@@ -153,9 +151,7 @@ def conjugate_gradients(matrix, load, start=None, rtol=1e-9, progress=None):
     solution, failed = cg(matrix, load, start, rtol=rtol, atol=0.0, maxiter=_STEPS, M=scaling, callback=count)
     if failed:
         raise SolverError(
-            "The equations of {count} points were not solved in {steps} steps. Fix more points, or raise the"
-            " number of neighbors.",
-            count=len(load),
-            steps=_STEPS,
+            f"The equations of {len(load)} points were not solved in {_STEPS} steps. Fix more points, or raise"
+            " the number of neighbors."
         )
     return solution

@@ -35,24 +35,16 @@ def solve_spectrum(laplacian, stiffness, count, progress=None):
     areas = laplacian.areas
     n = len(areas)
     if int(count) != count or count < 1:
-        raise TooFewPointsError("{count!r} modes were asked for. Ask for a whole number of at least 1.", count=count)
+        raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
     if count > n // 3:
-        raise TooFewPointsError(
-            "{count} modes were asked for, but {n} points carry at most {most}. Ask for fewer.",
-            count=count,
-            n=n,
-            most=n // 3,
-        )
+        raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
     try:
         values, vectors = lowest_eigenpairs(
             laplacian, stiffness, int(count), progress or (lambda stage, fraction: None)
         )
     except ArpackNoConvergence as error:
         raise SolverError(
-            "The eigenvalue solver found {found} of {count} modes on {n} points. Ask for fewer modes.",
-            found=len(error.eigenvalues),
-            count=count,
-            n=n,
+            f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
         ) from error
     largest = np.argmax(np.abs(vectors), axis=0)
     vectors *= np.sign(vectors[largest, np.arange(count)])
@@ -177,10 +169,9 @@ def correct_eigenvalues(laplacian, values, vectors):
     if not np.isfinite(corrected).all():
         resolved = int(np.argmin(np.isfinite(corrected)))
         raise UnresolvedModesError(
-            "The {count} modes asked for vary faster than the smoothing length resolves: {resolved} are resolved"
-            " on {n} points. Ask for at most {resolved}, or lower the number of neighbors.",
-            count=len(values),
+            f"The {len(values)} modes asked for vary faster than the smoothing length resolves: {resolved} are"
+            f" resolved on {len(laplacian.areas)} points. Ask for at most {resolved}, or lower the number of"
+            " neighbors.",
             resolved=resolved,
-            n=len(laplacian.areas),
         )
     return corrected

@@ -6,8 +6,6 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .phrases import Phrase
-
 
 @dataclass(frozen=True)
 class Stability:
@@ -42,19 +40,16 @@ class Stability:
         """Return a sentence for each assumption that does not hold comfortably; none for a sound operator."""
         found = []
         if self.area_ratio > 1e4:
-            found.append(Phrase("(A1) The areas differ by a factor of {ratio:.3g}.", ratio=self.area_ratio))
+            found.append(f"(A1) The areas differ by a factor of {self.area_ratio:.3g}.")
         if self.least_bandwidth < 0.8:
             found.append(
-                Phrase(
-                    "(A2, A4) Somewhere the smoothing length is only {share:.2g} times the distance to the sixth"
-                    " neighbor.",
-                    share=self.least_bandwidth,
-                )
+                f"(A2, A4) Somewhere the smoothing length is only {self.least_bandwidth:.2g} times the distance to"
+                " the sixth neighbor."
             )
         if self.most_neighbors > 5000:
-            found.append(Phrase("(A3) One support holds {count} points.", count=self.most_neighbors))
+            found.append(f"(A3) One support holds {self.most_neighbors} points.")
         if self.parts > 1:
-            found.append(Phrase("The operator falls into {count} parts, each with its own constant.", count=self.parts))
+            found.append(f"The operator falls into {self.parts} parts, each with its own constant.")
         return found
 
 

@@ -102,10 +102,8 @@ def fit_surface(points, index, weight, rows=None, normals=None):
         fitted.misfit[block] = np.sqrt((share * misfit).sum(axis=1)) * unit
     if curves > 0.01 * count:
         raise NotASurfaceError(
-            "Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane. Use"
-            " points of a surface.",
-            curves=curves,
-            count=count,
+            f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane."
+            " Use points of a surface."
         )
     return fitted
 

@@ -7,7 +7,6 @@ import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
 from ..core import LaplaceBeltrami, Spectrum, UnresolvedModesError
-from ..core.phrases import Phrase
 from . import cache
 from .application import ShownOperator
 from .attributes import point_count
@@ -76,11 +75,7 @@ def resolved_modes(laplacian, modes, progress):
     except UnresolvedModesError as error:
         if error.resolved == 0:
             raise
-        notice = Phrase(
-            "Only {resolved} of {modes} modes were computed: the others are finer than the points resolve.",
-            resolved=error.resolved,
-            modes=modes,
-        )
+        notice = f"Only {error.resolved} of {modes} modes were computed: the others are finer than the points resolve."
         return cache.lowest_modes(laplacian, error.resolved, progress), [notice]
 
 
@@ -118,17 +113,9 @@ class AnalysisOperator(ShownOperator):
     def write(self, context, obj, result):
         write_result(obj, result, self.write_limit)
         self.warn(result.notices)
-        spectrum = result.spectrum
-        return Phrase(
-            "{object}: {area} from {count:,} points, {seconds:.1f} s"
-            if spectrum is None
-            else "{object}: {area} from {count:,} points, {modes} modes, {seconds:.1f} s",
-            object=obj.name,
-            area=area_text(result.total_area),
-            count=point_count(obj.data),
-            modes=0 if spectrum is None else len(spectrum.eigenvalues),
-            seconds=sum(result.seconds.values()),
-        )
+        modes = "" if result.spectrum is None else f", {len(result.spectrum.eigenvalues)} modes"
+        points, seconds = point_count(obj.data), sum(result.seconds.values())
+        return f"{obj.name}: {area_text(result.total_area)} from {points:,} points{modes}, {seconds:.1f} s"
 
 
 class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):

@@ -7,14 +7,12 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..core import PointCloudError
-from ..core.phrases import Phrase
 from . import cache
 from .job import JobOperator
 from .options import laplacian_options
 from .reading import TYPES, obstacle, read_points, sharing_objects
 from .result import check_writable
 from .stages import Stages
-from .translation import translated
 
 
 @dataclass
@@ -65,20 +63,20 @@ class ApplicationOperator(JobOperator):
             with Stages(context.window_manager, self.bl_label) as stages:
                 results = compute_all(plans, stages)
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return self.finish(context, objects, results, stages.seconds)
 
     def finish(self, context, objects, results, seconds):
         """Write what was computed."""
         done.messages, done.notices, done.seconds = [], [], seconds
-        self.warn([Phrase("Left out: {reason}.", reason=reason) for reason in self._left_out])
+        self.warn([(f"Left out: {reason}.") for reason in self._left_out])
         for obj in objects:  # before anything is written to a mesh that is copied
             if self.becomes_single(obj) and sharing_objects(obj):
                 obj.data = obj.data.copy()
         for obj, result in zip(objects, results, strict=True):
             done.messages.append(self.write(context, obj, result))
-            self.report({"INFO"}, translated(done.messages[-1]))
+            self.report({"INFO"}, done.messages[-1])
         self.conclude(context, objects)
         return {"FINISHED"}
 
@@ -92,7 +90,7 @@ class ApplicationOperator(JobOperator):
     def warn(self, notices):
         """Report notices of core."""
         for notice in notices:
-            self.report({"WARNING"}, translated(notice))
+            self.report({"WARNING"}, notice)
         done.notices += notices
 
     def draw(self, context):
@@ -152,7 +150,7 @@ def naming(name):
     except PointCloudError as error:
         if f'"{name}"' in str(error):
             raise
-        raise PointCloudError('"{name}": {error}', name=name, error=error.text) from error
+        raise PointCloudError(f'"{name}": {error}') from error
 
 
 def chosen_objects(context, becomes_single):

@@ -73,10 +73,8 @@ def check_names(obj, names):
     taken = sorted(set(names) & {group.name for group in obj.vertex_groups})
     if taken:
         raise PointCloudError(
-            'Object "{object}" has vertex groups named {taken}, which results need as attribute names. Rename'
-            " these vertex groups.",
-            object=obj.name,
-            taken=", ".join(taken),
+            f'Object "{obj.name}" has vertex groups named {", ".join(taken)}, which results need as attribute'
+            " names. Rename these vertex groups."
         )
 
 
@@ -122,11 +120,8 @@ def write_attribute(data, name: str, values, data_type: str = ""):
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
     if len(values) != storage.components * point_count(data):
         raise PointCloudError(
-            "Attribute {name} got {given} numbers for {count} points with {each} each. Analyze the object again.",
-            name=name,
-            given=len(values),
-            count=point_count(data),
-            each=storage.components,
+            f"Attribute {name} got {len(values)} numbers for {point_count(data)} points with"
+            f" {storage.components} each. Analyze the object again."
         )
     attribute = data.attributes.get(name)
     if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, "POINT"):
@@ -143,18 +138,12 @@ def read_attribute(data, name: str):
     """Read an attribute of the points as an array of shape (n,) or (n, 3)."""
     attribute = data.attributes.get(name)
     if attribute is None:
-        raise PointCloudError(
-            '"{object}" has no attribute {name}. Analyze the object, or choose another name.',
-            object=data.name,
-            name=name,
-        )
+        raise PointCloudError(f'"{data.name}" has no attribute {name}. Analyze the object, or choose another name.')
     storage = _STORAGE.get(attribute.data_type)
     if storage is None or attribute.domain != "POINT":
         raise PointCloudError(
-            "Attribute {name} has the type {type} on the domain {domain}. Choose a number or a vector on points.",
-            name=name,
-            type=attribute.data_type,
-            domain=attribute.domain,
+            f"Attribute {name} has the type {attribute.data_type} on the domain {attribute.domain}. Choose a"
+            " number or a vector on points."
         )
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         values = _edited_values(data, name, attribute.data_type)

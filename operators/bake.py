@@ -5,7 +5,6 @@ import numpy as np
 from bpy.props import IntProperty
 
 from ..core import PointCloudError
-from ..core.phrases import Phrase
 from . import live
 from .attributes import DISPLACEMENT, point_count, read_attribute, tag_changed, write_attribute
 from .binding import POSE, stale_reason
@@ -14,7 +13,6 @@ from .deform_nodes import find_deform, is_baked, show_baked
 from .job import Job, JobOperator, SteppedJob, all_steps
 from .reading import find_object
 from .stages import Stages
-from .translation import translated
 
 _LAST = 1048574  # frame of Blender
 _PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
@@ -48,9 +46,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
             check_fresh(obj)
             if self.last < self.first:
                 raise PointCloudError(
-                    "The last frame, {last}, comes before the first one, {first}. Swap them.",
-                    last=self.last,
-                    first=self.first,
+                    f"The last frame, {self.last}, comes before the first one, {self.first}. Swap them."
                 )
             self._kept = _Kept(scene, obj)
             if attended:
@@ -61,7 +57,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
             finally:
                 self.leave(context)
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return self.finish(context, [obj], frames, stages.seconds)
 
@@ -87,14 +83,14 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
             scene, obj = self._kept.find()
             if frames and not self._kept.holds():
                 raise PointCloudError(
-                    'The handles of "{object}" or the frame were changed meanwhile. Nothing was baked.', object=obj.name
+                    f'The handles of "{obj.name}" or the frame were changed meanwhile. Nothing was baked.'
                 )
             scene.frame_set(number)
             self._kept.expect()
             live.update(obj, waits=live.find(obj) is None)
             reason = stale_reason(obj, glance=True, trusting=True)
             if reason:
-                raise PointCloudError('"{object}" is not up to date. {reason}.', object=obj.name, reason=reason)
+                raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
             frames.append(read_attribute(obj.data, DISPLACEMENT))
             yield
         return frames
@@ -113,13 +109,8 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
         show_baked(find_deform(obj), cache, self.first, len(results))
         size = np.prod([len(results), *results[0].shape]) * 4 / 2**20
-        text = Phrase(
-            "{object}: {count} frames are baked, {size:.1f} MB in the file",
-            object=obj.name,
-            count=len(results),
-            size=size,
-        )
-        self.report({"INFO"}, translated(text))
+        text = f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file"
+        self.report({"INFO"}, text)
         return {"FINISHED"}
 
 
@@ -195,13 +186,13 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
     def obstacle(cls, context):
         reason = super().obstacle(context)
         obj = cls.subject(context)
-        return reason or ("" if is_baked(obj) else Phrase('Nothing of "{object}" is baked', object=obj.name))
+        return reason or ("" if is_baked(obj) else (f'Nothing of "{obj.name}" is baked'))
 
     def change(self, context, obj):
         delete_bake(obj)
         context.view_layer.update()
         live.update(obj)
-        return Phrase("{object}: follows its handles again", object=obj.name)
+        return f"{obj.name}: follows its handles again"
 
 
 CLASSES = (MESHFREE_OT_deform_bake, MESHFREE_OT_deform_free)

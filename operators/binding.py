@@ -14,7 +14,6 @@ import bpy
 import numpy as np
 
 from ..core import PointCloudError
-from ..core.phrases import Phrase
 from .attributes import (
     DISPLACEMENT,
     REST,
@@ -79,18 +78,16 @@ def read_constraints(obj) -> Constraints:
     """
     settings = obj.meshfree.deform
     names = handle_names(obj) or [settings.handles]  # which says what is missing
-    weights = np.array([chosen_weights(obj, name, Phrase("Handles")) for name in names])
+    weights = np.array([chosen_weights(obj, name, "Handles") for name in names])
     several = int(np.count_nonzero(np.count_nonzero(weights > 0.0, axis=0) > 1))
     if several:
         raise PointCloudError(
-            '{several} points of "{object}" are in more than one of the groups {names}. Leave each in one.',
-            several=several,
-            object=obj.name,
-            names=", ".join(names),
+            f'{several} points of "{obj.name}" are in more than one of the groups {", ".join(names)}. Leave'
+            " each in one."
         )
     anchors = np.zeros(weights.shape[1])
     if is_chosen(obj, settings.anchors, ANCHOR):
-        anchors = chosen_weights(obj, settings.anchors, Phrase("Anchors"))
+        anchors = chosen_weights(obj, settings.anchors, "Anchors")
     moved, kept = np.flatnonzero(weights.max(axis=0) > 0.0), np.flatnonzero(anchors > 0.0)
     owner = weights.argmax(axis=0)[moved]
     strength = np.concatenate([weights.max(axis=0)[moved], anchors[kept]])
@@ -199,41 +196,37 @@ def stale_reason(obj, glance=False, trusting=False) -> str:
     settings = obj.meshfree.deform
     count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
     if is_baked(obj):
-        return Phrase("Its animation is baked. Delete the bake to let it follow the handles again")
+        return "Its animation is baked. Delete the bake to let it follow the handles again"
     original = copied_from(obj)
     if original is not None and original.data == obj.data:
-        return Phrase('It shares its mesh with "{other}", whose handles move both', other=original.name)
+        return f'It shares its mesh with "{original.name}", whose handles move both'
     if original is not None:
-        return Phrase(
-            'It has no handles of its own, "{other}" has them. Bind again to get copies of them', other=original.name
-        )
+        return f'It has no handles of its own, "{original.name}" has them. Bind again to get copies of them'
     if count != settings.point_count:
-        return Phrase(
-            "It had {before:,} points and has {count:,} now. Bind again", before=settings.point_count, count=count
-        )
+        return f"It had {settings.point_count:,} points and has {count:,} now. Bind again"
     gone = [item.name for item in settings.handle_items if item.has_empty and not is_there(item.empty)]
     if gone:
-        return Phrase("The empty of {names} was deleted. Bind again to get a new one", names=", ".join(gone))
+        return f"The empty of {', '.join(gone)} was deleted. Bind again to get a new one"
     if find_deform(obj) is None:
-        return Phrase('The modifier "Mesh-Free Deform" or an input of its nodes was removed. Bind again')
+        return 'The modifier "Mesh-Free Deform" or an input of its nodes was removed. Bind again'
     if settings.settings_used != settings_text(obj):
-        return Phrase("Settings changed. Bind again")
+        return "Settings changed. Bind again"
     others = [other.name for other in sharing_objects(obj) if is_bound(other) and copied_from(other) != obj]
     if others:
-        return Phrase('It shares its mesh with "{other}", which is bound, too. Make it a single user', other=others[0])
+        return f'It shares its mesh with "{others[0]}", which is bound, too. Make it a single user'
     if in_edit_mesh(obj):  # groups and positions are only known to be right when one leaves it
         return ""
     if any(obj.data.attributes.get(name) is None for name in WRITES):
-        return Phrase("The attributes {first} and {second} were removed. Bind again", first=WRITES[0], second=WRITES[1])
+        return f"The attributes {WRITES[0]} and {WRITES[1]} were removed. Bind again"
     groups = _groups_now(obj, glance, trusting)
     if groups is None:
         return ""
     checksum, edited = groups
     if settings.groups_used != checksum:
-        return Phrase("The groups of handles or anchors changed. Bind again")
+        return "The groups of handles or anchors changed. Bind again"
     known = fingerprint(obj, glance, left_out=edited)
     if known and settings.fingerprint != known:
-        return Phrase("The points at rest were moved. Bind again")
+        return "The points at rest were moved. Bind again"
     return ""
 
 
@@ -260,8 +253,7 @@ def relative_matrix(obj, empty, depsgraph=None):
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     if not np.linalg.cond(matrix[:3, :3]) < 1e6:
         raise PointCloudError(
-            '"{object}" is scaled to nothing along an axis. Give it a scale above zero along each axis.',
-            object=obj.name,
+            f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
         )
     return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
 

@@ -172,11 +172,11 @@ def _process(path, arguments) -> dict:
     """Work on one file, write its output, and return what to print."""
     output = _output_path(path, arguments)
     if output is not None and output.resolve() == path.resolve():
-        raise PointCloudError("The output {output} would overwrite its input. Choose another name.", output=output)
+        raise PointCloudError(f"The output {output} would overwrite its input. Choose another name.")
     obj, notices = files.load(path, arguments.object)
     reason = obstacle(obj)
     if reason:
-        raise PointCloudError("{reason}", reason=reason)
+        raise PointCloudError(f"{reason}")
     for name in _SETTINGS:
         value = getattr(arguments, name)
         if value is not None:

@@ -7,7 +7,6 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..core import PointCloudError
-from ..core.phrases import Phrase
 from .application import chosen_objects
 from .attributes import SELECTION, point_count, write_attribute
 from .binding import handle_names, is_bound
@@ -17,7 +16,6 @@ from .modifiers import get_input, is_display, set_input
 from .ready import ReadyOperator
 from .result import check_writable
 from .selecting import selection
-from .translation import translated
 
 _SEGMENT = re.compile(r"Segment \d+")
 
@@ -42,7 +40,7 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
     @classmethod
     def obstacle(cls, context):
         old = bpy.app.version < cls.since
-        return super().obstacle(context) or (Phrase("Meshes become point clouds from Blender 4.5 on") if old else "")
+        return super().obstacle(context) or (("Meshes become point clouds from Blender 4.5 on") if old else "")
 
     def execute(self, context):
         objects = chosen_objects(context, lambda obj: obj.meshfree.make_single_user)[0]
@@ -50,29 +48,21 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
         try:
             if not objects:
                 raise PointCloudError(
-                    '"{object}" is a point cloud already.'
+                    (f'"{context.object.name}" is a point cloud already.')
                     if self.target == "POINTCLOUD"
-                    else '"{object}" is a mesh already.',
-                    object=context.object.name,
+                    else (f'"{context.object.name}" is a mesh already.')
                 )
             for obj in objects:
                 _check(obj)
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         active, chosen = context.view_layer.objects.active, context.selected_objects
         for obj in objects:
             if obj.meshfree.make_single_user and obj.data.users > 1:
                 obj.data = obj.data.copy()
             _convert(context, obj, self.target)
-            text = Phrase(
-                "{object}: {count:,} points are a pointcloud now"
-                if obj.type == "POINTCLOUD"
-                else "{object}: {count:,} points are a mesh now",
-                object=obj.name,
-                count=point_count(obj.data),
-            )
-            self.report({"INFO"}, translated(text))
+            self.report({"INFO"}, f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now")
         for obj in chosen:
             obj.select_set(True)
         context.view_layer.objects.active = active
@@ -83,13 +73,9 @@ def _check(obj):
     """Refuse an object that would lose something."""
     check_writable(obj, (), obj.meshfree.make_single_user)
     if is_bound(obj):
-        raise PointCloudError(
-            '"{object}" is bound to handles, which would be lost. Apply or unbind it first.', object=obj.name
-        )
+        raise PointCloudError(f'"{obj.name}" is bound to handles, which would be lost. Apply or unbind it first.')
     if not obj.visible_get():
-        raise PointCloudError(
-            '"{object}" is hidden, and Blender converts what is seen. Show it first.', object=obj.name
-        )
+        raise PointCloudError(f'"{obj.name}" is hidden, and Blender converts what is seen. Show it first.')
 
 
 def _convert(context, obj, target):

@@ -6,7 +6,6 @@ from bpy.props import BoolProperty
 from mathutils import Matrix, Vector
 
 from ..core import PointCloudError
-from ..core.phrases import Phrase
 from . import live
 from .application import ApplicationOperator
 from .attributes import REST, own_positions, point_count, read_attribute, write_own_positions
@@ -37,7 +36,6 @@ from .reading import read_points, shape_keys
 from .ready import ReadyOperator
 from .result import length_text
 from .selecting import SelectionOperator, groups_changed, selected
-from .translation import translated
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -63,7 +61,7 @@ class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
                 assign(obj, other, chosen, "REMOVE", 1.0)
             assign(obj, name, chosen, "REPLACE", 1.0)
             groups_changed(obj)
-            return Phrase('{count:,} points are in the group "{name}"', count=np.count_nonzero(chosen), name=name)
+            return f'{np.count_nonzero(chosen):,} points are in the group "{name}"'
 
         return change
 
@@ -96,10 +94,8 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         edited = constraints.moved[~np.array(by_empty)[constraints.owner]]
         if len(edited) and (shape_keys(obj) is not None or obj.meshfree.use_modifiers):
             raise PointCloudError(
-                'The {count} handles of "{object}" have no empty, and to move them in Edit Mode takes a mesh'
-                " without shape keys whose modifiers are not used. Turn on Add Empties.",
-                count=len(edited),
-                object=obj.name,
+                f'The {len(edited)} handles of "{obj.name}" have no empty, and to move them in Edit Mode takes'
+                " a mesh without shape keys whose modifiers are not used. Turn on Add Empties."
             )
         if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
             rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
@@ -130,18 +126,8 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         live.update(obj)
         self.warn(made.deformer.notices)
         moved, stay = len(made.constraints.moved), len(made.constraints.kept)
-        way = (
-            Phrase('Move "{empty}"', empty=empties[0][0].name)
-            if empties[0]
-            else Phrase("Move the handles in Edit Mode")
-        )
-        return Phrase(
-            "{object}: {moved:,} handles and {stay:,} anchors are bound. {way}",
-            object=obj.name,
-            moved=moved,
-            stay=stay,
-            way=way,
-        )
+        way = (f'Move "{empties[0][0].name}"') if empties[0] else ("Move the handles in Edit Mode")
+        return f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"
 
 
 def _add_empty(context, obj, name, rest, rows):
@@ -187,22 +173,22 @@ class BoundOperator(HandledOperator):
                 live.update(obj)  # all steps, should only the first one have been taken
             message = self.change(context, obj)
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, translated(message))
+        self.report({"INFO"}, message)
         return {"FINISHED"}
 
 
 def not_bound(obj) -> str:
     """Say that an object is not bound, and what to do; empty if it is."""
-    return "" if is_bound(obj) else Phrase('"{object}" is not bound. Bind it to its handles first', object=obj.name)
+    return "" if is_bound(obj) else (f'"{obj.name}" is not bound. Bind it to its handles first')
 
 
 def check_fresh(obj):
     """Refuse an object that no longer follows its handles."""
     reason = stale_reason(obj)
     if reason:
-        raise PointCloudError('"{object}" is not up to date. {reason}.', object=obj.name, reason=reason)
+        raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
 
 
 class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.Operator):
@@ -228,9 +214,9 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
         live.keep(obj, made)
         live.write(obj, made, points, displacement, pose)
         if not made.deformer.converged:
-            self.warn([Phrase("The turns of details were still changing. Raise Steps.")])
+            self.warn([("The turns of details were still changing. Raise Steps.")])
         distance = np.linalg.norm(points - made.deformer.points, axis=1)
-        return Phrase("{object}: moved at most by {distance}", object=obj.name, distance=length_text(distance.max()))
+        return f"{obj.name}: moved at most by {length_text(distance.max())}"
 
 
 class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
@@ -249,9 +235,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         write_own_positions(obj.data, positions)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
         write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
-        return Phrase(
-            "{object}: {count:,} points are at rest where they are now", object=obj.name, count=len(positions)
-        )
+        return f"{obj.name}: {len(positions):,} points are at rest where they are now"
 
 
 class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
@@ -262,7 +246,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        keyless = Phrase("Point clouds have no shape keys. Apply the deformation, or bake it")
+        keyless = "Point clouds have no shape keys. Apply the deformation, or bake it"
         return super().obstacle(context) or ("" if cls.subject(context).type == "MESH" else keyless)
 
     def change(self, context, obj):
@@ -270,9 +254,8 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
         constraints = read_constraints(obj)
         if edited_rows(obj, constraints).any():
             raise PointCloudError(
-                'Handles of "{object}" are moved in Edit Mode, which a mesh with shape keys does not allow. Turn'
-                " on Add Empties and bind again.",
-                object=obj.name,
+                f'Handles of "{obj.name}" are moved in Edit Mode, which a mesh with shape keys does not allow.'
+                " Turn on Add Empties and bind again."
             )
         key = add_key(obj, "Deform", shown_displacement(obj))
         put_back(context, obj)
@@ -280,7 +263,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
         renew(obj, constraints)
         if known is not None:
             live.keep(obj, known)
-        return Phrase('{object}: the deformation is the shape key "{key}"', object=obj.name, key=key.name)
+        return f'{obj.name}: the deformation is the shape key "{key.name}"'
 
 
 class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
@@ -292,7 +275,7 @@ class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
 
     def change(self, context, obj):
         put_back(context, obj)
-        return Phrase("{object}: handles and points are at rest", object=obj.name)
+        return f"{obj.name}: handles and points are at rest"
 
 
 class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
@@ -318,7 +301,7 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
             for empty in empties:
                 if empty.type == "EMPTY" and empty not in used:
                     bpy.data.objects.remove(empty)
-        return Phrase("{object}: is no longer bound", object=obj.name)
+        return f"{obj.name}: is no longer bound"
 
 
 def shown_displacement(obj):

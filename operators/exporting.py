@@ -9,7 +9,6 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..core import PointCloudError
 from ..core.files import replacing, write_points
-from ..core.phrases import Phrase
 from . import cache
 from .files import analysis_arrays, file_filter, place_of, point_table, save_arrays
 from .job import JobOperator
@@ -17,7 +16,6 @@ from .options import laplacian_options
 from .reading import read_points
 from .result import EIGENVALUES
 from .stages import Stages
-from .translation import translated
 
 
 class ExportOperator(JobOperator, ExportHelper):
@@ -49,20 +47,20 @@ class ExportOperator(JobOperator, ExportHelper):
         try:
             reason = self.obstacle(context)
             if reason:  # since the file browser opened
-                raise PointCloudError("{reason}.", reason=reason)
+                raise PointCloudError(f"{reason}.")
             write = self.plan(context, context.object)
             if attended:
                 return self.start(context, [], lambda progress: write(path, progress))
             with Stages(context.window_manager, self.bl_label) as stages:
                 result = write(path, stages)
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return self.finish(context, [], result, stages.seconds)
 
     def finish(self, context, objects, results, seconds):
         """Tell what was written."""
-        self.report({"INFO"}, translated(results))
+        self.report({"INFO"}, results)
         return {"FINISHED"}
 
 
@@ -113,9 +111,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
         def write(path, progress):
             progress("Write", 0.0)
             write_points(path, table, double=not table.single)
-            return Phrase(
-                "{object}: {count:,} points written to {file}", object=name, count=len(table.points), file=path.name
-            )
+            return f"{name}: {len(table.points):,} points written to {path.name}"
 
         return write
 
@@ -138,13 +134,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
             save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))
-            return Phrase(
-                "{object}: {count:,} weights and {modes} modes written to {file}",
-                object=name,
-                count=built.laplacian.stiffness.nnz,
-                modes=count,
-                file=path.name,
-            )
+            return f"{name}: {built.laplacian.stiffness.nnz:,} weights and {count} modes written to {path.name}"
 
         return write
 
@@ -163,7 +153,7 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
         reason = super().obstacle(context)
         if reason or EIGENVALUES in context.object:
             return reason
-        return Phrase('"{object}" has no eigenvalues. Press Compute Modes first', object=context.object.name)
+        return f'"{context.object.name}" has no eigenvalues. Press Compute Modes first'
 
     def plan(self, context, obj):
         name, values = obj.name, np.array(obj[EIGENVALUES])
@@ -172,9 +162,7 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
             rows = np.stack([np.arange(1, len(values) + 1), values], axis=1)
             with replacing(path) as part:
                 np.savetxt(part, rows, ["%d", "%.17g"], ",", header="mode,eigenvalue", comments="")
-            return Phrase(
-                "{object}: {count} eigenvalues written to {file}", object=name, count=len(values), file=path.name
-            )
+            return f"{name}: {len(values)} eigenvalues written to {path.name}"
 
         return write
 

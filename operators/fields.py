@@ -5,7 +5,6 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
-from ..core.phrases import Phrase
 from . import cache
 from .application import ShownOperator, operator_reader
 from .attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
@@ -49,26 +48,21 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
 
     def plan(self, context, obj):
         if self.values == "GROUPS":
-            low = chosen_members(obj, self.low_group, Phrase("Low Group"))
-            high = chosen_members(obj, self.high_group, Phrase("High Group"))
+            low = chosen_members(obj, self.low_group, ("Low Group"))
+            high = chosen_members(obj, self.high_group, ("High Group"))
             both = np.count_nonzero(low & high)
             if both:
                 raise PointCloudError(
-                    '{both} points are both in "{low}" and in "{high}". Remove them from one.',
-                    both=both,
-                    low=self.low_group,
-                    high=self.high_group,
+                    f'{both} points are both in "{self.low_group}" and in "{self.high_group}". Remove them from one.'
                 )
             fixed, shares = low | high, high.astype(np.float64)
         elif self.group or not self.source:
-            shares = chosen_weights(obj, self.group, Phrase("Group"), least=0, outside=np.nan)
+            shares = chosen_weights(obj, self.group, "Group", least=0, outside=np.nan)
             fixed = np.isfinite(shares)  # with weight 0 too
             if not fixed.any():
                 raise PointCloudError(
-                    'The {kind} "{group}" of "{object}" holds no points. Assign some to it in Edit Mode.',
-                    kind=group_kind(obj),
-                    group=self.group,
-                    object=obj.name,
+                    f'The {group_kind(obj)} "{self.group}" of "{obj.name}" holds no points. Assign some to'
+                    " it in Edit Mode."
                 )
         else:
             shares = np.zeros(point_count(obj.data))
@@ -78,10 +72,8 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
             source = read_attribute(obj.data, self.source).astype(np.float64)
             if source.ndim > 1:
                 raise PointCloudError(
-                    'The attribute "{attribute}" of "{object}" holds vectors. Choose one with a number for each'
-                    " point as the source.",
-                    attribute=self.source,
-                    object=obj.name,
+                    f'The attribute "{self.source}" of "{obj.name}" holds vectors. Choose one with a number'
+                    " for each point as the source."
                 )
         _, operator = operator_reader(context, obj)
         low, high = self.low, self.high
@@ -112,9 +104,7 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
     def write(self, context, obj, result):
         write_attribute(obj.data, FIELD, result)
         tag_changed(obj.data)
-        return Phrase(
-            "{object}: a field from {low:.4g} to {high:.4g}", object=obj.name, low=result.min(), high=result.max()
-        )
+        return f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"
 
     def draw_settings(self, context, layout):
         layout.prop(self, "values")
@@ -143,14 +133,13 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
 
     def plan(self, context, obj):
         if is_chosen(obj, self.group, SOURCE):
-            sources = chosen_members(obj, self.group, Phrase("Sources"))
+            sources = chosen_members(obj, self.group, "Sources")
         else:
             sources = selected(obj)
         if sources.all():
             raise PointCloudError(
-                'All points of "{object}" are sources, so that all distances are 0. Select fewer of them in Edit'
-                " Mode, or choose a smaller group.",
-                object=obj.name,
+                f'All points of "{obj.name}" are sources, so that all distances are 0. Select fewer of them in'
+                " Edit Mode, or choose a smaller group."
             )
         _, operator = operator_reader(context, obj)
 
@@ -171,16 +160,9 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
         tag_changed(obj.data)
         missed = np.count_nonzero(~reached)
         if missed:
-            far = Phrase(
-                "{missed:,} points of {object} are reached by no source. Their distance is {unreached:g}.",
-                missed=missed,
-                object=obj.name,
-                unreached=UNREACHED,
-            )
+            far = f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."
             self.warn([far])
-        return Phrase(
-            "{object}: distances up to {distance}", object=obj.name, distance=length_text(result[reached].max())
-        )
+        return f"{obj.name}: distances up to {length_text(result[reached].max())}"
 
     def draw_settings(self, context, layout):
         search_group(layout, self, "group", context.object)

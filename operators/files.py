@@ -195,7 +195,7 @@ def load(path, name: str = ""):
     elif path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
     else:
-        raise PointCloudError("There is no file {path}. Check its name and folder.", path=path)
+        raise PointCloudError(f"There is no file {path}. Check its name and folder.")
     return _choose_object(path, name), notices
 
 
@@ -204,7 +204,7 @@ def _choose_object(path, name):
     meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
     active = bpy.context.view_layer.objects.active
     if not meshes:
-        raise PointCloudError("{path} has no mesh object. Give a file with points.", path=path)
+        raise PointCloudError(f"{path} has no mesh object. Give a file with points.")
     if name:
         chosen = [obj for obj in meshes if obj.name == name]
     elif active in meshes:
@@ -214,12 +214,9 @@ def _choose_object(path, name):
     if len(chosen) != 1:
         names = ", ".join(obj.name for obj in meshes)
         raise PointCloudError(
-            '{path} has no mesh object "{name}". Name one of its mesh objects with --object: {names}.'
+            (f'{path} has no mesh object "{name}". Name one of its mesh objects with --object: {names}.')
             if name
-            else "{path} has no active mesh object. Name one of its mesh objects with --object: {names}.",
-            path=path,
-            name=name,
-            names=names,
+            else (f"{path} has no active mesh object. Name one of its mesh objects with --object: {names}.")
         )
     bpy.context.view_layer.objects.active = chosen[0]
     return chosen[0]

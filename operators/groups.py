@@ -3,16 +3,15 @@
 import numpy as np
 
 from ..core import PointCloudError
-from ..core.phrases import Phrase
 from .attributes import point_count, read_attribute, tag_changed, write_attribute
 
 HANDLE, ANCHOR, FIXED, SOURCE, VALUE, RIM = ROLES = "Handle", "Anchor", "Fixed", "Source", "Value", "Rim"
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
 
 
-def group_kind(obj) -> Phrase:
+def group_kind(obj) -> str:
     """What the groups of an object are called in Blender."""
-    return Phrase("vertex group") if obj.type == "MESH" else Phrase("attribute")
+    return ("vertex group") if obj.type == "MESH" else "attribute"
 
 
 def has_group(obj, name: str) -> bool:
@@ -30,7 +29,7 @@ def search_group(layout, settings, name: str, obj):
     awaited = group in ROLES and not has_group(obj, group)
     layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
     if awaited:
-        layout.label(text=Phrase("No points assigned yet"), icon="INFO")
+        layout.label(text=("No points assigned yet"), icon="INFO")
 
 
 def group_weights(obj, name: str, outside=0.0):
@@ -53,7 +52,7 @@ def is_chosen(obj, name: str, default: str) -> bool:
     return bool(name) and (has_group(obj, name) or name != default)
 
 
-def chosen_weights(obj, name: str, setting: Phrase, least: int = 1, outside=0.0):
+def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
     """Read the weights in the group that a setting names.
 
     Parameters
@@ -61,7 +60,7 @@ def chosen_weights(obj, name: str, setting: Phrase, least: int = 1, outside=0.0)
     obj : bpy.types.Object
     name : str
         The group.
-    setting : Phrase
+    setting : str
         What the panel calls the setting, for the texts of errors.
     least : int
         How many points must have a weight above zero.
@@ -81,38 +80,22 @@ def chosen_weights(obj, name: str, setting: Phrase, least: int = 1, outside=0.0)
     if not has_group(obj, name):
         if not name:
             raise PointCloudError(
-                '"{object}" has no {setting} chosen. Choose a group; Assign to Group makes one from the points selected'
-                " in Edit Mode.",
-                object=obj.name,
-                setting=setting,
+                f'"{obj.name}" has no {setting} chosen. Choose a group; Assign to Group makes one from the'
+                " points selected in Edit Mode."
             )
-        raise PointCloudError(
-            '"{object}" has no {kind} named "{name}". Choose another {setting}, or clear it.'
-            if obj.type == "MESH"
-            else '"{object}" has no {kind} of truth values or numbers on points named "{name}". Choose another'
-            " {setting}, or clear it.",
-            object=obj.name,
-            kind=kind,
-            name=name,
-            setting=setting,
-        )
+        what = kind if obj.type == "MESH" else f"{kind} of truth values or numbers on points"
+        raise PointCloudError(f'"{obj.name}" has no {what} named "{name}". Choose another {setting}, or clear it.')
     weights = group_weights(obj, name, outside)
     count = np.count_nonzero(weights > 0.0)
     if count < least:
         raise PointCloudError(
-            'The {kind} "{name}" gives {held} of {count} points a weight above zero, and {setting} takes at'
-            " least {least}. Assign points to it in Edit Mode, or clear {setting}.",
-            kind=kind,
-            name=name,
-            held=count,
-            count=len(weights),
-            setting=setting,
-            least=least,
+            f'The {kind} "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting}'
+            f" takes at least {least}. Assign points to it in Edit Mode, or clear {setting}."
         )
     return weights
 
 
-def chosen_members(obj, name: str, setting: Phrase, least: int = 1):
+def chosen_members(obj, name: str, setting: str, least: int = 1):
     """Read which points the group that a setting names gives a weight above zero, (n,) bool; see `chosen_weights`."""
     return chosen_weights(obj, name, setting, least) > 0.0
 
@@ -121,25 +104,15 @@ def check_assignable(obj, name: str, must_exist: bool):
     """Refuse a group that points cannot be assigned to, or removed from."""
     kind, exists = group_kind(obj), has_group(obj, name)
     if must_exist and not exists:
-        raise PointCloudError(
-            '"{object}" has no {kind} named "{name}" to remove points from. Choose another.',
-            object=obj.name,
-            kind=kind,
-            name=name,
-        )
+        raise PointCloudError(f'"{obj.name}" has no {kind} named "{name}" to remove points from. Choose another.')
     if name in obj.data.attributes and not (exists and obj.type != "MESH"):
-        reason = Phrase("vertex groups share their names") if obj.type == "MESH" else Phrase("it holds no weights")
+        reason = ("vertex groups share their names") if obj.type == "MESH" else ("it holds no weights")
         raise PointCloudError(
-            '"{object}" has an attribute named "{name}", and {reason}. Choose another name, or rename the attribute.',
-            object=obj.name,
-            name=name,
-            reason=reason,
+            f'"{obj.name}" has an attribute named "{name}", and {reason}. Choose another name, or rename the attribute.'
         )
     if obj.type == "MESH" and exists and obj.vertex_groups[name].lock_weight:
         raise PointCloudError(
-            'The vertex group "{name}" of "{object}" is locked. Unlock it, or choose another name.',
-            name=name,
-            object=obj.name,
+            f'The vertex group "{name}" of "{obj.name}" is locked. Unlock it, or choose another name.'
         )
 
 

@@ -10,12 +10,10 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..core import PointCloudError
 from ..core.files import READABLE, read_points
-from ..core.phrases import Phrase
 from . import cache
 from .files import OFFSET, add_object, file_filter, known_offset, offset_of
 from .job import JobOperator
 from .stages import Stages
-from .translation import translated
 
 LASER = (".las", ".laz")  # listed, so that the error can say what to do with them
 OWN = (".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", *LASER)  # Blender reads the others by itself, too
@@ -81,7 +79,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def obstacle(cls, context):
         if context.mode == "OBJECT":
             return ""
-        return Phrase("Points are imported in Object Mode. Switch to Object Mode first")
+        return "Points are imported in Object Mode. Switch to Object Mode first"
 
     def invoke(self, context, event):
         self._attended = True
@@ -106,7 +104,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             with Stages(context.window_manager, self.bl_label) as stages:
                 tables = _read_all(paths, stages)
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return self.finish(context, [], tables, stages.seconds)
 
@@ -114,7 +112,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         """Add an object for each table."""
         reason = self.obstacle(context)
         if reason:  # while the files were read
-            self.report({"ERROR"}, translated(reason))
+            self.report({"ERROR"}, reason)
             return {"CANCELLED"}
         for other in context.selected_objects:
             other.select_set(False)
@@ -138,22 +136,17 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""
         for notice in table.notices:
-            self.report({"WARNING"}, translated(notice))
+            self.report({"WARNING"}, notice)
         offset = offset_of(obj)
         if offset.any():
             shift = ", ".join(f"{-value:.10g}" for value in offset)
-            text = Phrase(
-                "{object}: {count:,} points, shifted by ({shift})",
-                object=obj.name,
-                count=len(table.points),
-                shift=shift,
-            )
+            text = f"{obj.name}: {len(table.points):,} points, shifted by ({shift})"
         else:
-            text = Phrase("{object}: {count:,} points", object=obj.name, count=len(table.points))
-        self.report({"INFO"}, translated(text))
+            text = f"{obj.name}: {len(table.points):,} points"
+        self.report({"INFO"}, text)
         if shared is not None and (offset != shared).any():
-            text = Phrase("{object} is too far from the points imported before to share their shift", object=obj.name)
-            self.report({"WARNING"}, translated(text))
+            text = f"{obj.name} is too far from the points imported before to share their shift"
+            self.report({"WARNING"}, text)
 
 
 def _frame_selected(context):

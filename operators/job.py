@@ -5,20 +5,16 @@ from threading import Event, Thread
 
 import bpy
 from bpy.app.handlers import persistent
-from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_tip as tip_
 
 from ..core import Cancelled, PointCloudError
-from ..core.phrases import Phrase
 from .handlers import add_handlers, remove_handlers
 from .options import settings_values
 from .reading import find_object, fingerprint, metric, obstacle, read_points
 from .ready import ReadyOperator
 from .result import same_lengths
 from .stages import StageTimes, redraw_panels
-from .translation import translated
 
-STOPPED = Phrase("Stopped: nothing was changed")  # by somebody
+STOPPED = "Stopped: nothing was changed"  # by somebody
 _FIRST = 0.01  # seconds to the first look, which comes after the first drawing
 _TICK = 0.1  # seconds between two looks at the work
 _PATIENCE = 1.0  # seconds that Blender waits at its end for the thread to stop by itself
@@ -35,7 +31,7 @@ def busy() -> str:
     job = running()
     if job is None:
         return ""
-    return Phrase("{label} is running. Wait for it, or press Esc to stop it", label=job.title)
+    return f"{job.title} is running. Wait for it, or press Esc to stop it"
 
 
 class Snapshot:
@@ -59,14 +55,12 @@ class Snapshot:
         """
         obj = self.find()
         if obj is None:
-            raise PointCloudError('"{object}" was deleted meanwhile', object=self.name)
+            raise PointCloudError(f'"{self.name}" was deleted meanwhile')
         reason = obstacle(obj, modes)
         if reason:
-            raise PointCloudError("{reason}", reason=reason)
+            raise PointCloudError(f"{reason}")
         if _state(context, obj) != self._state or not same_lengths(self._metric, metric(obj)):
-            raise PointCloudError(
-                'points, scale or settings of "{object}" were changed meanwhile. Start it again', object=obj.name
-            )
+            raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile. Start it again')
         return obj
 
 
@@ -92,7 +86,7 @@ class Job(StageTimes):
 
     Attributes
     ----------
-    reason : Phrase or ""
+    reason : str or ""
         Why it was stopped; empty while nobody did.
     """
 
@@ -132,7 +126,7 @@ class Job(StageTimes):
     @property
     def title(self):
         """The label in the language of the interface."""
-        return iface_(self.label, "Operator")
+        return self.label
 
     def go_on(self, context):
         """Let the work begin, if it has not yet: once Blender has drawn that it does, from which it would take time."""
@@ -165,7 +159,7 @@ class Job(StageTimes):
                 if all(operator.bl_idname != _ESCAPE for operator in window.modal_operators):
                     with bpy.context.temp_override(window=window):
                         bpy.ops.meshfree.escape("INVOKE_DEFAULT")
-        text = iface_("{}: {}, {:.0%}    Esc to stop").format(self.title, iface_(self.stage), self.fraction)
+        text = f"{self.title}: {self.stage}, {self.fraction:.0%}    Esc to stop"
         if text != self._shown:
             self._shown = text
             _set_status([window.workspace for window in windows], text)
@@ -250,14 +244,14 @@ class JobOperator(ReadyOperator):
     @classmethod
     def poll(cls, context):
         if busy():
-            cls.poll_message_set(translated(busy(), tip_))
+            cls.poll_message_set(busy())
             return False
         return super().poll(context)
 
     def start(self, context, objects, compute, kind=Job):
         """Begin to work for some objects."""
         if busy():  # since a file browser opened
-            raise PointCloudError("{reason}.", reason=busy())
+            raise PointCloudError(f"{busy()}.")
         self._job = kind(self.bl_label, [Snapshot(context, obj) for obj in objects], compute, at_once=False)
         self._job.open(context)
         context.window_manager.modal_handler_add(self)
@@ -269,7 +263,7 @@ class JobOperator(ReadyOperator):
         job = self._job
         for snapshot in job.snapshots:
             if snapshot.find() is None:
-                job.stop(Phrase('Stopped because "{object}" was deleted: nothing was changed', object=snapshot.name))
+                job.stop(f'Stopped because "{snapshot.name}" was deleted: nothing was changed')
         if job.ended:
             job.close(context)
             self.leave(context)
@@ -294,16 +288,16 @@ class JobOperator(ReadyOperator):
         try:
             results = job.result()
         except Cancelled:
-            self.report({"INFO"}, translated(job.reason))
+            self.report({"INFO"}, job.reason)
             return {"CANCELLED"}
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            text = Phrase("{label} wrote nothing: {change}", label=job.title, change=change.text)
-            self.report({"WARNING"}, translated(text))
+            text = f"{job.title} wrote nothing: {change.text}"
+            self.report({"WARNING"}, text)
             return {"CANCELLED"}
         return self.finish(context, objects, results, job.seconds)
 
@@ -317,7 +311,7 @@ class MESHFREE_OT_stop(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if running() is None:
-            cls.poll_message_set(translated(Phrase("Nothing is running"), tip_))
+            cls.poll_message_set("Nothing is running")
         return running() is not None
 
     def execute(self, context):
@@ -373,7 +367,7 @@ def detach():
 def _undone(*_):
     job = running()
     if job is not None:
-        job.stop(Phrase("Stopped by undo: nothing was changed"))
+        job.stop("Stopped by undo: nothing was changed")
 
 
 @persistent

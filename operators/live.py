@@ -16,7 +16,6 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ..core import Cancelled, Deformer, PointCloudError
-from ..core.phrases import Phrase
 from . import binding, cache
 from .handlers import add_handlers, remove_handlers
 from .job import STOPPED, Job, running
@@ -216,7 +215,7 @@ def update_all(scene, depsgraph, quick, waits=True):
             try:
                 update(obj, depsgraph, quick, waits)
             except PointCloudError as error:
-                _troubles[obj.session_uid] = error.text, None
+                _troubles[obj.session_uid] = str(error), None
 
 
 def _bound_objects(scene):
@@ -294,7 +293,7 @@ def _attend(obj, depsgraph) -> bool:
         elif job.prepares:
             job.work.show(bpy.context)
     except PointCloudError as error:
-        _troubles[uid] = error.text, None if job is None else job.pose
+        _troubles[uid] = str(error), None if job is None else job.pose
         return job is not None  # else wait for another pose, not to go wrong again at once
     return True
 
@@ -333,7 +332,7 @@ def _take(obj, job, key, pose):
         live, points, displacement = job.work.result()
     except Cancelled:
         if job.prepares and job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
-            _troubles[obj.session_uid] = Phrase("Binding was stopped. Press Update, or move a handle"), pose
+            _troubles[obj.session_uid] = ("Binding was stopped. Press Update, or move a handle"), pose
         return
     if job.key == key:
         keep(obj, live)

@@ -4,7 +4,6 @@ import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ..core import Cancelled, PointCloudError, minimal_surface
-from ..core.phrases import Phrase
 from . import cache
 from .application import ApplicationOperator
 from .groups import FIXED, chosen_members, group_kind, is_chosen, search_group
@@ -46,7 +45,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
         options = laplacian_options(obj.meshfree)
         fixed = reading.rim
         if is_chosen(obj, self.group, FIXED):
-            fixed = chosen_members(obj, self.group, Phrase("Fixed"))
+            fixed = chosen_members(obj, self.group, "Fixed")
         tolerance, steps, name = self.tolerance, self.steps, obj.name
         kind = group_kind(obj)
 
@@ -56,11 +55,8 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
                 rim = cache.build(reading.points, options, None, progress).laplacian.boundary
                 if not rim.any():
                     raise PointCloudError(
-                        '"{name}" has no rim, so that its surface would shrink to nothing. Assign the points that'
-                        ' stay to the {kind} "{fixed}".',
-                        name=name,
-                        kind=kind,
-                        fixed=FIXED,
+                        f'"{name}" has no rim, so that its surface would shrink to nothing. Assign the points'
+                        f' that stay to the {kind} "{FIXED}".'
                     )
             settings = (reading.points, rim, tolerance, steps, options)
             return reading, cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
@@ -74,13 +70,9 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
             write_positions(obj, reading, film.points, self.target, "Minimal Surface")
         obj[HISTORY] = film.area_history.tolist()
         area = film.area_history[-1] if film.steps else film.initial_area
-        return Phrase(
-            "{object}: area from {before} to {after} in {steps} steps ({reason})",
-            object=obj.name,
-            before=area_text(film.initial_area),
-            after=area_text(float(area)),
-            steps=film.steps,
-            reason=film.reason,
+        return (
+            f"{obj.name}: area from {area_text(film.initial_area)} to {area_text(float(area))} in {film.steps}"
+            f" steps ({film.reason})"
         )
 
     def draw_settings(self, context, layout):

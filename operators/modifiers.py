@@ -98,10 +98,8 @@ def input_property(modifier, name: str):
         identifier = next((key for key, label in named.items() if label == name), None)
     if identifier not in named:
         raise PointCloudError(
-            'The nodes "{group}" have no input "{name}" any more. Undo that, or delete these nodes and use again the'
-            " button that added them.",
-            group=group.name,
-            name=name,
+            f'The nodes "{group.name}" have no input "{name}" any more. Undo that, or delete these nodes and'
+            " use again the button that added them."
         )
     return _input(modifier, identifier)
 

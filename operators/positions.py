@@ -28,27 +28,23 @@ def check_movable(obj, target: str):
     """Refuse an object whose points cannot be moved to given places, before anything is computed."""
     if obj.meshfree.use_modifiers and any(not is_own(item) for item in obj.modifiers):
         raise PointCloudError(
-            'The points of "{object}" were read after its modifiers, and cannot be written back before them. Turn'
-            " off Use Modifiers, or apply the modifiers.",
-            object=obj.name,
+            f'The points of "{obj.name}" were read after its modifiers, and cannot be written back before'
+            " them. Turn off Use Modifiers, or apply the modifiers."
         )
     keys = shape_keys(obj)
     if keys is not None and target == "IN_PLACE":
         raise PointCloudError(
-            '"{object}" has shape keys, so that moving its points in place would not be seen. Choose Shape Key as'
-            " the result, or apply the shape keys.",
-            object=obj.name,
+            f'"{obj.name}" has shape keys, so that moving its points in place would not be seen. Choose Shape'
+            " Key as the result, or apply the shape keys."
         )
     if keys is not None and not keys.use_relative:
         raise PointCloudError(
-            'The shape keys of "{object}" are absolute. Turn on Relative, so that a key can be added to them.',
-            object=obj.name,
+            f'The shape keys of "{obj.name}" are absolute. Turn on Relative, so that a key can be added to them.'
         )
     if keys is not None and obj.show_only_shape_key:
         raise PointCloudError(
-            '"{object}" shows its active shape key alone, which hides a new one. Turn off Solo Active Shape Key'
-            " (pin icon).",
-            object=obj.name,
+            f'"{obj.name}" shows its active shape key alone, which hides a new one. Turn off Solo Active Shape'
+            " Key (pin icon)."
         )
 
 

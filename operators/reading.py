@@ -6,11 +6,9 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_iface as iface_
 from scipy.spatial import cKDTree
 
 from ..core import PointCloudError, check_points
-from ..core.phrases import Phrase
 from ..core.rims import FEWEST
 from .attributes import own_positions, point_count
 from .counting import members
@@ -26,54 +24,33 @@ def shape_keys(obj):
     return obj.data.shape_keys if obj.type == "MESH" else None
 
 
-def obstacle(obj, modes=("OBJECT",)) -> Phrase | str:
+def obstacle(obj, modes=("OBJECT",)) -> str:
     """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
     if obj is None:
-        return Phrase("No active object. Select a mesh with the points of a surface")
+        return "No active object. Select a mesh with the points of a surface"
     if obj.type == "EMPTY" and obj.instance_collection is not None:
-        return Phrase(
-            '"{object}" shows the collection "{collection}". Select an object of that, or use Object > Apply >'
-            " Make Instances Real",
-            object=obj.name,
-            collection=obj.instance_collection.name,
+        return (
+            f'"{obj.name}" shows the collection "{obj.instance_collection.name}". Select an object of that,'
+            " or use Object > Apply > Make Instances Real"
         )
     if obj.type not in TYPES:
-        types = obj.bl_rna.properties["type"]
-        english = types.enum_items[obj.type].name
-        vowel, kind = english[0] in "AE", iface_(english, types.translation_context)
-        if obj.type in _CONVERTIBLE:
-            return Phrase(
-                '"{object}" is an {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh'
-                if vowel
-                else '"{object}" is a {kind}, not a Mesh. Convert it with Object > Convert > Mesh, or select a mesh',
-                object=obj.name,
-                kind=kind,
-            )
-        return Phrase(
-            '"{object}" is an {kind}, not a Mesh. Select a mesh'
-            if vowel
-            else '"{object}" is a {kind}, not a Mesh. Select a mesh',
-            object=obj.name,
-            kind=kind,
-        )
+        kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
+        article = "an" if kind[0] in "AE" else "a"
+        way = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
+        return f'"{obj.name}" is {article} {kind}, not a Mesh. {way} a mesh'
     if not obj.is_editable or not obj.data.is_editable:
-        return Phrase(
-            '"{object}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data',
-            object=obj.name,
-        )
+        return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
     edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
     if obj.mode not in modes or edited:
-        return Phrase('"{object}" is not in Object Mode. Switch to Object Mode first', object=obj.name)
+        return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
     if not point_count(obj.data):
-        kind = Phrase("vertices") if obj.type == "MESH" else Phrase("points")
+        kind = "vertices" if obj.type == "MESH" else "points"
         if obj.meshfree.point_count:  # it had some: Convert takes what modifiers show, and ours shows points
-            return Phrase(
-                '"{object}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under Points'
-                " and Groups",
-                object=obj.name,
-                kind=kind,
+            return (
+                f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under'
+                " Points and Groups"
             )
-        return Phrase('"{object}" has no {kind}. Add points, or select another object', object=obj.name, kind=kind)
+        return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
 
 
@@ -124,21 +101,13 @@ def read_points(context, obj) -> Reading:
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     if not np.linalg.cond(matrix) < 1e6:
         raise PointCloudError(
-            '"{object}" is scaled to nothing along an axis, so its {count} points have no area. Give it a scale'
-            " above zero along each axis.",
-            object=obj.name,
-            count=len(positions),
+            f'"{obj.name}" is scaled to nothing along an axis, so its {len(positions)} points have no area.'
+            " Give it a scale above zero along each axis."
         )
     notices = []
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
-        notices.append(
-            Phrase(
-                "The mesh has {faces} faces: it is taken as its {count} vertices.",
-                faces=faces,
-                count=point_count(obj.data),
-            )
-        )
+        notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
     return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
 
 
@@ -153,7 +122,7 @@ def seen_positions(context, obj):
 def rim_points(obj):
     """Read which points the rim group of an object holds, (n,) bool; None if the settings name no group."""
     name = obj.meshfree.rim_group
-    return chosen_members(obj, name, Phrase("Rim Group"), FEWEST) if name else None
+    return chosen_members(obj, name, ("Rim Group"), FEWEST) if name else None
 
 
 def key_positions(key):
@@ -169,9 +138,8 @@ def _evaluated_positions(context, obj):
         evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
         if not evaluated.is_evaluated:
             raise PointCloudError(
-                '"{object}" is disabled in viewports, so its shape keys and modifiers are not computed. Enable it'
-                " in the Outliner (monitor icon).",
-                object=obj.name,
+                f'"{obj.name}" is disabled in viewports, so its shape keys and modifiers are not computed.'
+                " Enable it in the Outliner (monitor icon)."
             )
         if obj.type == "MESH":
             positions = own_positions(evaluated.to_mesh())
@@ -180,11 +148,8 @@ def _evaluated_positions(context, obj):
             positions = own_positions(evaluated.data)
     if len(positions) != point_count(obj.data):
         raise PointCloudError(
-            'The modifiers of "{object}" turn its {count} points into {found}, instances not counted, so results'
-            " have no place. Apply these modifiers, or turn off Use Modifiers.",
-            object=obj.name,
-            count=point_count(obj.data),
-            found=len(positions),
+            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)},'
+            " instances not counted, so results have no place. Apply these modifiers, or turn off Use Modifiers."
         )
     return positions
 

@@ -1,11 +1,8 @@
 """What all operators have in common: they run on objects that can be read and written, and can be undone."""
 
 import bpy
-from bpy.app.translations import pgettext_tip as tip_
 
-from ..core.phrases import Phrase
 from .reading import obstacle
-from .translation import translated
 
 
 class ReadyOperator:
@@ -21,7 +18,7 @@ class ReadyOperator:
         return context.object
 
     @classmethod
-    def obstacle(cls, context) -> Phrase | str:
+    def obstacle(cls, context) -> str:
         """Return what keeps the operator from running, and what to do; empty if nothing does."""
         return obstacle(cls.subject(context), cls.works_in)
 
@@ -29,7 +26,7 @@ class ReadyOperator:
     def poll(cls, context):
         reason = cls.obstacle(context)
         if reason:
-            cls.poll_message_set(translated(reason, tip_))
+            cls.poll_message_set(reason)
         return not reason
 
     def takes_window(self):

@@ -47,9 +47,7 @@ def check_writable(obj, names, make_single_user: bool, among=()):
     if others and not make_single_user:
         shown = ", ".join(f'"{name}"' for name in others[:3]) + (", ..." if len(others) > 3 else "")
         raise PointCloudError(
-            '"{object}" shares its mesh with {shown}. Turn on Make Single User to give it a mesh of its own.',
-            object=obj.name,
-            shown=shown,
+            f'"{obj.name}" shares its mesh with {shown}. Turn on Make Single User to give it a mesh of its own.'
         )
     check_names(obj, names)
 

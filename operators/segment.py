@@ -6,7 +6,6 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ..core import PointCloudError, heat_kernel_signature, modes_needed, nodal_domains, segment, wave_kernel_signature
-from ..core.phrases import Phrase
 from . import cache
 from .analyze import resolved_modes
 from .application import ApplicationOperator, ShownOperator, operator_reader
@@ -72,9 +71,7 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         if self.vertex_groups:
             _write_groups(obj, [result == label for label in range(count)])
         tag_changed(obj.data)
-        return Phrase(
-            "{object}: {count} parts" if count > 1 else "{object}: {count} part", object=obj.name, count=count
-        )
+        return (f"{obj.name}: {count} parts") if count > 1 else (f"{obj.name}: {count} part")
 
     def draw_settings(self, context, layout):
         for name in ("method", "mode" if self.method == "NODAL" else "parts", "vertex_groups", "show"):
@@ -118,16 +115,14 @@ def _check_groups(obj):
     locked = [group.name for group in obj.vertex_groups if _is_numbered(group.name) and group.lock_weight]
     if locked:
         raise PointCloudError(
-            'The vertex groups {groups} of "{object}" are locked, and would be replaced. Unlock or rename them.',
-            groups=", ".join(locked),
-            object=obj.name,
+            f'The vertex groups {", ".join(locked)} of "{obj.name}" are locked, and would be replaced. Unlock'
+            " or rename them."
         )
     taken = [attribute.name for attribute in obj.data.attributes if _is_numbered(attribute.name)]
     if taken:
         raise PointCloudError(
-            '"{object}" has attributes named {taken}, and vertex groups share their names. Rename these attributes.',
-            object=obj.name,
-            taken=", ".join(taken),
+            f'"{obj.name}" has attributes named {", ".join(taken)}, and vertex groups share their names.'
+            " Rename these attributes."
         )
 
 
@@ -143,20 +138,16 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
         reason = super().obstacle(context)
         if reason or SEGMENT in context.object.data.attributes:
             return reason
-        return Phrase('"{object}" has no parts. Segment it first', object=context.object.name)
+        return f'"{context.object.name}" has no parts. Segment it first'
 
     def plan(self, context, obj):
         leaving = [other for other in context.selected_objects if other.meshfree.make_single_user]
         check_writable(obj, (), obj.meshfree.make_single_user, among=leaving)  # others would lose points
         if obj.type != "MESH" and not obj.visible_get():
-            raise PointCloudError(
-                '"{object}" is hidden. Show it, so that its points can be divided in Edit Mode.', object=obj.name
-            )
+            raise PointCloudError(f'"{obj.name}" is hidden. Show it, so that its points can be divided in Edit Mode.')
         labels = read_attribute(obj.data, SEGMENT)
         if labels.dtype.kind != "i" or len(np.unique(labels[labels >= 0])) < 2:
-            raise PointCloudError(
-                'All points of "{object}" are in one part. Segment it into more parts first.', object=obj.name
-            )
+            raise PointCloudError(f'All points of "{obj.name}" are in one part. Segment it into more parts first.')
         return lambda progress: labels
 
     def write(self, context, obj, result):
@@ -172,7 +163,7 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
                 collection.objects.link(part)
             _keep(context, part, result == number)
         _keep(context, obj, ~np.isin(result, numbers))
-        return Phrase("{object}: {count} parts are objects of their own", object=obj.name, count=len(numbers) + 1)
+        return f"{obj.name}: {len(numbers) + 1} parts are objects of their own"
 
 
 def _keep(context, obj, kept):
@@ -250,7 +241,7 @@ class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
         for name, values in zip(self.writes, result.T, strict=True):
             write_attribute(obj.data, name, values)
         tag_changed(obj.data)
-        return Phrase("{object}: signatures at {count} scales", object=obj.name, count=self.count)
+        return f"{obj.name}: signatures at {self.count} scales"
 
 
 CLASSES = (MESHFREE_OT_segment, MESHFREE_OT_separate_by_segment, MESHFREE_OT_signature)

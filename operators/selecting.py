@@ -7,7 +7,6 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
 from ..core import PointCloudError, grow
-from ..core.phrases import Phrase
 from .application import compute_all, naming, operator_reader
 from .attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from .counting import renew_counts
@@ -15,7 +14,6 @@ from .groups import HANDLE, assign, check_assignable, chosen_members
 from .job import JobOperator
 from .reading import obstacle
 from .stages import Stages
-from .translation import translated
 
 
 class SelectionOperator(JobOperator):
@@ -40,7 +38,7 @@ class SelectionOperator(JobOperator):
                 plans = [(obj.name, operator_reader(context, obj)[1]) for obj in objects]
                 return self.start(context, objects, lambda progress: compute_all(plans, progress))
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
 
     def complete(self, context, job):
@@ -66,11 +64,11 @@ class SelectionOperator(JobOperator):
                     with naming(obj.name):
                         changes.append(self.prepare(context, obj))
             except PointCloudError as error:
-                self.report({"ERROR"}, translated(error))
+                self.report({"ERROR"}, str(error))
                 return {"CANCELLED"}
             messages = [change() for change in changes]
         for obj, message in zip(objects, messages, strict=True):
-            self.report({"INFO"}, translated(Phrase("{object}: {message}", object=obj.name, message=message)))
+            self.report({"INFO"}, f"{obj.name}: {message}")
         return {"FINISHED"}
 
     def with_points(self, objects):
@@ -125,7 +123,7 @@ def selected(obj):
     """Read which points are selected, (n,) bool; at least one is."""
     chosen = selection(obj)
     if not chosen.any():
-        raise PointCloudError('No points of "{object}" are selected. Select some in Edit Mode.', object=obj.name)
+        raise PointCloudError(f'No points of "{obj.name}" are selected. Select some in Edit Mode.')
     return chosen
 
 
@@ -143,7 +141,7 @@ def select(context, obj, chosen) -> str:
     else:
         write_attribute(obj.data, SELECTION, shown, "BOOLEAN")
     tag_changed(obj.data)
-    return Phrase("{chosen:,} of {count:,} points are selected", chosen=np.count_nonzero(shown), count=len(shown))
+    return f"{np.count_nonzero(shown):,} of {len(shown):,} points are selected"
 
 
 def groups_changed(obj):
@@ -280,9 +278,8 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             chosen &= self.facing(context, obj)
             if not chosen.any():
                 raise PointCloudError(
-                    'All selected points of "{object}" face away from the viewer. Turn off Front Only, or look'
-                    " from the other side.",
-                    object=obj.name,
+                    f'All selected points of "{obj.name}" face away from the viewer. Turn off Front Only, or'
+                    " look from the other side."
                 )
         name = self.name or self.role.title()
         check_assignable(obj, name, must_exist=self.action == "REMOVE")
@@ -292,15 +289,8 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             groups_changed(obj)
             if self.role == "RIM" and self.action != "REMOVE":
                 obj.meshfree.rim_group = name
-            return Phrase(
-                {
-                    "REPLACE": '{count:,} points are in the group "{name}"',
-                    "ADD": '{count:,} points were added to the group "{name}"',
-                    "REMOVE": '{count:,} points were removed from the group "{name}"',
-                }[self.action],
-                count=np.count_nonzero(chosen),
-                name=name,
-            )
+            done = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
+            return f'{np.count_nonzero(chosen):,} points {done} the group "{name}"'
 
         return change
 
@@ -315,9 +305,7 @@ class MESHFREE_OT_select_rim(SelectionOperator, bpy.types.Operator):
     def prepare(self, context, obj):
         rim = analyzed(context, obj)[1].boundary
         if not rim.any():
-            raise PointCloudError(
-                '"{object}" has no rim: its surface is closed, or Rims is off in the settings.', object=obj.name
-            )
+            raise PointCloudError(f'"{obj.name}" has no rim: its surface is closed, or Rims is off in the settings.')
         return lambda: select(context, obj, rim)
 
 
@@ -332,7 +320,7 @@ class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
     name: StringProperty(name="Name", description="Name of the group", default=HANDLE, maxlen=63)
 
     def prepare(self, context, obj):
-        chosen = chosen_members(obj, self.name, Phrase("Name"))
+        chosen = chosen_members(obj, self.name, "Name")
         return lambda: select(context, obj, chosen)
 
 

@@ -14,7 +14,6 @@ from ..core import (
     smooth_points,
     smoothing_base,
 )
-from ..core.phrases import Phrase
 from . import cache
 from .application import ApplicationOperator, operator_reader
 from .groups import chosen_weights, search_group
@@ -87,7 +86,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
     def plan(self, context, obj):
         check_movable(obj, self.target)
         reading, operator = operator_reader(context, obj)
-        mask = chosen_weights(obj, self.group, Phrase("Vertex Group")) if self.group else None
+        mask = chosen_weights(obj, self.group, ("Vertex Group")) if self.group else None
         method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
         shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
         keep_rim, name = self.keep_rim, obj.name
@@ -97,17 +96,13 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
             fixed_rim = keep_rim and bool(laplacian.boundary.any())
             if fixed_rim and shared["keep"]:
                 raise PointCloudError(
-                    '"{name}" has a rim, which stays and fixes the size already. Set Keep to Nothing, or turn off'
-                    " Keep Rim.",
-                    name=name,
+                    f'"{name}" has a rim, which stays and fixes the size already. Set Keep to Nothing, or turn'
+                    " off Keep Rim."
                 )
             size = np.linalg.norm(np.ptp(reading.points, axis=0))
             if wavelength > size:
                 raise PointCloudError(
-                    'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.',
-                    wavelength=wavelength,
-                    name=name,
-                    size=size,
+                    f'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.'
                 )
             blend = PointBlend(laplacian, fixed_rim=fixed_rim, **shared)
             settings = (
@@ -141,12 +136,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         reading, points = result
         write_positions(obj, reading, points, self.target, "Smooth")
         moved = np.sqrt(np.mean(np.sum((points - reading.points) ** 2, axis=1)))
-        return Phrase(
-            "{object}: {count:,} points moved by {distance} on average",
-            object=obj.name,
-            count=len(points),
-            distance=length_text(moved),
-        )
+        return f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"
 
     def draw_settings(self, context, layout):
         layout.prop(self, "method")
@@ -208,9 +198,8 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
         target = "SHAPE_KEY" if self.animate else self.target
         if self.animate and obj.type != "MESH":
             raise PointCloudError(
-                '"{object}" is a Point Cloud, which has no shape keys to animate. Turn off Animate, or convert it'
-                " with Object > Convert > Mesh.",
-                object=obj.name,
+                f'"{obj.name}" is a Point Cloud, which has no shape keys to animate. Turn off Animate, or'
+                " convert it with Object > Convert > Mesh."
             )
         check_movable(obj, target)
         reading, operator = operator_reader(context, obj)
@@ -233,9 +222,7 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     def write(self, context, obj, result):
         reading, points, mode = result
         if mode < self.mode:
-            again = Phrase(
-                "Only {mode} modes are computed: this is the last. Start Deform by Mode again for more.", mode=mode
-            )
+            again = f"Only {mode} modes are computed: this is the last. Start Deform by Mode again for more."
             self.warn([again])
         key = write_positions(obj, reading, points, "SHAPE_KEY" if self.animate else self.target, f"Mode {mode}")
         if self.animate:
@@ -245,12 +232,7 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
                 key.value = (1.0, 0.0, -1.0, 0.0)[index % 4]
                 key.keyframe_insert("value", frame=scene.frame_start + index * quarter)
         largest = np.linalg.norm(points - reading.points, axis=1).max()
-        return Phrase(
-            "{object}: moved by mode {mode}, at most by {distance}",
-            object=obj.name,
-            mode=mode,
-            distance=length_text(largest),
-        )
+        return f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"
 
     def draw_settings(self, context, layout):
         for name in ("mode", "amplitude", "phase", "animate"):

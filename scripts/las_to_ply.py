@@ -29,11 +29,9 @@ def read_las(path) -> PointTable:
     try:
         las = laspy.read(path)
     except (laspy.errors.LaspyException, OSError, ValueError) as error:
-        raise PointCloudError(
-            "{path} cannot be read as a LAS or LAZ file: {error}", path=path, error=str(error)
-        ) from error
+        raise PointCloudError(f"{path} cannot be read as a LAS or LAZ file: {error}") from error
     if len(las.points) == 0:
-        raise PointCloudError("{path} has no points.", path=path)
+        raise PointCloudError(f"{path} has no points.")
     table = PointTable(np.stack([las.x, las.y, las.z], axis=1).astype(np.float64))
     for name in (*COLUMNS, *las.point_format.extra_dimension_names):
         values = np.asarray(las[name])
@@ -56,7 +54,7 @@ def main():
             table = read_las(path)
             target = path.with_suffix(".ply")
             if target.exists():
-                raise PointCloudError("{file} exists already. Move or rename it.", file=target)
+                raise PointCloudError(f"{target} exists already. Move or rename it.")
             write_points(target, table)
         except (PointCloudError, OSError) as error:
             sys.exit(str(error))

@@ -5,7 +5,6 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError
 from ..operators.ready import ReadyOperator
-from ..operators.translation import translated
 from .color_choices import COLOR_CHOICES, color_choice
 from .show import show_attribute, use_material_preview
 
@@ -44,7 +43,7 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
         try:
             show_attribute(obj, self.attribute, self.radius)
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         for name in COLOR_CHOICES:  # the settings of the object keep what they are unless given
             if not self.properties.is_property_set(name):

@@ -1,7 +1,6 @@
 """The panel of the deformation by handles."""
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..operators import live
 from ..operators.binding import copied_from, handle_names, handled_object, is_bound, stale_reason
@@ -9,7 +8,6 @@ from ..operators.deform_nodes import find_deform, is_baked
 from ..operators.groups import search_group
 from ..operators.modifiers import input_property
 from ..operators.reading import obstacle
-from ..operators.translation import translated
 from .panel import SidebarPanel
 
 _WIDTH = 38  # letters in a line of the panel
@@ -29,7 +27,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, obj = self.layout, handled_object(context.object, context.scene)
         if obj != context.object:
-            layout.label(text=iface_("Moves handles of {}").format(obj.name), icon="EMPTY_DATA")
+            layout.label(text=f"Moves handles of {obj.name}", icon="EMPTY_DATA")
         settings = obj.meshfree.deform
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -38,7 +36,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         search_group(column, settings, "anchors", obj)
         names = handle_names(obj)
         if len(names) > 1:
-            column.label(text=iface_("{} groups of handles").format(len(names)), icon="INFO")
+            column.label(text=f"{len(names)} groups of handles", icon="INFO")
         if obj == context.object:  # whose points are selected
             layout.operator("meshfree.handle_add")
         column = layout.column(align=True)
@@ -74,15 +72,15 @@ def _draw_state(layout, obj):
     """Draw whether the points follow the handles, and what to do if not."""
     reason, working = stale_reason(obj, glance=True) or live.trouble(obj), live.preparing(obj)
     if reason:
-        state = "Baked. {}" if is_baked(obj) else "Copy. {}" if copied_from(obj) is not None else "Not up to date. {}"
-        text = iface_(state).format(translated(reason, iface_))
+        state = "Baked" if is_baked(obj) else "Copy" if copied_from(obj) is not None else "Not up to date"
+        text = f"{state}. {reason}"
         icon = "INFO" if is_baked(obj) else "ERROR"
     elif working is not None:
         stage, fraction = working
-        text = iface_("Not up to date. Binding: {}, {:.0%}").format(iface_(stage), fraction)
+        text = f"Not up to date. Binding: {stage}, {fraction:.0%}"
         icon = "SORTTIME"
     else:
-        text, icon = iface_("Bound: follows its handles"), "CHECKMARK"
+        text, icon = "Bound: follows its handles", "CHECKMARK"
     column = layout.column(align=True)
     for line in _wrapped(text):
         column.label(text=line, icon=icon)

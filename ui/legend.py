@@ -5,7 +5,6 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..core import PointCloudError
 from ..operators.ready import ReadyOperator
-from ..operators.translation import translated
 from .display import shown_attribute
 from .nodes import add_node, new_tree
 from .scale import shown_scale
@@ -103,19 +102,15 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
             if not self.show:
                 legend = find_legend(scene, obj)
                 if legend is None:
-                    raise PointCloudError(
-                        'There is no legend of "{object}" in this scene to take away.', object=obj.name
-                    )
+                    raise PointCloudError(f'There is no legend of "{obj.name}" in this scene to take away.')
                 remove_legend(scene, legend)
                 return {"FINISHED"}
             if scene.camera is None:
                 raise PointCloudError("The scene has no camera to put a legend in front of. Add one with Add > Camera.")
             if not shown_attribute(obj):
-                raise PointCloudError(
-                    '"{object}" shows no colors yet. Choose what to see under Display first.', object=obj.name
-                )
+                raise PointCloudError(f'"{obj.name}" shows no colors yet. Choose what to see under Display first.')
         except PointCloudError as error:
-            self.report({"ERROR"}, translated(error))
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         make_legend(scene, obj, scene.camera, self.title)
         return {"FINISHED"}

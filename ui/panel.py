@@ -1,9 +1,7 @@
 """The panel in the sidebar of the 3D view, tab "Mesh-Free"."""
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.phrases import Phrase
 from ..operators.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.binding import handled_object
 from ..operators.groups import search_group
@@ -11,13 +9,12 @@ from ..operators.job import running
 from ..operators.modifiers import is_own
 from ..operators.reading import obstacle, sharing_objects
 from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
-from ..operators.translation import translated
 from .display import find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
 
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
-_EDITING = Phrase("Choose points here, in Edit Mode. Switch to Object Mode to analyze")
+_EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
 _SETTINGS = (  # what belongs together
     ("rims", "rim_group", "sheets", "projection"),
     ("bandwidth", "neighbors", "bandwidth_factor"),
@@ -60,7 +57,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             return  # the panel of the deformation tells
         if reason:
             column = layout.column(align=True)
-            for sentence in translated(reason if obstacle(obj, ("EDIT",)) else _EDITING, iface_).split(". "):
+            for sentence in (reason if obstacle(obj, ("EDIT",)) else _EDITING).split(". "):
                 column.label(text=sentence)
             if context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
@@ -78,9 +75,9 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
 def _draw_job(layout, job):
     """Draw what is computed, how far it is, and how to stop it."""
     column = layout.column(align=True)
-    column.label(text=iface_("{} (Esc to Stop)").format(job.title))
+    column.label(text=f"{job.title} (Esc to Stop)")
     row = column.row(align=True)
-    row.progress(text=f"{iface_(job.stage)}: {job.fraction:.0%}", factor=job.fraction)
+    row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
     row.operator("meshfree.stop", text="", icon="X")
 
 
@@ -103,19 +100,18 @@ def _draw_result(layout, result):
 def _draw_summary(layout, obj):
     mesh = obj.data
     column = layout.column(align=True)
-    points = iface_("{}: {:,} points").format(obj.name, point_count(mesh))
-    column.label(text=points, icon=f"OUTLINER_OB_{obj.type}")
+    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon=f"OUTLINER_OB_{obj.type}")
     if obj.type == "MESH" and mesh.polygons:
-        column.label(text=iface_("Faces not used: {:,}").format(len(mesh.polygons)), icon="INFO")
+        column.label(text=f"Faces not used: {len(mesh.polygons):,}", icon="INFO")
     scale = obj.matrix_world.to_scale()
     if max(abs(factor - 1.0) for factor in scale) > 1e-5:
         shown = ", ".join(f"{factor:.4g}" for factor in scale)
-        column.label(text=iface_("Object scale ({}) is applied").format(shown), icon="INFO")
+        column.label(text=f"Object scale ({shown}) is applied", icon="INFO")
         column.label(text="to lengths and areas", icon="BLANK1")
     modifiers = [modifier for modifier in obj.modifiers if not is_own(modifier)]
     if modifiers:
-        text = "Modifiers used: {}" if obj.meshfree.use_modifiers else "Modifiers left out: {}"
-        column.label(text=iface_(text).format(len(modifiers)), icon="MODIFIER")
+        what = "used" if obj.meshfree.use_modifiers else "left out"
+        column.label(text=f"Modifiers {what}: {len(modifiers)}", icon="MODIFIER")
         column.prop(obj.meshfree, "use_modifiers")
     if sharing_objects(obj):
         column.label(text="Other objects share this mesh", icon="INFO")
@@ -176,7 +172,7 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
             else:
                 grid.label(text=text)
         if len(eigenvalues) > _LISTED:
-            more = iface_("and {} more, up to {:.5g}").format(len(eigenvalues) - _LISTED, eigenvalues[-1])
+            more = f"and {len(eigenvalues) - _LISTED} more, up to {eigenvalues[-1]:.5g}"
             layout.label(text=more)
 
 

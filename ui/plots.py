@@ -1,7 +1,6 @@
 """The pictures over the view: the legend, the histogram of what is shown, and the eigenvalues."""
 
 import numpy as np
-from bpy.app.translations import pgettext_iface as iface_
 
 from .canvas import DIM, WHITE, Picture
 from .colormaps import to_display
@@ -80,8 +79,8 @@ def histogram_picture(scale, edges, counts, beyond) -> Picture:
             )
     y = _EDGE + 0.2 * _LINE
     if any(beyond):
-        picture.text(iface_("{:,} below").format(beyond[0]), left, y)
-        picture.text(iface_("{:,} above").format(beyond[1]), right, y, "RIGHT")
+        picture.text(f"{beyond[0]:,} below", left, y)
+        picture.text(f"{beyond[1]:,} above", right, y, "RIGHT")
     return picture
 
 

@@ -1,7 +1,6 @@
 """The panel about points: selecting them, and the groups that the tools take."""
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..operators.convert import MESHFREE_OT_convert
 from ..operators.counting import members
@@ -34,8 +33,7 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
         for role, title in _TITLES.items():
             row = column.split(factor=0.66, align=True)
             icon = {"icon_value": swatch(role)} if obj.meshfree.show_groups else {}
-            text = iface_("Assign to {}").format(iface_(title))
-            row.operator("meshfree.group_from_selection", text=text, **icon).role = role.upper()
+            row.operator("meshfree.group_from_selection", text=f"Assign to {title}", **icon).role = role.upper()
             found = members(obj, role, glance=True)
             text = "..." if found is None else f"{found.count:,}"
             selecting = row.row(align=True)

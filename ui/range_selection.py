@@ -40,9 +40,8 @@ class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
         bounds = shown_range(obj)
         if bounds is None:
             raise PointCloudError(
-                '"{object}" shows no numbers as colors. Show an attribute, or one component of a vector, under'
-                " Display first.",
-                object=obj.name,
+                f'"{obj.name}" shows no numbers as colors. Show an attribute, or one component of a vector,'
+                " under Display first."
             )
         for name, bound in zip(("low", "high"), bounds, strict=True):
             if not self.properties.is_property_set(name):
@@ -55,12 +54,15 @@ class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
             chosen |= selection(obj)
         if not chosen.any():
             raise PointCloudError(
-                "No value of {attribute} lies outside {low:g} to {high:g}. Widen the range."
+                (
+                    f"No value of {label(shown_attribute(obj))} lies outside {self.low:g} to {self.high:g}. Widen"
+                    " the range."
+                )
                 if self.invert
-                else "No value of {attribute} lies from {low:g} to {high:g}. Widen the range.",
-                attribute=label(shown_attribute(obj)),
-                low=self.low,
-                high=self.high,
+                else (
+                    f"No value of {label(shown_attribute(obj))} lies from {self.low:g} to {self.high:g}. Widen the"
+                    " range."
+                )
             )
         return lambda: select(context, obj, chosen)
 

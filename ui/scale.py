@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-from bpy.app.translations import pgettext_iface as iface_
-
 from .display import color_node, label, range_node, shown_attribute, shown_range, step_colors
 from .nodes import direction_color
 from .ticks import round_ticks, tick_texts
@@ -79,4 +77,4 @@ def _shortened(boxes):
     if len(boxes) <= _MOST_BOXES:
         return boxes
     kept = dict(list(boxes.items())[: _MOST_BOXES - 1])
-    return kept | {iface_("{} more").format(len(boxes) - len(kept)): (0.0, 0.0, 0.0, 0.0)}
+    return kept | {f"{len(boxes) - len(kept)} more": (0.0, 0.0, 0.0, 0.0)}

@@ -5,7 +5,6 @@ import zipfile
 import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError
-from ..phrases import Phrase
 from .ply import read_ply, write_ply
 from .table import PointTable, check_table
 from .text import read_columns, read_scan, read_vertices, write_columns
@@ -23,15 +22,10 @@ def _read_array(path) -> PointTable:
                 loaded = loaded["points"]
     except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile) as error:
         raise InvalidPointsError(
-            "{path} holds no array of points: {problem}. Save it again.", path=path, problem=str(error).strip(chr(39))
+            f"{path} holds no array of points: {str(error).strip(chr(39))}. Save it again."
         ) from None
     if loaded.ndim != 2 or loaded.shape[1] != 3 or loaded.dtype.kind not in "iuf":
-        raise InvalidPointsError(
-            "{path} holds {type} of the shape {shape}. Points are numbers (n, 3).",
-            path=path,
-            type=loaded.dtype,
-            shape=loaded.shape,
-        )
+        raise InvalidPointsError(f"{path} holds {loaded.dtype} of the shape {loaded.shape}. Points are numbers (n, 3).")
     return PointTable(loaded.astype(np.float64), single=loaded.dtype == np.float32)
 
 
@@ -68,32 +62,22 @@ def read_points(path) -> PointTable:
     suffix = path.suffix.lower()
     if suffix in _LASER:
         raise PointCloudError(
-            "{path} is a LAS file, which cannot be read inside Blender. Convert it to PLY with coordinates in"
-            " double precision first, for instance with this extension's source: make convert LAS={file}",
-            path=path,
-            file=path.name,
+            f"{path} is a LAS file, which cannot be read inside Blender. Convert it to PLY with coordinates in"
+            f" double precision first, for instance with this extension's source: make convert LAS={path.name}"
         )
     if suffix not in _READERS:
-        raise PointCloudError(
-            "{path} is not a file with points. Give one of {endings}.", path=path, endings=", ".join(READABLE)
-        )
+        raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
     if not path.is_file():
-        raise PointCloudError("There is no file {path}. Check its name and folder.", path=path)
+        raise PointCloudError(f"There is no file {path}. Check its name and folder.")
     try:
         table = check_table(_READERS[suffix](path), path)
     except OSError as error:
-        raise PointCloudError(
-            "{path} cannot be read: {problem}. Check the file.", path=path, problem=error.strerror or error
-        ) from error
+        raise PointCloudError(f"{path} cannot be read: {error.strerror or error}. Check the file.") from error
     step = float(np.spacing(np.float32(np.abs(table.points).max())))
     if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
         table.notices.append(
-            Phrase(
-                "{file}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in double"
-                " precision, or with a shift.",
-                file=path.name,
-                step=step,
-            )
+            f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in"
+            " double precision, or with a shift."
         )
     return table
 
@@ -110,9 +94,7 @@ def write_points(path, table, double=True):
     """
     suffix = path.suffix.lower()
     if suffix not in WRITABLE:
-        raise PointCloudError(
-            "Points cannot be written to {path}. Give it one of {endings}.", path=path, endings=", ".join(WRITABLE)
-        )
+        raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(WRITABLE)}.")
     with replacing(path) as part:
         if suffix == ".ply":
             write_ply(part, table, double)

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidPointsError
-from ..phrases import Phrase
 from .table import PointTable, from_columns, to_columns
 
 _NAMES = {
@@ -45,18 +44,14 @@ def read_ply(path) -> PointTable:
         names = [element.name for element in elements]
         if "vertex" not in names:
             raise InvalidPointsError(
-                "{path} has no vertices, only {others}. It holds no points.",
-                path=path,
-                others=", ".join(names) or Phrase("nothing"),
+                f"{path} has no vertices, only {', '.join(names) or 'nothing'}. It holds no points."
             )
         at = names.index("vertex")
         for element in (elements[at], *elements[:at]):
             if None in element.types and (element.count or element.name == "vertex"):
                 raise InvalidPointsError(
-                    "{path} has lists in its element {element}, before or among its points. Save it again with"
-                    " plain vertices first.",
-                    path=path,
-                    element=element.name,
+                    f"{path} has lists in its element {element.name}, before or among its points. Save it again"
+                    " with plain vertices first."
                 )
         vertex = elements[at]
         if order is None:
@@ -71,12 +66,7 @@ def read_ply(path) -> PointTable:
             columns = [column.astype(column.dtype.newbyteorder("=")) for column in columns]
     table = from_columns(dict(zip(vertex.names, columns, strict=True)), path)
     table.notices += [
-        Phrase(
-            "{file}: left out {count} {element} elements. Only points are read.",
-            file=path.name,
-            count=element.count,
-            element=element.name,
-        )
+        (f"{path.name}: left out {element.count} {element.name} elements. Only points are read.")
         for element in elements
         if element is not vertex and element.count
     ]
@@ -90,16 +80,14 @@ def _record(element, order):
 def _read_header(file, path):
     """Return the byte order, None for text, and the elements; leave the file where the data begin."""
     if file.readline(_LONGEST).strip() != b"ply":
-        raise InvalidPointsError("{path} is no PLY file: its first line is not 'ply'. Export it again.", path=path)
+        raise InvalidPointsError(f"{path} is no PLY file: its first line is not 'ply'. Export it again.")
     order, elements = "", []
     for number in range(2, _LONGEST):
         line = file.readline(_LONGEST).decode(errors="replace").strip()
         match line.split():
             case ["end_header"]:
                 if order == "":
-                    raise InvalidPointsError(
-                        "{path} does not say whether it is text or binary. Export it again.", path=path
-                    )
+                    raise InvalidPointsError(f"{path} does not say whether it is text or binary. Export it again.")
                 return order, elements
             case ["format", kind, *_] if kind in _ORDERS:
                 order = _ORDERS[kind]
@@ -115,12 +103,9 @@ def _read_header(file, path):
                 elements[-1].types.append(_TYPES[kind])
             case _:
                 raise InvalidPointsError(
-                    "{path}, line {number}: {words!r} does not belong into the header of a PLY file.",
-                    path=path,
-                    number=number,
-                    words=line[:60],
+                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PLY file."
                 )
-    raise InvalidPointsError("{path} has a header without an end. Export it again.", path=path)
+    raise InvalidPointsError(f"{path} has a header without an end. Export it again.")
 
 
 def _read_text(file, vertex, before, path):
@@ -145,10 +130,7 @@ def _read_text(file, vertex, before, path):
 
 def _too_short(path, found, count):
     return InvalidPointsError(
-        "{path} ends after {found} of the {count} points that its header names. Copy or save it again.",
-        path=path,
-        found=found,
-        count=count,
+        f"{path} ends after {found} of the {count} points that its header names. Copy or save it again."
     )
 
 
@@ -157,18 +139,12 @@ def _refuse_row(lines, width, path):
     for number, line in enumerate(lines, start=1):
         words = line.split()
         try:
-            wrong = (
-                ""
-                if len(words) == width
-                else Phrase("{count} numbers where the header names {width} properties", count=len(words), width=width)
-            )
+            wrong = "" if len(words) == width else (f"{len(words)} numbers where the header names {width} properties")
             [float(word) for word in words]
         except ValueError as error:
             wrong = str(error)
         if wrong:
-            raise InvalidPointsError(
-                "{path}, point {number}: {wrong}. Correct the file.", path=path, number=number, wrong=wrong
-            )
+            raise InvalidPointsError(f"{path}, point {number}: {wrong}. Correct the file.")
 
 
 def write_ply(path, table, double=True):

@@ -53,10 +53,7 @@ def from_columns(columns, path):
     missing = [axis for axis in _AXES if axis not in named]
     if missing:
         raise InvalidPointsError(
-            "{path} has no {missing} among its columns {columns}. Each point needs x y z.",
-            path=path,
-            missing=" ".join(missing),
-            columns=", ".join(columns),
+            f"{path} has no {' '.join(missing)} among its columns {', '.join(columns)}. Each point needs x y z."
         )
     left = dict(columns)
 
@@ -126,15 +123,11 @@ def _free_name(name, columns):
 def check_table(table, path):
     """Refuse a file without points, or with coordinates that are no places, and return it."""
     if len(table.points) == 0:
-        raise TooFewPointsError("{path} has no points. Give a file with points.", path=path)
+        raise TooFewPointsError(f"{path} has no points. Give a file with points.")
     bad = np.flatnonzero(~np.isfinite(table.points).all(axis=1))
     if len(bad):
         raise InvalidPointsError(
-            "{path}: {bad} of {count} points have coordinates that are not finite (NaN or infinity), the first of"
-            " them is point {first}. Delete these points from the file.",
-            path=path,
-            bad=len(bad),
-            count=len(table.points),
-            first=bad[0] + 1,
+            f"{path}: {len(bad)} of {len(table.points)} points have coordinates that are not finite (NaN or"
+            f" infinity), the first of them is point {bad[0] + 1}. Delete these points from the file."
         )
     return table

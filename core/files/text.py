@@ -5,7 +5,6 @@ import re
 import numpy as np
 
 from ..errors import InvalidPointsError
-from ..phrases import Phrase
 from .table import PointTable, from_columns, to_columns
 
 _DELIMITERS = (";", "\t", None, ",")  # in this order; None is white space
@@ -41,17 +40,12 @@ def read_scan(path) -> PointTable:
         if at > len(filled):
             missing = at - len(filled)
             raise InvalidPointsError(
-                "{path} announces {count} points, but {found} lines follow. Copy or export the file again.",
-                path=path,
-                count=count,
-                found=count - missing,
+                f"{path} announces {count} points, but {count - missing} lines follow. Copy or export the file again."
             )
     if 0 < at < len(filled):
         raise InvalidPointsError(
-            "{path} announces fewer points than it has: the first one beyond is in line {line}. Correct the"
-            " number of points, which stands before them.",
-            path=path,
-            line=filled[at] + 1,
+            f"{path} announces fewer points than it has: the first one beyond is in line {filled[at] + 1}."
+            " Correct the number of points, which stands before them."
         )
     return _read_rows(lines, path, _SCAN_NAMES)
 
@@ -73,9 +67,7 @@ def _read_rows(lines, path, usual=()) -> PointTable:
     notices = []
     unnamed = len(numeric) - len(extra) - 3
     if unnamed > 0:
-        notices.append(
-            Phrase("{file}: left out {unnamed} columns that no header names.", file=path.name, unnamed=unnamed)
-        )
+        notices.append(f"{path.name}: left out {unnamed} columns that no header names.")
     rows = lines[first:]
     try:
         values = _load(rows, delimiter, places + extra)
@@ -83,14 +75,10 @@ def _read_rows(lines, path, usual=()) -> PointTable:
         problem = _find_problem(lines, first, delimiter, places, names)
         if problem:
             raise InvalidPointsError(
-                "{path} does not hold columns of numbers x y z: {problem}. Correct the file.",
-                path=path,
-                problem=problem,
+                f"{path} does not hold columns of numbers x y z: {problem}. Correct the file."
             ) from None
         problem = _find_problem(lines, first, delimiter, extra, names)
-        notices.append(
-            Phrase("{file}: left out all columns but x y z, for {problem}.", file=path.name, problem=problem)
-        )
+        notices.append(f"{path.name}: left out all columns but x y z, for {problem}.")
         extra, values = [], _load(rows, delimiter, places)
     columns = dict(zip("xyz", values.T, strict=False))
     columns.update((names[index], values[:, 3 + number]) for number, index in enumerate(extra))
@@ -115,14 +103,8 @@ def _find_first(lines, path):
         seen += bool(line.strip())
         if seen > _HEADER:
             break
-    problem = (
-        Phrase("there are none")
-        if seen <= _HEADER
-        else Phrase("there are none in its first {header} lines", header=_HEADER)
-    )
-    raise InvalidPointsError(
-        "{path} does not hold columns of numbers x y z: {problem}. Correct the file.", path=path, problem=problem
-    )
+    problem = ("there are none") if seen <= _HEADER else (f"there are none in its first {_HEADER} lines")
+    raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {problem}. Correct the file.")
 
 
 def _words(line, delimiter):
@@ -164,9 +146,9 @@ def _find_problem(lines, first, delimiter, columns, names):
             continue
         for index in columns:
             if index >= len(words):
-                return Phrase("line {number} has {count} columns only", number=number, count=len(words))
+                return f"line {number} has {len(words)} columns only"
             if not _is_number(words[index]):
-                return Phrase("line {number} has {word!r} where a number should be", number=number, word=words[index])
+                return f"line {number} has {words[index]!r} where a number should be"
     return ""
 
 
@@ -175,9 +157,7 @@ def read_vertices(path) -> PointTable:
     lines = [line.lstrip() for line in path.read_text(encoding="utf-8", errors="replace").splitlines()]
     rows = [line[2:] for line in lines if line.startswith(("v ", "v\t"))]
     if not rows:
-        raise InvalidPointsError(
-            "{path} has no vertices, which are lines that begin with v. It holds no points.", path=path
-        )
+        raise InvalidPointsError(f"{path} has no vertices, which are lines that begin with v. It holds no points.")
     names = {6: "x y z r g b", 7: "x y z w r g b"}.get(len(rows[0].split()), "x y z").split()
     used = [index for index, name in enumerate(names) if name != "w"]
     try:
@@ -185,15 +165,11 @@ def read_vertices(path) -> PointTable:
     except ValueError:
         vertices = [line if line.startswith(("v ", "v\t")) else "" for line in lines]
         problem = _find_problem([line[1:] for line in vertices], 0, None, used, names)
-        raise InvalidPointsError(
-            "{path} has a broken vertex: {problem}. Correct the file.", path=path, problem=problem
-        ) from None
+        raise InvalidPointsError(f"{path} has a broken vertex: {problem}. Correct the file.") from None
     table = from_columns(dict(zip([names[index] for index in used], values.T, strict=True)), path)
     faces = sum(line.startswith(("f ", "f\t", "l ", "l\t")) for line in lines)
     if faces:
-        table.notices.append(
-            Phrase("{file}: left out {faces} faces and lines. Only points are read.", file=path.name, faces=faces)
-        )
+        table.notices.append(f"{path.name}: left out {faces} faces and lines. Only points are read.")
     return table
 
 

@@ -35,6 +35,4 @@ def replacing(path):
         finally:
             part.unlink(missing_ok=True)
     except OSError as error:
-        raise PointCloudError(
-            "{path} cannot be written: {problem}. Choose another place.", path=path, problem=error.strerror or error
-        ) from error
+        raise PointCloudError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error

@@ -985,7 +985,7 @@ class TestPanel:
             assert "Not up to date. Binding: Areas, 50%" in self.texts()
         finally:
             live._jobs.clear()
-        stopped = core.phrases.Phrase("Binding was stopped. Press Update, or move a handle")
+        stopped = "Binding was stopped. Press Update, or move a handle"
         live._troubles[strip.session_uid] = stopped, None
         assert "Not up to date. Binding was stopped. Press Update, or move a handle" in self.texts()
 

@@ -55,38 +55,3 @@ def test_core_is_usable_from_the_repository_root_without_blender():
 
 def test_core_never_uses_the_warnings_module():
     assert [file.name for file in (ROOT / "core").rglob("*.py") if "warnings" in imported(file)] == []
-
-
-def calls(path):
-    """All calls in a file: the name of what is called, and the call."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Call):
-            yield getattr(node.func, "attr", getattr(node.func, "id", "")), node
-
-
-def has_words(node):
-    """Whether a text is put together from words and values."""
-    strings = [part for part in ast.walk(node) if isinstance(part, ast.JoinedStr)]
-    parts = [part.value for text in strings for part in text.values if isinstance(part, ast.Constant)]
-    return any(letter.isalpha() for part in parts for letter in str(part))
-
-
-def test_texts_of_the_interface_can_be_translated():
-    """Blender translates whole texts: values are put in by format, into what iface_ or rpt_ gives for a template."""
-    files = sorted((ROOT / "ui").glob("*.py"))
-    wrong = [
-        f"{file.name}: line {call.lineno}"
-        for file in files
-        for name, call in calls(file)
-        for keyword in call.keywords
-        if keyword.arg == "text" and has_words(keyword.value)
-    ]
-    assert wrong == []
-    templates = [
-        (file.name, call)
-        for file in [*files, *sorted((ROOT / "operators").glob("*.py"))]
-        for name, call in calls(file)
-        if name in {"iface_", "rpt_"}
-    ]
-    assert len(templates) > 10
-    assert [file for file, call in templates if any(isinstance(item, ast.JoinedStr) for item in call.args)] == []
