@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 import core
-from core.areas import KernelMatrix, constrained_areas, fast_areas, regularized_areas
-from core.cloud import read_cloud
-from core.laplacian import assemble_stiffness
-from core.reference import algorithm_1
+from core.geometry.cloud import read_cloud
+from core.operator.areas import KernelMatrix, fast_areas
+from core.operator.stiffness import assemble_stiffness
+from core.paper.areas import algorithm_1, constrained_areas, regularized_areas
 
 from .accuracy import relative
 from .samplings import random_sphere, sphere_eigenvalues, uneven_sphere

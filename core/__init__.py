@@ -1,10 +1,32 @@
 """Mesh-free discrete Laplace-Beltrami operator on point clouds: numpy and scipy only, usable without Blender."""
 
-from .areas import estimate_areas
-from .cloud import estimate_normals
-from .curvature import mean_curvature
-from .deformation import Deformer
-from .descriptors import heat_kernel_signature, signature_energies, signature_times, wave_kernel_signature
+from .applications import (
+    Deformer,
+    MinimalSurface,
+    PointBlend,
+    band,
+    boost,
+    chebyshev_filter,
+    displace_by_mode,
+    exponential,
+    fair_points,
+    fairing,
+    geodesic_distance,
+    grow,
+    harmonic_field,
+    heat_kernel_signature,
+    minimal_surface,
+    modes_needed,
+    nodal_domains,
+    segment,
+    signature_energies,
+    signature_times,
+    smooth_points,
+    smoothing_base,
+    solve_poisson,
+    spectral_filter,
+    wave_kernel_signature,
+)
 from .errors import (
     AreaError,
     Cancelled,
@@ -16,18 +38,10 @@ from .errors import (
     TooFewPointsError,
     UnresolvedModesError,
 )
-from .fields import harmonic_field, solve_poisson
-from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
-from .geodesics import geodesic_distance
-from .laplacian import LaplaceBeltrami, build_laplacian
-from .minimal_surface import MinimalSurface, minimal_surface
+from .geometry import check_points, estimate_normals
+from .operator import LaplaceBeltrami, Spectrum, build_laplacian, estimate_areas, mean_curvature
 from .options import LaplacianOptions
-from .points import check_points
-from .segmentation import modes_needed, nodal_domains, segment
-from .selection import grow
-from .smoothing import PointBlend, displace_by_mode, fair_points, smooth_points, smoothing_base
-from .spectrum import Spectrum
-from .stability import Stability, check_stability
+from .paper import Stability, check_stability
 
 __all__ = [
     "AreaError",

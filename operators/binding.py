@@ -14,15 +14,7 @@ import bpy
 import numpy as np
 
 from ..core import PointCloudError
-from .attributes import (
-    DISPLACEMENT,
-    REST,
-    own_positions,
-    point_count,
-    read_attribute,
-    tag_changed,
-    write_attribute,
-)
+from .attributes import DISPLACEMENT, REST, own_positions, point_count, read_attribute, tag_changed, write_attribute
 from .counting import members, summarize
 from .deform_nodes import find_deform, is_baked
 from .groups import ANCHOR, chosen_weights, has_group, is_chosen

@@ -3,7 +3,8 @@
 import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
-from ..core import Cancelled, PointCloudError, minimal_surface
+from ..core import Cancelled, PointCloudError
+from ..core.applications import minimal_surface
 from . import cache
 from .application import ApplicationOperator
 from .groups import FIXED, chosen_members, group_kind, is_chosen, search_group

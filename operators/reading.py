@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core import PointCloudError, check_points
-from ..core.rims import FEWEST
+from ..core.geometry.boundary import FEWEST
 from .attributes import own_positions, point_count
 from .counting import members
 from .groups import chosen_members

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from ..core.value_range import CLASSES
 from ..operators.attributes import BOUNDARY, COMPONENT, DISPLACEMENT, DISTANCE, read_attribute
 from ..operators.modifiers import DISPLAY_TAG, get_input, is_display
 from .nodes import ATTRIBUTE, COLORS, RANGE
+from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"
 _TITLES = {BOUNDARY: "Rim", COMPONENT: "Connected Part"}

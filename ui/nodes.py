@@ -2,9 +2,9 @@
 
 import bpy
 
-from ..core.value_range import CLASSES, STEPPED
 from ..operators.modifiers import DISPLAY_TAG, add_input, add_node, is_intact, new_group
 from . import colormaps
+from .value_range import CLASSES, STEPPED
 
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values

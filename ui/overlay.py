@@ -6,13 +6,13 @@ import bpy
 import numpy as np
 
 from ..core import PointCloudError
-from ..core.value_range import histogram
 from ..operators.attributes import mode_number
 from ..operators.result import EIGENVALUES
 from . import canvas, plots
 from .display import range_node, shown_attribute, shown_values, without_unreached
 from .scale import shown_scale
 from .units import EIGENVALUE_POWER, unit
+from .value_range import histogram
 
 _GAP = 10.0  # between pictures, and to the border
 _GIZMOS = 80.0  # width of the view's own controls, at the right edge above the lowest row

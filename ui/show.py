@@ -4,7 +4,6 @@ import math
 
 import bpy
 
-from ..core.value_range import fit_range
 from ..operators.attributes import MEAN_CURVATURE, read_attribute
 from ..operators.binding import handle_names, positions_now
 from ..operators.groups import ANCHOR, HANDLE, RIM, ROLES
@@ -12,16 +11,9 @@ from ..operators.modifiers import DISPLAY_TAG, get_input, set_input
 from ..operators.reading import TYPES, fingerprint, spacing, typical_distance
 from ..operators.stages import redraw_views
 from . import colormaps, legend
-from .display import (
-    NAME,
-    component,
-    find_display,
-    find_material,
-    numbers,
-    shown_attribute,
-    without_unreached,
-)
+from .display import NAME, component, find_display, find_material, numbers, shown_attribute, without_unreached
 from .nodes import color_by_direction, color_by_number, color_plain, display_group, is_plain
+from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
 _NO_SPACING = 0.01  # stands in where points are too few to have one

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import core
-from core.areas import KernelMatrix, constrained_areas, fast_areas, regularized_areas
-from core.cloud import read_cloud
+from core.geometry.cloud import read_cloud
+from core.operator.areas import KernelMatrix, fast_areas
+from core.paper.areas import constrained_areas, regularized_areas
 
 from ..peers import METHODS, build
 from ..plateau import catenoid

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import LinearOperator, eigs, eigsh, splu
 from scipy.spatial import cKDTree
 
 import core
-from core.solvers import conjugate_gradients
+from core.operator.solvers import solve_symmetric
 
 _WIDE = 60  # neighbours per point from which factors cost more than Lanczos steps and conjugate gradients
 _TOLERANCE = 1e-10  # of the eigenvalue solvers, relative
@@ -103,7 +103,7 @@ class Operator:
         load = self.mass * source
         load = load - self.mass * (load.sum() / self.mass.sum())
         if self.stiffness.nnz > _WIDE * len(load):
-            solution = conjugate_gradients(self.stiffness, load)
+            solution = solve_symmetric(self.stiffness, load, scaling=1.0 / self.stiffness.diagonal())
         else:
             solution = np.append(0.0, factors(self.stiffness[1:, 1:]).solve(load[1:]))  # any level serves
         return solution - self.mass @ solution / self.mass.sum()

@@ -14,19 +14,13 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
-from core.areas import (
-    TAU,
-    KernelMatrix,
-    bounded_quadratic,
-    constrained_areas,
-    fast_areas,
-    regularized_areas,
-    solve_areas,
-)
-from core.cloud import read_cloud
-from core.distances import arc_length
+from core.geometry.boundary import no_rim
+from core.geometry.cloud import read_cloud
+from core.geometry.distances import arc_length
+from core.operator.areas import KernelMatrix, fast_areas, solve_areas
+from core.operator.solvers import bounded_quadratic
 from core.options import LaplacianOptions
-from core.rims import no_rim
+from core.paper.areas import TAU, constrained_areas, regularized_areas
 
 SPHERE = 4.0 * np.pi
 METHODS = ["fast", "regularized", "constrained", "uniform"]

@@ -15,9 +15,9 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
-from core.bandwidth import irregularity
-from core.cloud import read_cloud
-from core.nearest import find_nearest
+from core.geometry.bandwidth import irregularity
+from core.geometry.cloud import read_cloud
+from core.geometry.nearest import find_nearest
 from core.options import LaplacianOptions
 
 

@@ -13,8 +13,8 @@ from benchmarks.samplings import (
     random_sphere,
     uneven_sphere,
 )
-from core.components import label_islands, move_apart
-from core.nearest import find_nearest
+from core.geometry.components import label_islands, move_apart
+from core.geometry.nearest import find_nearest
 from core.options import LaplacianOptions
 
 LARGE, SMALL = fibonacci_sphere(1500), 0.7 * fibonacci_sphere(900) + [4.0, 0.0, 0.0]

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import eval_legendre
 
-from core.curvature import kernel_integral, second_moment, weight_factor
 from core.kernel import SUPPORT, kernel, pair_kernel
+from core.operator.curvature import kernel_integral, second_moment, weight_factor
 
 WIDTHS = 0.05, 0.1, 0.2, 0.3  # h on the unit sphere
 

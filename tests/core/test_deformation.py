@@ -9,9 +9,10 @@ from scipy import sparse
 import core
 from benchmarks.deformation import LENGTH, bar_ends, section_areas, turns
 from benchmarks.samplings import bar, bent_end, fibonacci_sphere, random_sphere, square_grid
-from core.points import as_indices
-from core.rotations import nearest_rotations
-from core.solvers import drop_faint_pairs, narrow_laplacian
+from core.applications.rotations import nearest_rotations
+from core.geometry.points import as_indices
+from core.operator.factors import sparsify
+from core.operator.laplacian import narrow_laplacian
 
 QUARTER = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 MODES = [
@@ -88,7 +89,7 @@ def test_indices_keep_their_order():
 
 def test_without_faint_pairs_the_stiffness_stays_a_stiffness():
     full = narrow_laplacian(small_sphere(), 60).stiffness
-    thin = drop_faint_pairs(full)
+    thin = sparsify(full)
     assert thin.nnz < 0.6 * full.nnz
     assert abs(thin - thin.T).max() < 1e-12
     assert np.abs(thin.sum(axis=1)).max() < 1e-11
@@ -100,7 +101,7 @@ def test_faint_pairs_stay_where_they_alone_hold_parts_together():
     weights = sparse.coo_array(([1.0, 1e-4, 1.0], ([0, 1, 2], [1, 2, 3])), shape=(4, 4))
     weights = (weights + weights.T).tocsr()
     stiffness = (sparse.diags_array(weights.sum(axis=1)) - weights).tocsr()
-    assert drop_faint_pairs(stiffness) is stiffness
+    assert sparsify(stiffness) is stiffness
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -7,7 +7,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 import core
-from core.dissection import dissection_order
+from core.operator.factors import dissection_order
 
 
 def near_matrix(points, reach):

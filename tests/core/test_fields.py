@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import (
-    fibonacci_sphere,
-    random_sphere,
-    square_grid,
-    strip_points,
-    torus_potential,
-)
+from benchmarks.samplings import fibonacci_sphere, random_sphere, square_grid, strip_points, torus_potential
 
 OFF = 1e-6  # rounding, and the tolerance of the solver
 

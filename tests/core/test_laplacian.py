@@ -3,12 +3,7 @@ import pytest
 
 import core
 from benchmarks.accuracy import relative, sphere_errors
-from benchmarks.samplings import (
-    fibonacci_sphere,
-    icosahedral_sphere,
-    random_sphere,
-    torus_points,
-)
+from benchmarks.samplings import fibonacci_sphere, icosahedral_sphere, random_sphere, torus_points
 
 
 @pytest.fixture(scope="module")

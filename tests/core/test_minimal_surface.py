@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy import sparse
 
 import core
 from benchmarks.plateau import cap, catenoid, catenoid_errors, helicoid, tube
 from benchmarks.samplings import fibonacci_sphere, grid_points, hemisphere_random, square_grid
-from core.minimal_surface import conjugate_gradients
-from core.rim_curve import RimCurve
+from core.applications.boundary_curve import RimCurve
 
 
 @pytest.fixture(scope="module")
@@ -315,20 +313,6 @@ class TestRimCurve:
         curve = RimCurve(np.concatenate([ring, ring]))
         assert len(curve.points) == 40
         np.testing.assert_array_equal(np.concatenate([ring, ring])[curve.first], curve.points)
-
-
-class TestConjugateGradients:
-    def test_a_known_solution(self):
-        matrix = sparse.diags_array([[2.0] * 50, [-1.0] * 49, [-1.0] * 49], offsets=[0, 1, -1]).tocsr()
-        exact = np.sin(np.arange(50.0))
-        solution, definite = conjugate_gradients(matrix, matrix @ exact)
-        assert definite
-        np.testing.assert_allclose(solution, exact, atol=1e-4)
-
-    def test_an_indefinite_matrix(self):
-        matrix = sparse.diags_array([[1.0] * 50, [-1.0] * 49, [-1.0] * 49], offsets=[0, 1, -1]).tocsr()
-        assert not conjugate_gradients(matrix, np.ones(50))[1]
-        assert not conjugate_gradients(-matrix, np.ones(50))[1]
 
 
 def test_given_distances_hold_beside_corners_only():

@@ -13,13 +13,13 @@ from benchmarks.samplings import (
     random_sphere,
     uneven_sphere,
 )
-from core.areas import KernelMatrix, solve_areas
-from core.cloud import read_cloud
-from core.curvature import kernel_integral, uneven
-from core.distances import arc_length
+from core.geometry.cloud import read_cloud
+from core.geometry.distances import arc_length
+from core.geometry.pairs import Neighborhoods, find_pairs
 from core.kernel import SECOND_MOMENT, SUPPORT, pair_kernel
-from core.moments import balance_weights
-from core.neighbors import Neighborhoods, find_pairs
+from core.operator.areas import KernelMatrix, solve_areas
+from core.operator.curvature import kernel_integral, uneven
+from core.operator.weights import balance_weights
 
 CLOUDS = {
     "even": lambda: fibonacci_sphere(3000),

@@ -4,10 +4,10 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from benchmarks.samplings import random_sphere, uneven_sphere
-from core.bandwidth import smoothing_lengths
-from core.cloud import read_cloud
-from core.nearest import find_nearest
-from core.neighbors import find_pairs
+from core.geometry.bandwidth import smoothing_lengths
+from core.geometry.cloud import read_cloud
+from core.geometry.nearest import find_nearest
+from core.geometry.pairs import find_pairs
 from core.options import LaplacianOptions
 
 

@@ -16,11 +16,11 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
-from core.cloud import read_cloud
-from core.nearest import find_nearest
-from core.noise import noise_level, project_points
+from core.geometry.cloud import read_cloud
+from core.geometry.nearest import find_nearest
+from core.geometry.noise import noise_level, project_points
+from core.geometry.sheets import fit_sheets
 from core.options import LaplacianOptions
-from core.sheets import fit_sheets
 
 COUNT = 2000
 SPACING = np.sqrt(4.0 * np.pi / COUNT)

@@ -5,11 +5,12 @@ import pytest
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, uneven_sphere
-from core.areas import TAU, KernelMatrix, constrained_areas, regularized_areas
-from core.cloud import read_cloud
+from core.geometry.boundary import no_rim
+from core.geometry.cloud import read_cloud
+from core.operator.areas import KernelMatrix
 from core.options import LaplacianOptions
-from core.reference import algorithm_1, unsymmetrized_operator
-from core.rims import no_rim
+from core.paper.areas import TAU, algorithm_1, constrained_areas, regularized_areas
+from core.paper.operator import unsymmetrized_operator
 
 
 @pytest.fixture(scope="module")

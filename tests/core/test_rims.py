@@ -22,13 +22,13 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
-from core.areas import KernelMatrix
-from core.cloud import read_cloud
-from core.distances import arc_length
-from core.images import image_excess
-from core.nearest import find_nearest
+from core.geometry.boundary import find_rim_points, measure_rim, no_rim
+from core.geometry.cloud import read_cloud
+from core.geometry.distances import arc_length
+from core.geometry.nearest import find_nearest
+from core.operator.areas import KernelMatrix
+from core.operator.images import image_excess
 from core.options import LaplacianOptions
-from core.rims import find_rim_points, measure_rim, no_rim
 
 CLOSED = {
     "random sphere": random_sphere(3000),

@@ -18,7 +18,7 @@ from benchmarks.samplings import (
     square_random,
     trimmed_star,
 )
-from core.graph import near_graph
+from core.applications.graph import near_graph
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 

@@ -14,12 +14,11 @@ from benchmarks.samplings import (
     sausage_bend,
     torus_points,
 )
-from core.cloud import _last_pairs, read_cloud
-from core.components import label_sheets
-from core.nearest import find_nearest
-from core.neighbors import Neighborhoods
+from core.geometry.cloud import read_cloud
+from core.geometry.nearest import find_nearest
+from core.geometry.pairs import Neighborhoods
+from core.geometry.sheets import fit_sheets, label_sheets, last_pairs, same_sheet
 from core.options import LaplacianOptions
-from core.sheets import fit_sheets, same_sheet
 
 
 def pair(first, second, normal, other):
@@ -233,10 +232,10 @@ class TestLastPairs:
         distance = np.linalg.norm(points[first] - points[second], axis=1)
         pairs = Neighborhoods(points, np.ones(4), first, second, distance)
         same = np.array([False, False, False, False, True])
-        np.testing.assert_array_equal(_last_pairs(pairs, same), [True, False, True, False, False])
+        np.testing.assert_array_equal(last_pairs(pairs, same), [True, False, True, False, False])
         same = np.array([True, False, False, False, False])
-        np.testing.assert_array_equal(_last_pairs(pairs, same), [False, False, True, False, True])
+        np.testing.assert_array_equal(last_pairs(pairs, same), [False, False, True, False, True])
 
     def test_none_where_all_have_pairs(self):
         pairs = Neighborhoods(np.eye(3), np.ones(3), np.array([0, 0]), np.array([1, 2]), np.ones(2))
-        assert not _last_pairs(pairs, np.array([True, True])).any()
+        assert not last_pairs(pairs, np.array([True, True])).any()

@@ -4,7 +4,7 @@ from scipy.special import sph_harm_y
 
 import core
 from benchmarks.samplings import disc_random, fibonacci_sphere, hemisphere_random, open_cylinder, square_grid
-from core.smoothing import rim_places
+from core.applications.smoothing import rim_places
 
 BUMP = 0.1
 

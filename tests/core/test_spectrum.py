@@ -2,12 +2,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import (
-    fibonacci_sphere,
-    icosahedral_sphere,
-    marching_cubes_sphere,
-    sphere_eigenvalues,
-)
+from benchmarks.samplings import fibonacci_sphere, icosahedral_sphere, marching_cubes_sphere, sphere_eigenvalues
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from benchmarks.samplings import (
     torus_low_discrepancy,
     torus_points,
 )
-from core.nearest import find_nearest
+from core.geometry.nearest import find_nearest
+from core.geometry.quadrics import fit_surface, frames
 from core.options import LaplacianOptions
-from core.surface import fit_surface, frames
 
 
 def fit(points):

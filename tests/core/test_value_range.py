@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from core.value_range import fit_range, histogram
+from ui.value_range import fit_range, histogram
 
 CONTINUOUS = ("VIRIDIS", "MAGMA", "COOL_WARM", "CYCLIC")
 VALUES = np.append(np.linspace(-1.0, 3.0, 401), 1000.0)

@@ -1,0 +1,350 @@
+"""Deformation of a surface by moved handles, with differential coordinates: Figure 13 of the paper."""
+
+import numpy as np
+from scipy import sparse
+
+from ..errors import InvalidPointsError, PointCloudError
+from ..geometry import as_indices
+from ..operator import dissection_order, factorize, narrow_laplacian, sparsify
+from .rotations import nearest_rotations
+
+_NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
+_STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
+_RTOL = 1e-5
+_HUGE = 1e100  # of a coordinate, so that no product overflows
+_MEMORY = 5  # steps that the acceleration looks back on
+
+
+class Deformer:
+    """Moves a surface by its handles while it keeps its details; bound once, solved for every move.
+
+    The deformed points x minimise ``sum_i areas_i |(L x)_i - R_i (L x_o)_i|^2`` over all positions in which handles and
+    anchors are where they should be. L x_o are the differential coordinates of the points at rest x_o: where the
+    surface bends, and how much. Without rotations (R_i = I) this is linear in the positions of the handles. The
+    rotation-aware mode estimates R_i from the neighbourhood of each point before and after, and solves again, until
+    nothing moves: details then turn with the surface.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of the points at rest. A narrower operator is built on its points.
+    handles : array_like, (h,) int or (n,) bool
+        The points to be moved.
+    anchors : array_like, (a,) int or (n,) bool
+        Points that stay where they are; may be empty.
+    rotation_aware : bool
+        Let details turn with the surface.
+    weights : float or array_like, (h + a,), optional
+        Make the constraints soft: how strongly handles, then anchors, are pulled to their positions. Free of units: a
+        weight of one pulls as strongly as the surface around resists the move of that point alone. Infinity is a hard
+        constraint, as all are by default; zero is none.
+    neighbors : int
+        Neighbours inside the kernel of the narrower operator.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)`` at the beginning of each stage; may raise `Cancelled`.
+
+    Attributes
+    ----------
+    points : ndarray, (n, 3)
+        The points at rest [L]: ``norm(solve(...) - points, axis=1)`` is the displacement.
+    handles, anchors : ndarray, (h,) and (a,) int
+        Indices of the points; positions of the handles follow their order.
+    rotation_aware : bool
+        As given.
+    steps : int
+        Rotation-aware steps of the last solve.
+    converged : bool
+        Whether its last step moved no point by more than the tolerance.
+    notices : list of str
+        What a user should know, such as points that nothing holds and that stay where they are.
+
+    Raises
+    ------
+    PointCloudError
+        No handles, points that are handles and anchors, weights that are negative or of a wrong number.
+    InvalidPointsError
+        Sets of points that are none.
+
+    Notes
+    -----
+    The paper solves L x = b with b = (2 I - L) x_o "following the methodology of differential coordinates [Sor06]".
+    That cannot be meant: x_o does not solve it when nothing is moved, and its terms differ in their units. Here L x is
+    to be L x_o, as in the work it cites, in the least-squares sense, so that x_o is a fixed point.
+
+    The normal equations, ``K M^-1 K (x - x_o) = 0`` with the stiffness K and the areas M at the points that are free,
+    are factorised. Before the rotation-aware steps each connected part is turned and moved as a whole to where its
+    constrained points fit best, so that parts which are moved rigidly come out rigid to round-off.
+
+    References
+    ----------
+    Petronetto, Paiva, Helou, Stewart, Nonato. Mesh-free discrete Laplace-Beltrami operator. 2013. Figure 13.
+    Sorkine. Differential representations for mesh processing. Computer Graphics Forum 25, 2006.
+    Sorkine, Alexa. As-rigid-as-possible surface modeling. SGP 2007.
+    """
+
+    def __init__(
+        self, laplacian, handles, anchors=(), rotation_aware=True, weights=None, neighbors=_NEIGHBORS, progress=None
+    ):
+        report = progress or (lambda stage, fraction: None)
+        n = len(laplacian.points)
+        self.points = laplacian.points
+        self.handles = as_indices(handles, n, "handles")
+        self.anchors = as_indices(anchors, n, "anchors")
+        self.rotation_aware = bool(rotation_aware)
+        self.steps, self.converged, self.notices = 0, True, []
+        held = np.concatenate([self.handles, self.anchors])
+        self._check_sets(held)
+        weights = _check_weights(weights, len(held))
+
+        report("Operator", 0.0)
+        narrow = narrow_laplacian(laplacian, neighbors)
+        self.notices += [notice for notice in narrow.notices if notice not in laplacian.notices]
+        self._choose_moving(narrow.component, held, weights)
+        self._chosen = np.flatnonzero(weights)
+        self._held, weights = held[self._chosen], weights[self._chosen]
+        hard = np.isinf(weights)
+
+        report("Equations", 0.4)
+        moving = self._moving
+        row = np.full(n, -1)
+        row[moving] = np.arange(len(moving))
+        self._row = row[self._held]
+        if not len(moving):
+            return
+        # The centre of each part at rest, so that sums of products do not lose digits far from the origin.
+        center = np.zeros((self._parts, 3))
+        np.add.at(center, self._part, self.points[moving])
+        center /= np.bincount(self._part)[:, None]
+        self._rest = self.points[moving] - center[self._part]
+        self._size = float(np.sqrt(np.mean(np.sum(self._rest**2, axis=1))))
+        stiffness = sparsify(narrow.stiffness[moving][:, moving])
+        inverse = sparse.diags_array(1.0 / narrow.areas[moving], format="csr")
+        energy = (stiffness @ inverse @ stiffness).tocsr()
+        self._differential = stiffness @ self._rest
+        inside = self._row >= 0
+        fixed = np.zeros(len(moving), dtype=bool)
+        fixed[self._row[inside & hard]] = True
+        free, self._fixed = np.flatnonzero(~fixed), np.flatnonzero(fixed)
+        order = dissection_order(energy[free][:, free], self._rest[free], lambda: report("Equations", 0.5))
+        self._free = free[order]
+        # A soft constraint adds its weight to the diagonal, and to the right-hand side times the place it pulls to.
+        self._pull = np.zeros(len(moving))
+        soft = inside & ~hard
+        self._pull[self._row[soft]] = weights[soft] * energy.diagonal()[self._row[soft]]
+        free_rows = energy[self._free]
+        self._coupling = free_rows[:, self._fixed].tocsr()
+        self._divergence = (stiffness[self._free] @ inverse).tocsr()
+        if self.rotation_aware:
+            self._edges = _edge_products(stiffness, self._rest)
+
+        report("Factors", 0.6)
+        matrix = free_rows[:, self._free] + sparse.diags_array(self._pull[self._free])
+        self._solve = factorize(matrix) if len(self._free) else None
+
+    def solve(self, handle_positions, steps=_STEPS, rtol=_RTOL, start=None, progress=None):
+        """Find the points for new positions of the handles.
+
+        Parameters
+        ----------
+        handle_positions : array_like, (h, 3)
+            Where the handles are to be [L], in the order of their indices.
+        steps : int
+            Most rotation-aware steps; a single one is fit for dragging, and with none each part turns as a whole.
+        rtol : float
+            Stop when no point moves by more than this share of the size.
+        start : array_like, (n, 3), optional
+            Points to estimate the first rotations from, such as the last result of a drag; otherwise those of the
+            linear solution.
+        progress : callable, optional
+            Called as ``progress(stage, fraction)`` before each step; may raise `Cancelled`.
+
+        Returns
+        -------
+        ndarray, (n, 3)
+            The deformed points [L]. Those that nothing holds are where they were.
+
+        Raises
+        ------
+        InvalidPointsError
+            Positions of the wrong shape or type, or not finite.
+        """
+        report = progress or (lambda stage, fraction: None)
+        target = _check_positions(handle_positions, len(self.handles), ("handle positions"), "handle")
+        target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
+        result = self.points.copy()
+        loose = self._row < 0
+        result[self._held[loose]] = target[loose]
+        if not len(self._moving):
+            self.steps, self.converged = 0, True
+            return result
+        turn, shift = self._fit_parts(target)
+        frame = self._turned(turn, self._rest) + shift[self._part]
+        inside = ~loose
+        wanted = np.zeros_like(frame)
+        wanted[self._row[inside]] = target[inside] - frame[self._row[inside]]
+        constant = self._pull[self._free, None] * wanted[self._free] - self._coupling @ wanted[self._fixed]
+
+        def place(load):
+            placed = frame + wanted
+            if len(self._free):
+                placed[self._free] = frame[self._free] + self._solve(constant + load)
+            return placed
+
+        report("Deform", 0.0)
+        if start is None or not self.rotation_aware or steps < 1:
+            now = place(0.0)
+        else:
+            now = _check_positions(start, len(self.points), ("starting points"), "point")[self._moving]
+        step, converged = 0, True
+        if self.rotation_aware and steps > 0:
+            at_rest = self._turned(turn, self._differential)
+            converged, mixing, begin = False, _Mixing(), now
+            for step in range(1, int(steps) + 1):
+                report("Deform", step / (steps + 1.0))
+                turned = np.einsum("abn,nb->na", self._rotations(begin), self._differential)
+                now = place(self._divergence @ (turned - at_rest))
+                if np.abs(now - begin).max() <= rtol * self._size:
+                    converged = True
+                    break
+                begin = mixing.mix(begin, now)
+        self.steps, self.converged = step, converged  # at once, for solves may run in several threads
+        result[self._moving] = now
+        return result
+
+    def _rotations(self, now):
+        """Estimate how each neighbourhood has turned: the polar factor of sum_j w_ij (x_i - x_j)(p_i - p_j)^T."""
+        centered = now - now.mean(axis=0)
+        products = (self._edges @ centered).reshape(3, len(now), 3)
+        return nearest_rotations(np.ascontiguousarray(products.transpose(2, 0, 1)))
+
+    def _fit_parts(self, target):
+        """Return the turn of each part, (parts, 3, 3), identity in the linear mode, and its new centre, (parts, 3)."""
+        inside = self._row >= 0
+        row, target = self._row[inside], target[inside]
+        part = self._part[row]
+        rest = self._rest[row]
+        count = np.bincount(part, minlength=self._parts)[:, None]
+        total = sparse.csr_array((np.ones(len(part)), (part, np.arange(len(part)))), shape=(self._parts, len(part)))
+        before, after = total @ rest / count, total @ target / count
+        turn = np.tile(np.eye(3), (self._parts, 1, 1))
+        if self.rotation_aware:
+            pairs = np.einsum("ka,kb->kab", target - after[part], rest - before[part])
+            products = (total @ pairs.reshape(-1, 9)).reshape(-1, 3, 3)
+            # A trace of the identity keeps a part from turning about an axis that all its constraints lie on.
+            spread = total @ np.sum((rest - before[part]) ** 2, axis=1)
+            products += 1e-9 * spread[:, None, None] * np.eye(3)
+            turn = np.moveaxis(nearest_rotations(np.moveaxis(products, 0, 2)), 2, 0)
+        shift = after - np.einsum("pab,pb->pa", turn, before)
+        return turn, shift
+
+    def _turned(self, turn, vectors):
+        """Turn vectors at the moving points with their parts."""
+        if self._parts == 1:
+            return vectors @ turn[0].T
+        return np.einsum("nab,nb->na", turn[self._part], vectors)
+
+    def _check_sets(self, held):
+        if not len(self.handles):
+            raise PointCloudError("There are no handles, so nothing can be moved. Choose at least one point.")
+        both = len(held) - len(np.unique(held))
+        if both:
+            raise PointCloudError(
+                f"{both} points are handles and anchors at once. Take them out of one of the two sets."
+            )
+
+    def _choose_moving(self, component, held, weights):
+        """Find the points of connected parts that some constraint holds; all others stay where they are."""
+        known = np.unique(component[held[weights > 0.0]])
+        known = known[known >= 0]
+        self._moving = np.flatnonzero(np.isin(component, known))
+        self._part = np.searchsorted(known, component[self._moving])
+        self._parts = len(known)
+        lone = int(np.count_nonzero(component < 0))
+        parts = len(np.unique(component[component >= 0])) - len(known)
+        if lone:
+            self.notices.append(
+                f"{lone} points belong to no surface. They stay where they are, unless they are handles."
+            )
+        if parts:
+            free = len(component) - lone - len(self._moving)
+            self.notices.append(
+                f"{parts} connected parts with {free} points have neither handles nor anchors. They stay where"
+                " they are."
+            )
+
+
+class _Mixing:
+    """Anderson's acceleration of a repeated map: half of the steps or fewer, to the same end.
+
+    References
+    ----------
+    Walker, Ni. Anderson acceleration for fixed-point iterations. SIAM J. Numer. Anal. 49, 2011.
+    """
+
+    def __init__(self):
+        self._before, self._change = [], []
+
+    def mix(self, before, after):
+        """Return where to go on from, given where the last step began and ended, both of any one shape."""
+        self._before.append(before.ravel())
+        self._change.append(after.ravel() - before.ravel())
+        del self._before[: -_MEMORY - 1], self._change[: -_MEMORY - 1]
+        if len(self._change) == 1:
+            return after
+        starts, changes = np.diff(self._before, axis=0), np.diff(self._change, axis=0)
+        products = changes @ changes.T
+        products += 1e-10 * np.trace(products) * np.eye(len(products))
+        if not products.any():  # both steps ended at one place
+            return after
+        share = np.linalg.solve(products, changes @ self._change[-1])
+        return after - (share @ (starts + changes)).reshape(after.shape)
+
+
+def _check_weights(weights, count):
+    """Return the weight of each constraint, (count,), infinite where it is hard."""
+    if weights is None:
+        return np.full(count, np.inf)
+    given = np.asarray(weights)
+    if given.dtype.kind not in "iuf" or given.shape not in ((), (count,)):
+        raise PointCloudError(
+            f"Weights have the shape {given.shape} and type {given.dtype}. Give one number, or {count}: one per"
+            " handle, then one per anchor."
+        )
+    bad = int(np.count_nonzero(~(given >= 0.0)))
+    if bad:
+        raise PointCloudError(f"{bad} weights are negative or NaN. Use numbers from zero to infinity.")
+    if not given.any():
+        raise PointCloudError("All weights are zero, so nothing holds the surface. Use some above zero.")
+    return np.broadcast_to(given.astype(np.float64), (count,))
+
+
+def _check_positions(positions, count, name, singular):
+    """Return positions, (count, 3), in double precision."""
+    try:
+        given = np.asarray(positions)
+    except ValueError as error:
+        raise InvalidPointsError(f"The {name} must be an array of shape ({count}, 3): {error}.") from error
+    if given.shape != (count, 3) or given.dtype.kind not in "iuf":
+        raise InvalidPointsError(
+            f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers."
+            f" Give x, y, z for each {singular}."
+        )
+    bad = int(np.count_nonzero(~(np.abs(given) < _HUGE).all(axis=1)))
+    if bad:
+        raise InvalidPointsError(
+            f"{bad} of {count} {name} are not finite (NaN or infinity), or beyond {_HUGE:g}. Give a place for"
+            f" each {singular}."
+        )
+    return given.astype(np.float64)
+
+
+def _edge_products(stiffness, rest):
+    """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_i - p_j)_c (x_i - x_j), p the points at rest."""
+    pairs = stiffness.tocoo()
+    difference = rest[pairs.row] - rest[pairs.col]  # zero on the diagonal
+    blocks = []
+    for c in range(3):
+        weight = -pairs.data * difference[:, c]
+        block = sparse.csr_array((-weight, (pairs.row, pairs.col)), shape=stiffness.shape)
+        blocks.append(block + sparse.diags_array(np.bincount(pairs.row, weight, minlength=len(rest)), format="csr"))
+    return sparse.vstack(blocks, format="csr")

@@ -1,0 +1,156 @@
+"""Signatures of points that depend on the inner shape alone: bending the surface does not change them."""
+
+import numpy as np
+
+from ..errors import PointCloudError
+
+_ZERO = 1e-8  # eigenvalues below this share of 4 pi / area belong to constants
+_RANGE = 4.0 * np.log(10.0)  # of eigenvalue times time: what is left at its end is 1e-4
+_WIDTH = 0.07  # of a wave signature's window, as a share of the range of log eigenvalues
+
+
+def signature_times(spectrum, count=100):
+    """Return the times of a heat kernel signature that suit a spectrum.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        At least one mode more than constant ones.
+    count : int
+        How many times.
+
+    Returns
+    -------
+    ndarray, (count,)
+        Ascending, evenly in the logarithm [L^2], from ``4 ln 10 / highest`` to ``4 ln 10 / lowest`` nonzero eigenvalue:
+        from where the modes that are missing matter no more to where all is even. They grow with the size of the object
+        squared, so that signatures of scaled copies agree.
+    """
+    values = _nonzero(spectrum)[1]
+    return np.geomspace(_RANGE / values[-1], _RANGE / values[0], _at_least_one(count))
+
+
+def signature_energies(spectrum, count=100):
+    """Return the energies of a wave kernel signature that suit a spectrum.
+
+    Returns
+    -------
+    ndarray, (count,)
+        Ascending and even: logarithms of eigenvalues, two windows inside the range of the spectrum.
+    """
+    low, high, width = _window(spectrum)
+    return np.linspace(low + 2.0 * width, high - 2.0 * width, _at_least_one(count))
+
+
+def heat_kernel_signature(spectrum, times=None, count=100, normalized=False):
+    """Compute the heat kernel signature: how much heat is left at a point some time after it was put there.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        100 to 300 modes are usual.
+    times : array_like, (k,), optional
+        [L^2], not negative; `signature_times` where not given.
+    count : int
+        How many times, where they are not given.
+    normalized : bool
+        Divide by the heat of all points together, so that late times do not fade: the integral over the surface is 1.
+
+    Returns
+    -------
+    ndarray, (n, k)
+        ``sum_k exp(-lambda_k t) phi_k^2`` [1 / L^2]; zero at points that the operator left out.
+
+    Raises
+    ------
+    PointCloudError
+        Times that are not numbers from zero up, or a spectrum of constants alone.
+
+    References
+    ----------
+    Sun, Ovsjanikov, Guibas. A concise and provably informative multi-scale signature based on heat diffusion. 2009.
+    """
+    times = signature_times(spectrum, count) if times is None else _numbers(times, "Times")
+    if np.any(times < 0.0):
+        raise PointCloudError(
+            f"{np.count_nonzero(times < 0.0)} of {len(times)} times are negative. Use times from 0 up."
+        )
+    decay = np.exp(-np.outer(spectrum.eigenvalues, times))
+    if normalized:
+        decay /= decay.sum(axis=0)
+    return spectrum.eigenvectors**2 @ decay
+
+
+def wave_kernel_signature(spectrum, energies=None, count=100):
+    """Compute the wave kernel signature: the mean chance to meet a particle of some energy at a point.
+
+    It tells details apart better than the heat kernel signature, as each energy looks at a narrow band of modes.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        100 to 300 modes are usual.
+    energies : array_like, (k,), optional
+        Logarithms of eigenvalues; `signature_energies` where not given.
+    count : int
+        How many energies, where they are not given.
+
+    Returns
+    -------
+    ndarray, (n, k)
+        Means of ``phi_k^2`` [1 / L^2] weighted by ``exp(-(e - log lambda_k)^2 / (2 sigma^2))``, sigma a share of 0.07
+        of the range of the logarithms; the integral over the surface is 1. Zero at points that the operator left out.
+
+    Raises
+    ------
+    PointCloudError
+        Energies that are not numbers, or fewer than two different eigenvalues above zero.
+
+    References
+    ----------
+    Aubry, Schlickewei, Cremers. The wave kernel signature: a quantum mechanical approach to shape analysis. 2011.
+    """
+    energies = signature_energies(spectrum, count) if energies is None else _numbers(energies, "Energies")
+    constant, values = _nonzero(spectrum)
+    width = _window(spectrum)[2]
+    exponent = -((energies - np.log(values)[:, None]) ** 2) / (2.0 * width**2)
+    weight = np.exp(exponent - exponent.max(axis=0))  # far outside the range all would vanish together
+    return spectrum.eigenvectors[:, constant:] ** 2 @ (weight / weight.sum(axis=0))
+
+
+def _nonzero(spectrum):
+    """Return the number of constant modes and the eigenvalues of all others."""
+    values = spectrum.eigenvalues
+    inverse_area = np.max(spectrum.eigenvectors[:, 0] ** 2)  # that of the part on which a constant mode lives
+    constant = int(np.searchsorted(values, _ZERO * 4.0 * np.pi * inverse_area))
+    if constant == len(values):
+        raise PointCloudError(
+            f"The {len(values)} modes of the spectrum are constants, which tell no points apart. Compute more modes."
+        )
+    return constant, values[constant:]
+
+
+def _window(spectrum):
+    """Return the lowest and highest logarithm of the eigenvalues above zero, and the width of the windows."""
+    logarithms = np.log(_nonzero(spectrum)[1])
+    low, high = logarithms[0], logarithms[-1]
+    if high - low < 1e-6:
+        raise PointCloudError(
+            f"The {len(logarithms)} modes above the constants have the same eigenvalue. Compute more modes."
+        )
+    return low, high, _WIDTH * (high - low)
+
+
+def _numbers(given, name):
+    values = np.asarray(given)
+    if values.ndim != 1 or values.size == 0 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+        raise PointCloudError(
+            f"{name} have the shape {values.shape} and type {values.dtype}. Give a row of finite numbers, at least one."
+        )
+    return values.astype(np.float64)
+
+
+def _at_least_one(count):
+    if int(count) != count or count < 1:
+        raise PointCloudError(f"{count!r} values per point were asked for. Use a whole number of at least 1.")
+    return int(count)

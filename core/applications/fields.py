@@ -1,0 +1,291 @@
+"""Functions on the surface that solve Poisson's or Laplace's equation, with or without fixed values."""
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidPointsError, PointCloudError
+from ..geometry import as_mask
+from ..kernel import SECOND_MOMENT
+from ..operator import narrow_laplacian, solve_symmetric
+from .graph import coupled_parts, mean_spacing
+
+_MEAN = 1e-2  # of the source's mean size: a larger mean is meant, a smaller one is left by the quadrature
+_DEEP = 0.6  # share of a point's weights that lead to fixed points, where it lies deep inside a set of them
+_NARROW = 60  # neighbours of the narrow operator: fewer are too noisy at random points, more leak more
+# Distances from thin sets, in units of h, between which the narrow operator gives way to the wide one.
+_NEAR = 1.5, 3.0
+_LEAST = 2e-3  # share of the wide operator everywhere: it connects what the narrow one does not
+_GRAZING = 0.1  # least distance from the edge of a set of fixed points, in spacings
+
+
+def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=None):
+    """Solve -Delta u = source.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points; at rims without fixed points nothing flows across.
+    source : array_like, (n,)
+        A function on the points [unit of u / L^2]; one number stands for a constant one.
+    fixed : array_like, (k,) int or (n,) bool, optional
+        Points with known values. Fixing the points of a whole rim gives the values there.
+    fixed_values : array_like, (k,), optional
+        Their values, in the order of the indices; one number serves all.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n,)
+        u. On connected parts without fixed points the source's mean must vanish, and u has the mean of all fixed
+        values there, zero if there are none. Points that were left out have that value too, unless they are fixed.
+
+    Raises
+    ------
+    InvalidPointsError
+        Source, points or values of another shape, not finite, or two values for one point.
+    PointCloudError
+        The source's mean does not vanish where nothing is fixed.
+    SolverError
+        The solver did not converge.
+
+    Notes
+    -----
+    Without fixed points the solution is corrected for the kernel's width: of ``lambda = k^2 - mu2 h^2 k^4 / 8`` the
+    inverse is ``1 / k^2 + mu2 h^2 / 8``, so that ``mu2 h^2 / 8`` times the source is to be taken off.
+
+    A set of fixed points may be any band, line, or single points. Values past the edge of a band continue those before
+    it in a straight line (as in Morris, Fox, Zhu, 1997), which makes weights across the edge larger: none becomes
+    negative, so that the maximum principle holds. Near sets thinner than the kernel, over which it would reach, the
+    operator goes over into a narrow one.
+
+    References
+    ----------
+    Figures 8 and 15 of the paper.
+    """
+    count = len(laplacian.points)
+    report = progress or (lambda stage, fraction: None)
+    source = _read_source(source, count)
+    index, values = read_values(fixed, fixed_values, count)
+    report("Equations", 0.0)
+    part = coupled_parts(laplacian)
+    known = part >= 0
+    is_fixed = np.zeros(count, dtype=bool)
+    is_fixed[index] = True
+    held = np.zeros(part.max() + 1, dtype=bool)
+    held[part[known & is_fixed]] = True
+    loose = np.flatnonzero(known)[~held[part[known]]]  # points of parts without any fixed point
+    source = _without_mean(laplacian.areas, source, part, loose)
+
+    result = np.full(count, values.mean() if len(values) else 0.0)
+    level = result[0]
+    result[index] = values
+    inside = known & is_fixed
+    free = np.flatnonzero(known & ~is_fixed)
+    if not len(free):
+        return result
+    if inside.any():
+        matrix, load = _with_fixed_points(laplacian, inside, np.where(is_fixed, result, 0.0), free, report)
+    else:
+        matrix, load = laplacian.stiffness, np.zeros(count)
+    report("Equations", 0.5)
+    free = free[cKDTree(laplacian.points[free]).indices]  # neighbours near in memory make the products faster
+    load = load[free] + laplacian.areas[free] * source[free]
+    matrix = matrix[free][:, free]
+    result[free] = solve_symmetric(matrix, load, result[free], 1.0 / matrix.diagonal(), report)
+    if laplacian.options.symbol_correction:
+        result[loose] -= SECOND_MOMENT / 8.0 * laplacian.smoothing_lengths[loose] ** 2 * source[loose]
+    result[loose] += level - _means(laplacian.areas, result, part, loose)
+    return result
+
+
+def harmonic_field(laplacian, fixed, fixed_values, progress=None):
+    """Spread fixed values smoothly over the surface: Delta f = 0.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+    fixed : array_like, (k,) int or (n,) bool
+        Points with known values, at least one.
+    fixed_values : array_like, (k,)
+        Their values, in the order of the indices; one number serves all.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n,)
+        f, nowhere outside the range of the fixed values. Connected parts without fixed points, and points that were
+        left out, have the mean of the fixed values.
+
+    Raises
+    ------
+    InvalidPointsError
+        No fixed points, points or values of another shape, not finite, or two values for one point.
+    SolverError
+        The solver did not converge.
+
+    References
+    ----------
+    Figure 15 of the paper.
+    """
+    index, values = read_values(fixed, fixed_values, len(laplacian.points))
+    if not len(index):
+        raise InvalidPointsError("No points are fixed, so the field is not determined. Fix at least one point.")
+    result = solve_poisson(laplacian, 0.0, index, values, progress)
+    return np.clip(result, values.min(), values.max())  # only rounding lies outside
+
+
+def read_values(fixed, values, count):
+    """Return fixed points as indices (k,) and their values (k,).
+
+    Raises
+    ------
+    InvalidPointsError
+        Points or values of another shape, not finite, or two values for one point.
+    """
+    if fixed is None:
+        fixed = np.zeros(0, dtype=int)
+    mask = as_mask(fixed, count)
+    index = np.asarray(fixed)
+    if index.dtype == bool and index.shape == (count,):
+        index = np.flatnonzero(mask)
+    index = index.astype(np.intp).ravel() % count
+    given = np.zeros(0) if values is None else np.asarray(values)
+    if given.dtype.kind not in "biuf" or (given.shape not in ((), (len(index),))):
+        raise InvalidPointsError(
+            f"Values have the shape {given.shape} and type {given.dtype} for {len(index)} fixed points. Give one"
+            " number for each of them."
+        )
+    given = np.broadcast_to(given.astype(np.float64).ravel(), len(index))
+    bad = np.count_nonzero(~np.isfinite(given))
+    if bad:
+        raise InvalidPointsError(f"{bad} of {len(given)} fixed values are not finite (NaN or infinity). Replace them.")
+    index, first, row = np.unique(index, return_index=True, return_inverse=True)
+    torn = np.count_nonzero(given != given[first][row])
+    if torn:
+        raise InvalidPointsError(f"{torn} fixed points have two different values. Give each point one value.")
+    return index, given[first]
+
+
+def _read_source(source, count):
+    given = np.asarray(source)
+    if given.dtype.kind not in "biuf" or given.shape not in ((), (count,)):
+        raise InvalidPointsError(
+            f"The source has the shape {given.shape} and type {given.dtype}. Give one number for each of the"
+            f" {count} points."
+        )
+    bad = np.count_nonzero(~np.isfinite(given))
+    if bad:
+        raise InvalidPointsError(f"{bad} of {count} values of the source are not finite. Replace them.")
+    return np.broadcast_to(given.astype(np.float64), count)
+
+
+def _means(areas, values, part, rows):
+    """Return the area-weighted mean of values (n,) over the part of each of some rows, (k,)."""
+    part, areas = part[rows], areas[rows]
+    total = np.bincount(part, areas)
+    return (np.bincount(part, areas * values[rows]) / np.where(total > 0.0, total, 1.0))[part]
+
+
+def _without_mean(areas, source, part, rows):
+    """Take the mean out of the source on parts that nothing holds, or raise if there is one."""
+    mean, size = (_means(areas, values, part, rows) for values in (source, np.abs(source)))
+    wrong = np.flatnonzero(np.abs(mean) > _MEAN * size)
+    if len(wrong):
+        raise PointCloudError(
+            f"The source has the mean {mean[wrong[0]]:.3g} over a connected part of"
+            f" {np.count_nonzero(part == part[rows[wrong[0]]])} points where nothing is fixed: only sources of"
+            " mean zero have a solution there. Subtract the area-weighted mean of each part, or fix a point."
+        )
+    result = source.copy()
+    result[rows] -= mean
+    return result
+
+
+def _with_fixed_points(laplacian, fixed, values, free, report):
+    """Return a stiffness and a load whose rows of free points take account of the fixed ones."""
+    report("Equations", 0.1)
+    spacing = mean_spacing(laplacian)
+    edge = _edge_distance(laplacian, fixed, spacing)
+    thin = fixed & ~_thick(laplacian, fixed)
+    edge[thin] = 0.0
+    thin &= ~laplacian.boundary  # images do the same there
+    weights, own, load = _weights(laplacian, fixed, values)
+    if thin.any():
+        report("Equations", 0.2)
+        distance = cKDTree(laplacian.points[thin]).query(laplacian.points, workers=-1)[0]
+        ramp = np.clip((distance / laplacian.smoothing_lengths - _NEAR[0]) / (_NEAR[1] - _NEAR[0]), 0.0, 1.0)
+        wide = np.maximum(ramp**2 * (3.0 - 2.0 * ramp), _LEAST)
+        narrow, narrow_own, narrow_load = _weights(narrow_laplacian(laplacian, _NARROW), fixed, values)
+        weights = _blend(weights, wide) + _blend(narrow, 1.0 - wide)
+        own, load = wide * own + (1.0 - wide) * narrow_own, wide * load + (1.0 - wide) * narrow_load
+    across = sparse.coo_array(weights[free][:, np.flatnonzero(fixed)])
+    i, j = free[across.row], np.flatnonzero(fixed)[across.col]
+    pulled = across.data * (1.0 + edge[j] / np.maximum(edge[i], _GRAZING * spacing[i]))
+    count = len(fixed)
+    load = load + np.bincount(i, pulled * values[j], count)
+    inner = weights[free][:, free]
+    diagonal = own + np.bincount(i, pulled, count)
+    diagonal[free] += inner.sum(axis=1)
+    place = sparse.csr_array((np.ones(len(free)), (free, np.arange(len(free)))), shape=(count, len(free)))
+    return (sparse.diags_array(diagonal) - place @ inner @ place.T).tocsr(), load
+
+
+def _blend(weights, share):
+    """Scale pair weights by the mean of a share at both ends."""
+    half = sparse.diags_array(0.5 * share)
+    return (half @ weights + weights @ half).tocsr()
+
+
+def _weights(laplacian, fixed, values):
+    """Return pair weights (n, n), and what rims with fixed points add to diagonal and load, (n,).
+
+    Images in such a rim carry ``2 c - f`` instead of f, with c the value at the nearest rim point.
+    """
+    count = len(fixed)
+    weights = sparse.diags_array(laplacian.stiffness.diagonal()) - laplacian.stiffness
+    rim = np.flatnonzero(laplacian.boundary)
+    near = np.flatnonzero(laplacian.near_rim)
+    nothing = np.zeros(count)
+    if not fixed[rim].any() or not laplacian.fixed_images.nnz:
+        return weights.tocsr(), nothing, nothing
+    nearest = rim[cKDTree(laplacian.points[rim]).query(laplacian.points[near], workers=-1)[1]]
+    chosen, c = np.zeros(count), np.zeros(count)
+    chosen[near] = fixed[nearest]
+    c[near] = values[nearest]
+    only = sparse.diags_array(chosen)
+    plain = (weights - only @ laplacian.natural_images @ only).tocsr()
+    plain.setdiag(0.0)
+    # An image is no nearer than its point, but for the curvature of the rim.
+    image = (only @ laplacian.fixed_images @ only).tocsr()
+    image = image.minimum(plain + sparse.diags_array(image.diagonal()))
+    total = image.sum(axis=1)
+    return (plain - (image - sparse.diags_array(image.diagonal()))).tocsr(), 2.0 * total, total * c + image @ c
+
+
+def _edge_distance(laplacian, fixed, spacing):
+    """Return how far points are from the edge between fixed and free points, halfway between them, (n,).
+
+    Zero for points that have no neighbours on the other side.
+    """
+    free = np.flatnonzero(~fixed)
+    across = laplacian.stiffness[np.flatnonzero(fixed)][:, free].tocoo()
+    i, j = np.flatnonzero(fixed)[across.row], free[across.col]
+    length = np.linalg.norm(laplacian.surface_points[i] - laplacian.surface_points[j], axis=1)
+    result = np.full(len(fixed), np.inf)
+    np.minimum.at(result, i, length)
+    np.minimum.at(result, j, length)
+    return np.where(np.isfinite(result), np.maximum(result - 0.5 * spacing, 0.0), 0.0)
+
+
+def _thick(laplacian, fixed):
+    """Tell which fixed points belong to a set so thick that the kernel does not reach over it, (n,) bool."""
+    rows = np.flatnonzero(fixed)
+    weights = -laplacian.stiffness[rows][:, np.flatnonzero(~fixed)]
+    deep = weights.sum(axis=1) < (1.0 - _DEEP) * laplacian.stiffness.diagonal()[rows]
+    result = np.zeros(len(fixed), dtype=bool)
+    result[rows] = (abs(laplacian.stiffness[rows][:, rows[deep]]).sum(axis=1) > 0.0) | deep
+    return result

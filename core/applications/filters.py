@@ -1,0 +1,290 @@
+"""Filters of functions on the points by the frequencies they are made of (section 4 of the paper, Figure 12)."""
+
+import numpy as np
+from scipy.fft import dct
+from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.special import expit
+
+from ..errors import InvalidPointsError, PointCloudError
+from ..geometry import check_values
+from ..kernel import SECOND_MOMENT
+from ..operator import symmetric_form
+
+_NODES = 4096  # at which a response is read
+_DEGREE = 800  # of a polynomial, at most
+_ROUGH = 0.02  # largest error of a response, as a share of its largest value, that is taken at that degree
+_ZERO = 1e-8  # eigenvalues below this share of 4 pi / area belong to constants
+
+
+def exponential(time):
+    """Return the response ``exp(-time * eigenvalue)``: the flow of heat for that time.
+
+    Parameters
+    ----------
+    time : float
+        [L^2], not negative. Details of a wavelength below about ``6 sqrt(time)`` fade.
+    """
+    if not 0.0 <= time < np.inf:
+        raise PointCloudError(f"The time of an exponential response is {time!r}. Use a number that is not negative.")
+    return lambda eigenvalues: np.exp(-time * np.asarray(eigenvalues))
+
+
+def fairing(time, order=3):
+    """Return the response ``1 / (1 + (time * eigenvalue)^order)`` of an implicit step of fairing.
+
+    Parameters
+    ----------
+    time : float
+        [L^2], not negative. What has a wavelength of ``2 pi sqrt(time)`` is halved.
+    order : int
+        1 for the flow of heat, 2 or 3 for a sharper line between what stays and what goes.
+    """
+    if not 0.0 <= time < np.inf:
+        raise PointCloudError(f"The time of the fairing is {time!r}. Use a number that is not negative.")
+    if order not in (1, 2, 3):
+        raise PointCloudError(f"The order of the fairing is {order!r}. Use 1, 2 or 3.")
+    return lambda eigenvalues: 1.0 / (1.0 + (time * np.asarray(eigenvalues)) ** order)
+
+
+def band(low, high=np.inf, softness=0.1):
+    """Return the response that keeps the eigenvalues from low to high and fades out on both sides.
+
+    Parameters
+    ----------
+    low, high : float
+        Eigenvalues [1 / L^2] at which the response is one half. A wavelength w has the eigenvalue ``(2 pi / w)^2``;
+        low = 0 keeps all below high, high = infinity all above low.
+    softness : float
+        Relative width of the fade in frequency, the root of the eigenvalue. A small one asks `chebyshev_filter` for
+        many products.
+    """
+    if not (0.0 <= low < high and softness > 0.0):
+        raise PointCloudError(
+            f"A band from {low!r} to {high!r} with softness {softness!r} is empty. Use 0 <= low < high and a"
+            " softness above zero."
+        )
+
+    def respond(eigenvalues):
+        frequency = np.sqrt(np.maximum(eigenvalues, 0.0))
+        result = np.ones_like(frequency)
+        for edge, side in ((low, 1.0), (high, -1.0)):
+            if 0.0 < edge < np.inf:
+                result *= expit(side * (frequency / np.sqrt(edge) - 1.0) * 4.0 / softness)
+        return result
+
+    return respond
+
+
+def boost(gain, low, high=np.inf, softness=0.25):
+    """Return the response that multiplies the details of a `band` by a gain and keeps all else.
+
+    Parameters
+    ----------
+    gain : float
+        Above 1 for stronger details, below for weaker ones.
+    low, high, softness : float
+        As for `band`. With an infinite high, noise grows as well.
+    """
+    if not np.isfinite(gain):
+        raise PointCloudError(f"The gain of the details is {gain!r}. Use a finite number.")
+    part = band(low, high, softness)
+    return lambda eigenvalues: 1.0 + (gain - 1.0) * part(eigenvalues)
+
+
+def spectral_filter(values, spectrum, areas, response, rest=0.0):
+    """Filter a function by its modes.
+
+    Parameters
+    ----------
+    values : array_like, (n,) or (n, k)
+        A function on the points, or several as columns.
+    spectrum : Spectrum
+        Of the operator on these points.
+    areas : array_like, (n,)
+        Area elements [L^2] that the eigenvectors are orthonormal for.
+    response : int or callable
+        A whole number m keeps the first m modes and drops the others; the cost follows m. A callable maps an array of
+        eigenvalues [1 / L^2] to the factors of their modes.
+    rest : float
+        Factor of what the spectrum does not hold; 1 keeps the details.
+
+    Returns
+    -------
+    ndarray
+        Same shape as the values: ``sum response_k <f, phi_k> phi_k + rest (f - sum <f, phi_k> phi_k)``.
+
+    Raises
+    ------
+    InvalidPointsError
+        Values or areas that do not fit the spectrum, or are not finite.
+    PointCloudError
+        More modes than the spectrum holds, fewer than there are constant ones, or a response that is not a number for
+        each eigenvalue.
+
+    References
+    ----------
+    Vallet, Levy. Spectral geometry processing with manifold harmonics. 2008. Section 4 and Figure 12 of the paper.
+    """
+    n, count = spectrum.eigenvectors.shape
+    values = check_values(values, n)
+    areas = check_values(areas, n)
+    if areas.ndim != 1:
+        raise InvalidPointsError(f"Areas have the shape {areas.shape}. Give one area for each of the {n} points.")
+    if callable(response):
+        factors = respond(response, spectrum.eigenvalues)
+    else:
+        factors = (np.arange(count) < check_modes(response, spectrum, areas)).astype(np.float64)
+    used = count if rest != 0.0 else int(np.max(np.flatnonzero(factors), initial=-1)) + 1
+    modes = spectrum.eigenvectors[:, :used]
+    columns = values.reshape(n, -1)
+    coefficients = modes.T @ (areas[:, None] * columns)
+    result = modes @ ((factors[:used] - rest)[:, None] * coefficients)
+    if rest != 0.0:
+        result += rest * columns
+    return result.reshape(values.shape)
+
+
+def chebyshev_filter(laplacian, values, response, fixed_rim=False, raw=False, tolerance=1e-4, progress=None):
+    """Filter a function by a polynomial of the operator, without any eigenvectors.
+
+    The result is that of `spectral_filter` with all modes: the polynomial is that of the operator with the symbol
+    correction, whose eigenvalues are the corrected ones as far as they are resolved.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+    values : array_like, (n,) or (n, k)
+        A function on the points, or several as columns.
+    response : callable
+        Maps an array of eigenvalues [1 / L^2] to factors. It should be smooth: the more abrupt, the more products with
+        the operator.
+    fixed_rim : bool
+        Take the functions to vanish at the rim, instead of meeting it level.
+    raw : bool
+        Leave out the symbol correction.
+    tolerance : float
+        Largest error of a factor, as a share of the largest one. A response with kinks may be met less closely, within
+        2 percent.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray
+        Same shape as the values. Points that the operator leaves out count as constants of their own: their values are
+        multiplied by ``response(0)``.
+
+    Raises
+    ------
+    InvalidPointsError
+        Values that do not fit the points, or are not finite.
+    PointCloudError
+        A response that is not a number for each eigenvalue, or too abrupt for a polynomial.
+    """
+    report = progress or (lambda stage, fraction: None)
+    values = check_values(values, len(laplacian.areas))
+    report("Filter", 0.0)
+    order, root, multiply = corrected_operator(laplacian, fixed_rim, raw)
+    report("Filter", 0.0)
+    top = highest_eigenvalue(multiply, len(order))
+    coefficients = _polynomial(response, top, tolerance)
+
+    columns = values.reshape(len(values), -1)
+    before = columns[order] / root[:, None]
+    result = coefficients[0] * before
+    if len(coefficients) > 1:
+        now = (2.0 / top) * multiply(before) - before
+        result += coefficients[1] * now
+        for k in range(2, len(coefficients)):
+            if k % 10 == 0:
+                report("Filter", k / len(coefficients))
+            before, now = now, (4.0 / top) * multiply(now) - 2.0 * now - before
+            result += coefficients[k] * now
+    filtered = respond(response, np.zeros(1))[0] * columns
+    filtered[order] = root[:, None] * result
+    return filtered.reshape(values.shape)
+
+
+def corrected_operator(laplacian, fixed_rim=False, raw=False):
+    """Return the negated operator with the symbol correction as a product with a symmetric matrix.
+
+    Returns
+    -------
+    order, root
+        As of `symmetric_form`.
+    multiply : callable
+        Of (m, k) arrays: ``S y + mu2 / 8 S (h^2 S y)``, or S y without the correction. Positive semi-definite.
+    """
+    order, root, matrix = symmetric_form(laplacian, laplacian.fixed_rim[0] if fixed_rim else laplacian.stiffness)
+    if raw or not laplacian.options.symbol_correction:
+        return order, root, lambda y: matrix @ y
+    squared = (SECOND_MOMENT / 8.0) * laplacian.smoothing_lengths[order, None] ** 2
+
+    def multiply(y):
+        product = matrix @ y
+        return product + matrix @ (squared * product)
+
+    return order, root, multiply
+
+
+def highest_eigenvalue(multiply, size):
+    """Return a close bound of the eigenvalues of a symmetric product, by a few Lanczos steps."""
+    operator = LinearOperator((size, size), matvec=lambda y: multiply(y.reshape(-1, 1)).ravel(), dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(size)
+    return 1.05 * eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0]
+
+
+def _polynomial(response, top, tolerance):
+    """Return the Chebyshev coefficients of a response over [0, top], as many as the tolerance needs."""
+    angle = np.pi * (np.arange(_NODES) + 0.5) / _NODES
+    factors = respond(response, 0.5 * top * (1.0 + np.cos(angle)))
+    coefficients = dct(factors) / _NODES
+    coefficients[0] *= 0.5
+    largest = np.abs(factors).max()
+    left = np.append(np.cumsum(np.abs(coefficients[::-1]))[::-1][1:], 0.0)  # bound of the error from each degree on
+    degree = int(np.argmax(left <= tolerance * largest))
+    if degree <= _DEGREE:
+        return coefficients[: degree + 1]
+    coefficients = coefficients[: _DEGREE + 1]
+    error = np.abs(np.polynomial.chebyshev.chebval(np.cos(angle), coefficients) - factors).max()
+    if error > _ROUGH * largest:
+        raise PointCloudError(
+            f"The response changes too abruptly for a polynomial: at degree {_DEGREE} it is off by"
+            f" {error / largest:.0%}. Soften it, or compute a spectrum first."
+        )
+    return coefficients
+
+
+def respond(response, eigenvalues):
+    """Return a response's factors for eigenvalues, (m,), after a check."""
+    factors = np.asarray(response(eigenvalues))
+    if factors.shape not in ((), eigenvalues.shape) or factors.dtype.kind not in "iufb":
+        raise PointCloudError(
+            f"The response gives an array of shape {factors.shape} and type {factors.dtype} for"
+            f" {len(eigenvalues)} eigenvalues. Let it return one real number for each."
+        )
+    factors = np.broadcast_to(factors, eigenvalues.shape).astype(np.float64)
+    bad = ~np.isfinite(factors)
+    if bad.any():
+        raise PointCloudError(
+            f"The response is not finite for {np.count_nonzero(bad)} of {len(bad)} eigenvalues, the first of"
+            f" them {eigenvalues[bad].min():.3g}. Let it return finite numbers from zero up."
+        )
+    return factors
+
+
+def check_modes(count, spectrum, areas):
+    """Check a number of modes to keep and return it as an integer."""
+    held = len(spectrum.eigenvalues)
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= held:
+        raise PointCloudError(
+            f"The first {count!r} modes were to be kept, and the spectrum holds {held}. Use a whole number from"
+            f" 1 to {held}, or compute more modes."
+        )
+    constant = int(np.count_nonzero(spectrum.eigenvalues < _ZERO * 4.0 * np.pi / areas.sum()))
+    if count < constant:
+        raise PointCloudError(
+            f"The first {constant} modes are the constants of as many separate parts, and {count} of them cannot"
+            f" be chosen. Keep at least {constant} modes."
+        )
+    return int(count)

@@ -1,0 +1,99 @@
+"""Distances along the surface."""
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidPointsError
+from ..geometry import as_mask
+from .graph import mean_spacing
+
+_BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
+_BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
+_GAP = 0.9  # spacings between the middle of a pair next to a rim and the nearest point: the surface is there
+
+
+def geodesic_distance(laplacian, sources, progress=None):
+    """Measure the distance along the surface from the nearest of some points.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+    sources : array_like, (k,) int or (n,) bool
+        Points to measure from, at least one.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n,)
+        Distances [L], zero at the sources; infinity on connected parts without a source and at points left out.
+
+    Raises
+    ------
+    InvalidPointsError
+        No sources, all of them left out of the operator, or indices out of range.
+
+    Notes
+    -----
+    The shortest path (Dijkstra, 1959) over all pairs of the operator, each as long as the circular arc through both
+    points with their normals. A path may choose among the 100 and more neighbours within the kernel, which do not
+    couple different sheets, so that it is hardly longer than the true one: by less than 0.1 % on the unit sphere with
+    8,000 points, where the heat method (Crane, Weischedel, Wardetzky, 2013) on the same operator is off by 0.2 to
+    0.4 % from one source, and by 4 % from five, because it smooths the ridges where the ways from two sources meet.
+    """
+    count = len(laplacian.points)
+    report = progress or (lambda stage, fraction: None)
+    chosen = as_mask(sources, count)
+    if not chosen.any():
+        raise InvalidPointsError("There are no sources to measure distances from. Choose at least one point.")
+    known = np.flatnonzero(chosen & (laplacian.component >= 0))
+    if not len(known):
+        raise InvalidPointsError(
+            f"All {np.count_nonzero(chosen)} sources are points that the operator left out, because they lie"
+            " apart from the surface. Choose points of the surface."
+        )
+    report("Lengths", 0.0)
+    graph = _lengths_of_pairs(laplacian)
+    report("Distance", 0.5)
+    result = dijkstra(graph, directed=False, indices=known, min_only=True)
+    result[chosen] = 0.0
+    return result
+
+
+def _lengths_of_pairs(laplacian):
+    """Return the (n, n) CSR matrix that holds the length of every pair of the operator once."""
+    stiffness, points = laplacian.stiffness, laplacian.surface_points
+    count = len(points)
+    first = np.repeat(np.arange(count, dtype=np.int32), np.diff(stiffness.indptr))
+    once = first < stiffness.indices
+    first, second = first[once], stiffness.indices[once]
+    spacing = mean_spacing(laplacian)
+    arcs = np.empty(len(first))
+    kept = np.empty(len(first), dtype=bool)
+    tree = cKDTree(points[laplacian.component >= 0])
+    for start in range(0, len(first), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        i, j = first[block], second[block]
+        chord = points[j] - points[i]
+        length = np.linalg.norm(chord, axis=1)
+        n, m = laplacian.normals[i], laplacian.normals[j]
+        left, right = (np.einsum("pc,pc->p", chord, normal) for normal in (n, m))
+        turn = np.where(np.einsum("pc,pc->p", n, m) < 0.0, -right, right) - left
+        bend = np.minimum(0.5 * np.abs(turn) / np.maximum(length, 1e-300), 1.0)
+        # On a circle the chord is as much shorter than the arc as a sine than its angle.
+        arcs[block] = length * np.where(bend > 1e-4, np.arcsin(bend) / np.maximum(bend, 1e-4), 1.0)
+        short = length < 0.5 * (laplacian.smoothing_lengths[i] + laplacian.smoothing_lengths[j])
+        kept[block] = short | (bend < _BEND)
+        # The straight way between two points near a rim may lead through a hole or past a bay.
+        doubtful = np.flatnonzero(kept[block] & laplacian.near_rim[i] & laplacian.near_rim[j] & ~short)
+        middle = 0.5 * (points[i[doubtful]] + points[j[doubtful]])
+        height = 0.25 * length[doubtful] * bend[doubtful]
+        reach = _GAP * 0.5 * (spacing[i[doubtful]] + spacing[j[doubtful]]) + height
+        kept[start + doubtful] = tree.query(middle, workers=-1)[0] < reach
+    arcs = np.maximum(arcs, 1e-300)  # points at one place are neighbours too
+    first, second = first[kept], second[kept]
+    start = np.concatenate([[0], np.cumsum(np.bincount(first, minlength=count))])
+    return sparse.csr_array((arcs[kept], second, start), shape=(count, count))

@@ -1,0 +1,125 @@
+"""Near neighbours on the same sheet of the surface, as a graph with lengths."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..geometry import SMALLEST
+
+_SEEN = 3  # times as many nearest points are looked at as are joined: those of close sheets are among them
+
+
+@dataclass(frozen=True)
+class NearGraph:
+    """Places of a cloud, joined to their nearest neighbours along the surface.
+
+    Attributes
+    ----------
+    lengths : csr_array, (m, m)
+        Symmetric; distances of joined places [L], all positive. All places of a connected part hang together.
+    place : ndarray, (n,) int
+        Row of each of the caller's points, the same for points at the same place; -1 for points left out.
+    first : ndarray, (m,) int
+        One of the caller's points at each place.
+    """
+
+    lengths: sparse.csr_array
+    place: np.ndarray
+    first: np.ndarray
+
+    def hand_out(self, quantity, neutral):
+        """Return a quantity of the places, (m,), for the caller's points; those left out get the neutral value."""
+        result = quantity[self.place]
+        result[self.place < 0] = neutral
+        return result
+
+
+def near_graph(laplacian, count):
+    """Join every point to its nearest ones among those that the operator couples it with.
+
+    The operator's pairs lie on one sheet of the surface, so the graph does not cross the gap between close sheets; and
+    it takes only the nearest of them, so that it does not leap over anything as narrow as the kernel is wide.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+    count : int
+        Nearest neighbours of each point; all that are as far as the last one belong to them.
+
+    Returns
+    -------
+    NearGraph
+    """
+    n = len(laplacian.points)
+    known = np.flatnonzero(laplacian.component >= 0)
+    _, first, inverse = np.unique(laplacian.points[known], axis=0, return_index=True, return_inverse=True)
+    first = known[first]
+    place = np.full(n, -1)
+    place[known] = inverse.reshape(-1)
+    points, label = laplacian.surface_points[first], laplacian.component[first]
+
+    m = len(first)
+    distance, index = cKDTree(points).query(points, k=min(_SEEN * count + 1, m), workers=-1)
+    joined = _coupled(laplacian.stiffness, first, index)
+    joined[:, 0] = False
+    last = np.where(joined & (np.cumsum(joined, axis=1) <= count), distance, 0.0).max(axis=1)
+    joined &= distance <= (1.0 + 1e-9) * last[:, None]
+    row, column = np.nonzero(joined)
+    lengths = sparse.csr_array((distance[row, column], (row, index[row, column])), shape=(m, m))
+    return NearGraph(_bridge(lengths.maximum(lengths.T), points, label), place, first)
+
+
+def _coupled(stiffness, first, index):
+    """Tell which of their neighbours, (m, k) int, the stiffness couples places with."""
+    row = np.repeat(first, index.shape[1])
+    number = np.arange(1.0, index.size + 1.0)  # survives a product with the pattern of the stiffness
+    numbers = sparse.csr_array((number, (row, first[index].ravel())), shape=stiffness.shape)
+    result = np.zeros(index.size, dtype=bool)
+    result[numbers.multiply(stiffness.astype(bool)).data.astype(np.int64) - 1] = True
+    return result.reshape(index.shape)
+
+
+def _bridge(lengths, points, label):
+    """Join pieces of one connected part at their nearest points, so that it hangs together.
+
+    The stiffness leaves a point without pairs where no other one seems to lie on its sheet.
+    """
+    piece = connected_components(lengths, directed=False)[1]
+    if piece.max() == label.max():
+        return lengths.tocsr()
+    size = np.bincount(piece)
+    ends = []
+    for part in range(label.max() + 1):
+        pieces = np.unique(piece[label == part])
+        main = pieces[np.argmax(size[pieces])]
+        own = np.flatnonzero(piece == main)
+        tree = cKDTree(points[own])
+        for other in pieces[pieces != main]:
+            rows = np.flatnonzero(piece == other)
+            distance, nearest = tree.query(points[rows])
+            best = distance.argmin()
+            ends.append((rows[best], own[nearest[best]], distance[best]))
+    row, column, distance = (np.array(part) for part in zip(*ends, strict=True))
+    bridges = sparse.csr_array((distance, (row, column)), shape=lengths.shape)
+    return (lengths + bridges + bridges.T).tocsr()
+
+
+def coupled_parts(laplacian):
+    """Number the parts of the cloud between which the operator couples no points, (n,) int.
+
+    Parts of fewer than 50 points are -1: points left out, and single ones within a connected part that are so far off
+    its surface that they lost all neighbours.
+    """
+    count, label = connected_components(laplacian.stiffness, directed=False)
+    large = np.bincount(label, minlength=count) >= SMALLEST
+    return np.where(large, np.cumsum(large) - 1, -1)[label]
+
+
+def mean_spacing(laplacian):
+    """Return the distance between the points of an even sample as dense as the neighbours of each, (n,) [L]."""
+    stiffness = laplacian.stiffness
+    neighbors = sparse.csr_array((np.ones(stiffness.nnz), stiffness.indices, stiffness.indptr), shape=stiffness.shape)
+    return np.sqrt(neighbors @ laplacian.areas / np.maximum(neighbors.sum(axis=1), 1.0))

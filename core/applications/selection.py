@@ -1,0 +1,52 @@
+"""Sets of points: grown by distance along the cloud."""
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from ..errors import PointCloudError
+from ..geometry import as_mask
+from .graph import near_graph
+
+_NEIGHBORS = 20  # so many directions make paths at most 2 % longer than the way along the surface
+
+
+def grow(laplacian, chosen, distance):
+    """Add all points within a distance along the surface to a set of points.
+
+    Distances are lengths of paths from neighbour to neighbour on the same sheet, so that the set does not jump to
+    another sheet, or another part, that passes nearby. They are a few percent too long at most.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+    chosen : array_like, (k,) int or (n,) bool
+        The set, which may be empty.
+    distance : float
+        How far to grow [L], not negative; infinity selects whole connected parts.
+
+    Returns
+    -------
+    ndarray, (n,) bool
+        The points chosen, and those near them. Points left out of the operator are only in it if they were chosen.
+
+    Raises
+    ------
+    InvalidPointsError
+        Neither whole numbers below n nor n truth values.
+    PointCloudError
+        A distance that is negative or not a number.
+    """
+    mask = as_mask(chosen, len(laplacian.points))
+    try:
+        reach = float(distance)
+    except (TypeError, ValueError):
+        reach = np.nan
+    if not reach >= 0.0:
+        raise PointCloudError(f"The distance to grow by is {distance!r}. Use a number that is not negative.")
+    graph = near_graph(laplacian, _NEIGHBORS)
+    start = np.unique(graph.place[mask & (graph.place >= 0)])
+    if not len(start):
+        return mask.copy()
+    way = dijkstra(graph.lengths, directed=False, indices=start, min_only=True, limit=reach)
+    return mask | graph.hand_out(np.isfinite(way), False)

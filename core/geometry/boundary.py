@@ -1,0 +1,324 @@
+"""Rims of open surfaces: which points lie at one, and how far every point is from it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..kernel import SUPPORT
+from .components import label_connected
+from .nearest import fading_weights
+from .quadrics import frames
+from .sheets import on_sheet
+
+_BLOCK = 1 << 13  # points looked at at one time
+_LOPSIDED = 0.15  # mean offset of the neighbours over their mean distance; less than half of it at a straight rim
+_NEIGHBORS = 30  # looked at around a candidate
+_GAP = np.radians(100.0)  # widest angle without a neighbour, at least
+_PROBE, _EMPTY = 6.0, 0.6  # no point within 0.6 of 6 spacings of the place 6 spacings further out
+_FOLDED = 2  # neighbours on another sheet that a rim point may have
+_LINK = 4.0  # spacings between candidates of the same rim
+_SHORTEST = 16  # candidates of a rim that is found
+FEWEST = 5  # points of a rim that is given
+_CURVE = (12, 34)  # candidates that the rim's course is fitted to: at least, at most
+_PART = 3  # of a short rim no more than a third: a longer part of a square's has two corners
+_LEVEL = 1.45  # a rim runs that many standard deviations outside the mean of its candidates
+_LEANING = 0.3  # what normals may be off by, as a share of the distance
+_OPPOSITE = -0.3  # cosine of the directions across two courses of the rim that do not belong together
+_HALF = (4, 6)  # a fit to one side of a corner needs more candidates than that: of a short rim, of a long one
+_KINK = (2.0, 0.1)  # a fit to one side of a corner must scatter so much less, and by so much of the spacing
+_KINKED = 1.3  # scatter over that of the neighbours at which a corner is near
+_CHANCE = 3.0  # variances of a curvature that may be chance
+_VIEWS = 48  # nearest candidates that a point looks at
+_FEW = 5  # candidates that make a second rim
+_AVERAGED = 8  # the nearest of them on one side of a corner, whose measures of the distance are averaged
+_STRAIGHT, _CORNER = 0.8, 0.75  # cosine of the directions across the rim: of one course, at least; of two, at most
+
+
+@dataclass(frozen=True)
+class Rim:
+    """Where the surface ends: for every point the nearest rim and, next to a corner, the second one.
+
+    Attributes
+    ----------
+    at_rim : ndarray, (m,) bool
+    distance : ndarray, (m, 2)
+        Distance to the rim along the surface; infinite where there is none near.
+    curvature : ndarray, (m, 2)
+        Geodesic curvature of the rim there: 1 / R for a disc of radius R, negative around a hole.
+    outward : ndarray, (m, 2, 3)
+        Unit vector across the rim; zero where it is not known.
+    """
+
+    at_rim: np.ndarray
+    distance: np.ndarray
+    curvature: np.ndarray
+    outward: np.ndarray
+
+    def reached(self, lengths):
+        """Tell from which points a kernel of these smoothing lengths reaches beyond the rim, (m,) bool."""
+        return self.distance[:, 0] < SUPPORT * lengths
+
+
+def no_rim(count):
+    """Return the rim of a closed surface."""
+    return Rim(np.zeros(count, dtype=bool), np.full((count, 2), np.inf), np.zeros((count, 2)), np.zeros((count, 2, 3)))
+
+
+def find_rim_points(nearest, oriented):
+    """Find the points at which the surface ends.
+
+    Candidates are points around which the directions of the neighbours leave a wide gap, and far into which there is
+    nothing. Short rows of candidates are dropped, as chance or as a hole that the kernel spans.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    oriented : ndarray, (m, 3)
+        Unit normals whose signs agree.
+
+    Returns
+    -------
+    ndarray, (m,) bool
+    """
+    points = nearest.points
+    result = np.zeros(len(points), dtype=bool)
+    rows = []
+    for start in range(0, len(points), _BLOCK):
+        block = np.arange(start, min(start + _BLOCK, len(points)))
+        offset = points[nearest.index[block]] - points[block, None]
+        flat = offset @ frames(oriented[block])[:, :, 1:]
+        weight = nearest.weight[block]
+        mean = np.einsum("ik,ikc->ic", weight, flat)
+        lopsided = np.linalg.norm(mean, axis=1) > _LOPSIDED * np.sum(weight * np.linalg.norm(flat, axis=2), axis=1)
+        flat, weight = flat[lopsided, 1 : _NEIGHBORS + 1], weight[lopsided, 1 : _NEIGHBORS + 1]
+        angle = np.sort(np.where(weight > 0.0, np.arctan2(flat[:, :, 1], flat[:, :, 0]), np.nan), axis=1)
+        around = np.concatenate([angle, angle[:, :1] + 2.0 * np.pi], axis=1)
+        gap = np.fmax.reduce(np.diff(around, axis=1), axis=1)
+        # Neighbours left out sort last, as NaN: the gap over the end is counted from the last known angle.
+        gap = np.fmax(gap, angle[:, 0] + 2.0 * np.pi - np.fmax.reduce(angle, axis=1))
+        rows.append(block[lopsided][gap > _GAP])
+    rows = np.concatenate(rows)
+    if not len(rows):
+        return result
+    # Where the surface folds back on itself both sides end, and go on in each other.
+    other = nearest.index[rows, 1:_NEIGHBORS]
+    behind = np.einsum("ikc,ic->ik", oriented[other], oriented[rows]) < 0.0
+    folded = np.count_nonzero(behind & (nearest.weight[rows, 1:_NEIGHBORS] <= 0.0), axis=1) > _FOLDED
+    rows = rows[~folded]
+    spacing = nearest.spacing[rows]
+    probe = points[rows] + _PROBE * spacing[:, None] * outward_directions(nearest, oriented, rows)
+    rows = rows[nearest.tree.query(probe, workers=-1)[0] > _EMPTY * _PROBE * spacing]
+    if len(rows) < _SHORTEST:
+        return result
+    result[rows[_row_sizes(points[rows], _LINK * nearest.spacing[rows]) >= _SHORTEST]] = True
+    return result
+
+
+def _row_sizes(points, reach):
+    """Return how many candidates, (k, 3), the row of each one has; those of a row are within reach of each other."""
+    distance, other = cKDTree(points).query(points, k=min(9, len(points)), workers=-1)
+    label = label_connected(other, distance <= reach[:, None])
+    return np.bincount(label)[label]
+
+
+def outward_directions(nearest, normals, rows):
+    """Return unit vectors in the tangent planes of some points, away from their neighbours, (k, 3)."""
+    offset = nearest.points[nearest.index[rows]] - nearest.points[rows, None]
+    return _tangents(-np.einsum("ik,ikc->ic", nearest.weight[rows], offset), normals[rows])
+
+
+def _tangents(directions, normals):
+    """Return the directions in the tangent planes as unit vectors, (k, 3)."""
+    flat = directions - np.einsum("ic,ic->i", directions, normals)[:, None] * normals
+    return flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
+
+
+def measure_rim(nearest, normals, at_rim, reach):
+    """Measure how far the points are from the rim.
+
+    Around every rim point the rim's course is a parabola through the rim points next to it, on one side of a corner,
+    moved outwards by their scatter: at random, points lie up to a spacing inside the rim; of points exactly on it the
+    scatter is zero.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals.
+    at_rim : ndarray, (m,) bool
+        Points at the rim.
+    reach : ndarray, (m,)
+        Distance at which a rim matters no more.
+
+    Returns
+    -------
+    Rim
+    """
+    rim = no_rim(len(normals))
+    rows = np.flatnonzero(at_rim)
+    if len(rows) < FEWEST:
+        return rim
+    course = _fit_course(nearest, normals, rows)
+    tree = cKDTree(nearest.points[rows])
+    span, view = tree.query(nearest.points, k=min(_VIEWS, len(rows)), workers=-1)
+    close = np.flatnonzero(span[:, 0] < reach)
+    for start in range(0, len(close), _BLOCK):
+        block = close[start : start + _BLOCK]
+        seen, near = view[block], span[block]
+        spacing = nearest.spacing[block, None]
+        doubt = (near + 2.0 * spacing) * np.where(course.kinked[seen], 10.0, 1.0)
+        distance, bend = course.measure(nearest.points, normals, block, seen)
+        every = np.arange(len(block))
+        eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
+        for side in (0, 1):
+            best = np.argmin(np.where(eligible, doubt, np.inf), axis=1)
+            ahead = course.outward[seen[every, best]]
+            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > _STRAIGHT)
+            rank = np.argsort(np.argsort(np.where(same, doubt, np.inf), axis=1, kind="stable"), axis=1, kind="stable")
+            trust = np.where(same & (rank < _AVERAGED), 1.0 / doubt, 0.0)
+            total = trust.sum(axis=1)
+            known = np.count_nonzero(same, axis=1) >= (_FEW if side else 1)
+            total[~known] = 1.0
+            rim.distance[block, side] = np.where(known, np.maximum((trust * distance).sum(axis=1) / total, 0), np.inf)
+            rim.curvature[block, side] = (trust * bend).sum(axis=1) / total
+            rim.outward[block, side] = np.where(known[:, None], ahead, 0.0)
+            if side == 0:
+                # Around a corner that the surface fills, the second rim turns away and lies inside the first.
+                chosen = seen[every, best][:, None]
+                apart, expected = course.ahead(nearest.points, chosen, seen)
+                turned = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _CORNER
+                eligible = turned & (apart < 0.25 * spacing) & (near < reach[block, None])
+                eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > 0.5
+    return replace(rim, at_rim=at_rim)
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Parabolas that the rim follows around each rim point: e = a + b t + c t^2 along two tangents."""
+
+    rows: np.ndarray
+    along: np.ndarray
+    across: np.ndarray
+    outward: np.ndarray
+    coefficients: np.ndarray
+    kinked: np.ndarray
+
+    def ahead(self, points, chosen, seen):
+        """Return how far other rim points lie outside a parabola's tangent, and its direction across next to them."""
+        chord = points[self.rows[seen]] - points[self.rows[chosen]]
+        t = np.einsum("ikc,ikc->ik", chord, self.along[chosen])
+        _, b, c = np.moveaxis(self.coefficients[chosen], 2, 0)
+        expected = self.across[chosen] - (b + 2.0 * c * t)[:, :, None] * self.along[chosen]
+        expected /= np.linalg.norm(expected, axis=2)[:, :, None]
+        return np.einsum("ikc,ikc->ik", chord, self.outward[chosen]), expected
+
+    def measure(self, points, normals, block, seen):
+        """Return the distance of points from the parabolas that they see, and the curvature of these, (k, views)."""
+        chord = points[block, None] - points[self.rows[seen]]
+        other = normals[self.rows[seen]]
+        side = np.sign(np.einsum("ic,ikc->ik", normals[block], other))[:, :, None]
+        turn = np.einsum("ikc,ikc->ik", chord, side * normals[block, None] - other)
+        squared = np.maximum(np.einsum("ikc,ikc->ik", chord, chord), 1e-300)
+        stretch = np.sqrt(1.0 + turn**2 / (12.0 * squared))
+        t = np.einsum("ikc,ikc->ik", chord, self.along[seen])
+        e = np.einsum("ikc,ikc->ik", chord, self.across[seen])
+        height = np.einsum("ikc,ikc->ik", chord, other)
+        e = np.where(e < 0.0, -1.0, 1.0) * np.hypot(e, height) * stretch
+        a, b, c = np.moveaxis(self.coefficients[seen], 2, 0)
+        slope = 1.0 + (b + 2.0 * c * t) ** 2
+        return (a + b * t + c * t * t - e) / np.sqrt(slope), -2.0 * c / (1.0 + b**2) ** 1.5
+
+
+def _fit_course(nearest, normals, rows):
+    points = nearest.points
+    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
+    # A rim that is given may be sparse, so that its rows are found without a reach.
+    fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, *_CURVE)[:, None]
+    across = outward_directions(nearest, normals, rows)
+    near = other[:, :9]
+    side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
+    across = _tangents(np.einsum("ik,ikc->ic", side, across[near]), normals[rows])
+    along = np.cross(normals[rows], across)
+
+    unit = np.take_along_axis(distance, np.minimum(fitted, distance.shape[1] - 1), axis=1)
+    offset = (points[rows[other]] - points[rows, None]) / unit[:, :, None]
+    t, e = np.einsum("ikc,ic->ik", offset, along), np.einsum("ikc,ic->ik", offset, across)
+    # The rim on the other side of a ribbon or a slit faces the other way.
+    facing = np.einsum("ikc,ic->ik", across[other], across) > _OPPOSITE
+    facing &= _on_sheet(nearest, normals, rows, rows[other], distance)
+    weight = np.where(facing, fading_weights(np.minimum(distance, unit)), 0.0)
+    fit, scatter = _parabola(t, e, weight)
+    spacing = nearest.spacing[rows] / unit[:, 0]
+    for half in (t < 0.25 * spacing[:, None], t > -0.25 * spacing[:, None]):
+        enough = np.count_nonzero(half & (weight > 0.0), axis=1) > np.clip(fitted[:, 0] // 5, *_HALF)
+        other_fit, other_scatter = _parabola(t, e, np.where(half | ~enough[:, None], weight, 0.0))
+        better = enough & (scatter > _KINK[0] * other_scatter + _KINK[1] * spacing)
+        fit[better], scatter[better] = other_fit[better], other_scatter[better]
+    close = np.where(np.arange(other.shape[1]) < fitted // 2, scatter[other] * unit[other, 0], np.nan)
+    usual = np.nanmedian(close, axis=1) / unit[:, 0]
+    kinked = scatter > _KINKED * usual + 0.1 * spacing
+    fit[:, 0] += _LEVEL * np.where(kinked, usual, scatter)
+    fit *= np.concatenate([unit, np.ones_like(unit), 1.0 / unit], axis=1)
+    outward = across - fit[:, 1:2] * along
+    return _Course(rows, along, across, outward / np.linalg.norm(outward, axis=1)[:, None], fit, kinked)
+
+
+def _on_sheet(nearest, normals, rows, other, distance):
+    """Tell which of other points lie on the sheet of some points, and face the same way, (k, views) each."""
+    same, cosine = on_sheet(nearest, normals, rows, other, distance, _LEANING)
+    return same & (cosine > 0.0)
+
+
+def _parabola(t, e, weight):
+    """Fit e = a + b t + c t^2, with c shrunk as far as chance may have made it; return it and the scatter about it."""
+    basis = np.stack([np.ones_like(t), t, t * t], axis=2)
+    weighted = np.swapaxes(basis * weight[:, :, None], 1, 2)
+    inverse = np.linalg.inv(weighted @ basis + 1e-9 * np.eye(3))
+    fit = (inverse @ weighted @ e[:, :, None])[:, :, 0]
+    residual = e - np.einsum("ikb,ib->ik", basis, fit)
+    total = weight.sum(axis=1)
+    freedom = np.maximum(1.0 - 3.0 * (weight**2).sum(axis=1) / total**2, 0.2)
+    scatter = np.sqrt((weight * residual**2).sum(axis=1) / (total * freedom))
+    spread = inverse[:, 2:] @ weighted
+    chance = scatter**2 * (spread**2).sum(axis=(1, 2))
+    kept = np.maximum(1.0 - _CHANCE * chance / np.maximum(fit[:, 2] ** 2, 1e-300), 0.0)
+    fit += (inverse[:, :, 2] / inverse[:, 2:, 2]) * ((kept - 1.0) * fit[:, 2])[:, None]
+    return fit, scatter
+
+
+def given_rim(nearest, normals, distance):
+    """Take distances to the rim as they are, and find the rim's curvature from them.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals.
+    distance : ndarray, (m,)
+        Distance to the rim along the surface; infinite where there is none near.
+
+    Returns
+    -------
+    Rim
+    """
+    curvature = np.zeros(len(distance))
+    known = np.isfinite(distance)
+    rows = np.flatnonzero(known & known[nearest.index].all(axis=1))
+    for start in range(0, len(rows), _BLOCK):
+        block = rows[start : start + _BLOCK]
+        index = nearest.index[block]
+        unit = nearest.distance[block, -1]
+        offset = (nearest.points[index] - nearest.points[block, None]) / unit[:, None, None]
+        u, v = np.moveaxis((offset @ frames(normals[block]))[:, :, 1:], 2, 0)
+        basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
+        weighted = np.swapaxes(basis * nearest.weight[block][:, :, None], 1, 2)
+        fit = np.linalg.solve(weighted @ basis + 1e-9 * np.eye(6), weighted @ distance[index][:, :, None])[:, :, 0]
+        bend = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2  # of the line at this distance; the rim's own is this below
+        curvature[block] = bend / np.maximum(1.0 + bend * distance[block], 0.5)
+    rim = no_rim(len(distance))
+    rim.distance[:, 0], rim.curvature[:, 0] = distance, curvature
+    return replace(rim, at_rim=distance < 0.5 * nearest.spacing)

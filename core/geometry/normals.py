@@ -1,0 +1,141 @@
+"""Normals from the cloud: covariance of each neighbourhood, and a consistent orientation."""
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
+
+from ..errors import InvalidPointsError, NotASurfaceError
+from ..kernel import kernel
+
+NEIGHBORS = 12
+
+
+def unit_normals(normals, count):
+    """Check given normals and scale them to unit length.
+
+    Raises
+    ------
+    InvalidPointsError
+        Not (count, 3) finite numbers, or some of them zero.
+    """
+    normals = np.asarray(normals)
+    if normals.shape != (count, 3) or normals.dtype.kind not in "iuf":
+        raise InvalidPointsError(
+            f"Normals of shape {normals.shape} and type {normals.dtype} do not fit {count} points. Give three"
+            " real numbers for each point."
+        )
+    length = np.linalg.norm(normals.astype(np.float64), axis=1)
+    bad = int(np.count_nonzero(~(np.isfinite(length) & (length > 0.0))))
+    if bad:
+        raise InvalidPointsError(f"{bad} of {count} normals are zero or not finite. Leave the normals to be estimated.")
+    return normals / length[:, None]
+
+
+def covariance_normals(neighborhoods, weighted=True):
+    """Estimate unit normals by (weighted) principal component analysis, eq. (9).
+
+    Parameters
+    ----------
+    neighborhoods : Neighborhoods
+        Of m distinct points.
+    weighted : bool
+        Weigh by the kernel W_h (WPCA) or count every neighbour alike (PCA).
+
+    Returns
+    -------
+    ndarray, (m, 3)
+        Unit normals of arbitrary sign: the direction of least variance.
+
+    Raises
+    ------
+    NotASurfaceError
+        The points of many neighbourhoods lie along a curve.
+    """
+    points, pairs = neighborhoods.points, neighborhoods
+    if weighted:
+        weights = pairs.half(kernel(pairs.distance / pairs.mean(pairs.lengths)))
+        own = kernel(0.0)
+    else:
+        weights = pairs.half(np.ones(len(pairs.first)))
+        own = 1.0
+    axes = np.triu_indices(3)
+    moments = np.column_stack([np.ones(len(points)), points, points[:, axes[0]] * points[:, axes[1]]])
+    moments = own * moments + weights @ moments + weights.T @ moments
+    moments /= moments[:, :1]
+    mean = moments[:, 1:4]
+    covariance = np.empty((len(points), 3, 3))
+    covariance[:, axes[0], axes[1]] = covariance[:, axes[1], axes[0]] = (
+        moments[:, 4:] - mean[:, axes[0]] * mean[:, axes[1]]
+    )
+    variances, directions = np.linalg.eigh(covariance)
+    curve = np.count_nonzero(variances[:, 1] < 5e-3 * variances[:, 2])
+    if curve > 0.01 * len(points):
+        raise NotASurfaceError(
+            f"Around {curve} of {len(points)} points the neighbors lie along a curve, so there is no tangent"
+            " plane. Use points of a surface."
+        )
+    return np.ascontiguousarray(directions[:, :, 0])
+
+
+def orient_normals(nearest, normals):
+    """Flip normals so that neighbours agree, outwards where the cloud encloses a volume.
+
+    The sign travels along a minimum spanning tree of the neighbour graph, whose edges cost least where a circular arc
+    joins both points best (Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1992). Along an arc the second normal is the
+    mirror image of the first in the plane halfway between the points, which holds across sharp edges too.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals of arbitrary sign.
+
+    Returns
+    -------
+    ndarray, (m, 3)
+        The same normals with consistent signs. Every connected part points away from its own centroid on the whole.
+    """
+    points = nearest.points
+    n = len(points)
+    first, second, _ = near_edges(nearest)
+    cost = (
+        1.0 + 1e-9 - np.minimum(np.abs(mirrored_cosine(points, normals, first, second)), 1.0)
+    )  # zero would be no edge
+    graph = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
+    graph = graph + graph.T
+    parts, part = connected_components(graph, directed=False)
+
+    parent = np.arange(n)
+    for root in np.unique(part, return_index=True)[1]:
+        order, before = breadth_first_order(graph, root, directed=False)
+        parent[order[1:]] = before[order[1:]]
+    child = np.flatnonzero(parent != np.arange(n))
+    sign = np.ones(n)
+    sign[child] = np.where(mirrored_cosine(points, normals, child, parent[child]) < 0.0, -1.0, 1.0)
+    while np.any(parent != parent[parent]):  # each round doubles the length of the path already multiplied
+        sign *= sign[parent]
+        parent = parent[parent]
+    normals = normals * sign[:, None]
+
+    size = np.bincount(part, minlength=parts)
+    centroid = np.column_stack([np.bincount(part, points[:, axis], parts) for axis in range(3)]) / size[:, None]
+    outward = np.bincount(part, np.einsum("ij,ij->i", points - centroid[part], normals), parts)
+    return normals * np.where(outward < 0.0, -1.0, 1.0)[part, None]
+
+
+def near_edges(nearest):
+    """Return the edges from every point to its nearest neighbours on its own sheet: both ends and the length."""
+    near = slice(1, NEIGHBORS + 1)
+    same = nearest.weight[:, near] > 0.0
+    first = np.repeat(np.arange(len(same), dtype=np.int32), np.count_nonzero(same, axis=1))
+    return first, nearest.index[:, near][same], nearest.distance[:, near][same]
+
+
+def mirrored_cosine(points, normals, first, second):
+    """Cosine between the second normal and the mirror image of the first in the plane halfway between the points."""
+    chord = points[second] - points[first]
+    chord /= np.linalg.norm(chord, axis=1)[:, None]
+    left, right = normals[first], normals[second]
+    along = np.einsum("ij,ij->i", chord, left) * np.einsum("ij,ij->i", chord, right)
+    return np.einsum("ij,ij->i", left, right) - 2.0 * along

@@ -1,0 +1,96 @@
+"""The neighbour pairs inside the kernel's support."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from ..kernel import SUPPORT
+
+_BLOCK = 1 << 22  # neighbour candidates held at one time while the pairs are collected
+
+
+@dataclass(frozen=True)
+class Neighborhoods:
+    """Points and all pairs nearer than 3 h_ij, each once.
+
+    Attributes
+    ----------
+    points : ndarray, (m, 3)
+        In scaled coordinates; parts that are not connected stand far apart.
+    lengths : ndarray, (m,)
+        Smoothing lengths h; h_ij is the mean of both ends.
+    first, second : ndarray, (pairs,) int32
+        The two points of each pair, ordered by the first.
+    distance : ndarray, (pairs,)
+        Their distance in space.
+    """
+
+    points: np.ndarray
+    lengths: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    distance: np.ndarray
+
+    def keep(self, kept):
+        """Return the same points with some of the pairs, (pairs,) bool."""
+        return replace(self, first=self.first[kept], second=self.second[kept], distance=self.distance[kept])
+
+    def mean(self, values):
+        """Return the mean of a point quantity over both ends of every pair."""
+        return 0.5 * (values[self.first] + values[self.second])
+
+    def half(self, values):
+        """Return a pair quantity as the (m, m) CSR matrix U that holds each pair once; the whole is U + U.T."""
+        count = len(self.points)
+        start = np.zeros(count + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
+        np.cumsum(np.bincount(self.first, minlength=count), out=start[1:])
+        return sparse.csr_array((values, self.second, start), shape=(count, count))
+
+
+def find_pairs(tree, lengths, report=lambda: None):
+    """Find all pairs nearer than 3 h_ij, with h_ij = (h_i + h_j) / 2.
+
+    Parameters
+    ----------
+    tree : cKDTree
+        Of n distinct points.
+    lengths : ndarray, (n,)
+        Smoothing lengths.
+    report : callable
+        Called before each block of points; may raise `Cancelled`.
+
+    Returns
+    -------
+    first, second : ndarray, (pairs,) int32
+        Each pair once, ordered by the first.
+    distance : ndarray, (pairs,)
+    """
+    n = tree.n
+    radii = SUPPORT * lengths
+    # The search starts from what an even sample holds; rows that reach further are asked again, for twice as many.
+    sample = slice(None, None, max(1, n // 1000))
+    spacing = tree.query(tree.data[sample], k=[min(31, n)], workers=-1)[0][:, 0]
+    count = int(min(max(40.0 * np.median(radii[sample] / spacing) ** 2, 16), n))
+    pending = np.arange(n)
+    found = []
+    while len(pending):
+        unfinished = []
+        for rows in np.array_split(pending, len(pending) * count // _BLOCK + 1):
+            report()
+            distance, column = tree.query(tree.data[rows], k=count, workers=-1)
+            complete = (distance[:, -1] > radii[rows]) | (count == n)
+            unfinished.append(rows[~complete])
+            rows, distance, column = rows[complete], distance[complete], column[complete]
+            reach, other = radii[rows, None], radii[column]
+            # A pair is kept by the end that reaches further, which always sees it.
+            kept = (reach > other) | ((reach == other) & (rows[:, None] < column))
+            kept &= distance <= 0.5 * (reach + other)
+            first = np.repeat(rows.astype(np.int32), np.count_nonzero(kept, axis=1))
+            found.append((first, column[kept].astype(np.int32), distance[kept]))
+        pending, count = np.concatenate(unfinished), min(2 * count, n)
+    rounds = [np.concatenate(part) for part in zip(*found, strict=True)]
+    if np.any(np.diff(rounds[0]) < 0):  # later rounds answered for earlier rows
+        order = np.argsort(rounds[0], kind="stable")
+        rounds = [part[order] for part in rounds]
+    return rounds

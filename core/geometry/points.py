@@ -1,0 +1,230 @@
+"""Checks and preparation of the input coordinates."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
+
+
+def check_points(points):
+    """Check coordinates and return them in double precision.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Coordinates [L]. Integers are taken as numbers; the precision of float32 input is judged as such.
+
+    Returns
+    -------
+    ndarray, (n, 3) float64
+        A copy only where the type changes.
+
+    Raises
+    ------
+    InvalidPointsError
+        Not (n, 3) real numbers, not finite, or so far from the origin that their type no longer tells them apart.
+    TooFewPointsError
+        No points at all.
+    """
+    try:
+        given = np.asarray(points)
+    except ValueError as error:
+        raise InvalidPointsError(f"Points must be an array of shape (n, 3): {error}.") from error
+    if given.ndim != 2 or given.shape[1] != 3:
+        raise InvalidPointsError(f"Points must have the shape (n, 3), not {given.shape}. Give x, y, z for each point.")
+    if given.dtype.kind not in "iuf":
+        raise InvalidPointsError(f"Points must be real numbers, not {given.dtype}. Convert them to float64.")
+    if len(given) == 0:
+        raise TooFewPointsError("There are no points. Add points, or choose another object.")
+    result = given.astype(np.float64, copy=False)
+    bad = int(np.count_nonzero(~np.isfinite(result).all(axis=1)))
+    if bad:
+        raise InvalidPointsError(
+            f"{bad} of {len(result)} points have coordinates that are not finite (NaN or infinity). Delete these"
+            " points."
+        )
+    extent = np.ptp(result, axis=0).max()
+    largest = np.abs(result).max()
+    if given.dtype.kind == "f" and extent < 8192.0 * np.finfo(given.dtype).eps * largest:
+        raise InvalidPointsError(
+            f"The {len(result)} points lie {largest:.3g} from the origin but span only {extent:.3g}:"
+            f" {given.dtype} coordinates cannot tell them apart there. Move them to the origin before they are"
+            " stored."
+        )
+    return result
+
+
+@dataclass(frozen=True)
+class ScaledPoints:
+    """Distinct points, centred and divided by their root mean square radius.
+
+    Attributes
+    ----------
+    points : ndarray, (m, 3)
+        Distinct points in scaled coordinates, in the order of a k-d tree, which keeps neighbours near in memory.
+    scale : float
+        The root mean square radius [L]: caller's length = scale * scaled length.
+    inverse : ndarray, (n,) int
+        For each of the caller's points, its row in `points`; -1 for points that were left out.
+    copies : ndarray, (m,) int
+        How many of the caller's points share each row.
+    first : ndarray, (m,) int
+        The caller's point that each row was first seen at.
+    """
+
+    points: np.ndarray
+    scale: float
+    inverse: np.ndarray
+    copies: np.ndarray
+    first: np.ndarray
+
+    @property
+    def duplicates(self):
+        """Number of points beyond the first at their place."""
+        return len(self.inverse) - len(self.points)
+
+    def hand_out(self, quantity, neutral):
+        """Return a quantity of the distinct points for the caller's; those left out get the neutral value."""
+        result = quantity[self.inverse]
+        result[self.inverse < 0] = neutral
+        return result
+
+    def share(self, quantity, neutral):
+        """Hand a quantity out in equal parts where several of the caller's points lie at one place."""
+        return self.hand_out(quantity / self.copies, neutral)
+
+    def leave_out(self, dropped):
+        """Return the same without some of the distinct points, (m,) bool."""
+        row = np.cumsum(~dropped) - 1
+        row[dropped] = -1
+        kept = ~dropped
+        return replace(
+            self, points=self.points[kept], inverse=row[self.inverse], copies=self.copies[kept], first=self.first[kept]
+        )
+
+
+def scale_points(points, needed):
+    """Centre, scale and merge duplicates, so that all that follows is free of units.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+        From `check_points`.
+    needed : int
+        How many distinct points the neighbourhoods need.
+
+    Raises
+    ------
+    TooFewPointsError, NotASurfaceError
+        Fewer distinct points than needed, or all of them on one line.
+    """
+    centered = points - points.mean(axis=0)
+    scale = float(np.sqrt(np.mean(np.sum(centered**2, axis=1))))
+    if scale > 0.0:
+        centered /= scale
+    distinct, first, inverse, copies = np.unique(
+        centered, axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    if len(distinct) < needed:
+        among = f" among {len(points)}" if len(distinct) < len(points) else ""
+        raise TooFewPointsError(
+            f"The neighborhoods need {needed} different points, and there are {len(distinct)}{among}. Add points, or"
+            " lower the number of neighbors."
+        )
+    spread = np.linalg.eigvalsh(centered.T @ centered / len(centered))
+    if spread[1] < 1e-10 * spread[2]:
+        raise NotASurfaceError(
+            f"All {len(points)} points lie on a straight line, so they have no area. Use points of a surface."
+        )
+    order = cKDTree(distinct).indices
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return ScaledPoints(distinct[order], scale, rank[inverse.reshape(-1)], copies[order], first[order])
+
+
+def as_mask(chosen, count):
+    """Return a set of points, (k,) indices or an (n,) bool mask, as a mask.
+
+    Raises
+    ------
+    InvalidPointsError
+        Neither whole numbers below n nor n truth values.
+    """
+    given = np.asarray(chosen)
+    if given.dtype == bool and given.shape == (count,):
+        return given
+    mask = np.zeros(count, dtype=bool)
+    if given.size == 0:
+        return mask
+    if given.ndim != 1 or given.dtype.kind not in "iu" or given.min() < -count or given.max() >= count:
+        raise InvalidPointsError(
+            f"A set of points has the shape {given.shape} and type {given.dtype}. Give whole numbers below"
+            f" {count}, or {count} truth values."
+        )
+    mask[given] = True
+    return mask
+
+
+def as_indices(chosen, count, name):
+    """Return a set of points, (k,) indices or an (n,) bool mask, as indices in the order given.
+
+    Raises
+    ------
+    InvalidPointsError
+        Neither whole numbers below n nor n truth values, or some points named several times.
+    """
+    mask = as_mask(chosen, count)
+    given = np.asarray(chosen)
+    if given.dtype == bool or given.size == 0:
+        return np.flatnonzero(mask)
+    index = given.astype(np.int64) % count
+    twice = len(index) - int(np.count_nonzero(mask))
+    if twice:
+        raise InvalidPointsError(
+            f"{twice} of the {len(index)} {name} are named more than once. Name every point a single time."
+        )
+    return index
+
+
+def check_distances(distances, count):
+    """Check distances to a rim, (count,), infinite where there is none near.
+
+    Raises
+    ------
+    InvalidPointsError
+        Another shape, negative, or NaN.
+    """
+    given = np.asarray(distances)
+    if given.shape != (count,) or given.dtype.kind not in "iuf" or not np.all(given >= 0.0):
+        raise InvalidPointsError(
+            f"Distances to the rim have the shape {given.shape} and type {given.dtype}. Give {count} numbers"
+            " that are not negative, infinity where there is no rim near."
+        )
+    return given.astype(np.float64)
+
+
+def check_values(values, count, columns=True):
+    """Check functions on the points and return them, (count,) or with columns (count, k), in double precision.
+
+    Raises
+    ------
+    InvalidPointsError
+        Another shape, no real numbers, or not finite.
+    """
+    given = np.asarray(values)
+    shapes = (1, 2) if columns else (1,)
+    if given.ndim not in shapes or len(given) != count or given.dtype.kind not in "iufb":
+        row = "row of real numbers" if columns else "real number"
+        raise InvalidPointsError(
+            f"Values have the shape {given.shape} and type {given.dtype}, and there are {count} points. Give one {row}"
+            " per point."
+        )
+    given = given.astype(np.float64)
+    bad = int(np.count_nonzero(~np.isfinite(given.reshape(count, -1)).all(axis=1)))
+    if bad:
+        raise InvalidPointsError(
+            f"{bad} of {count} points have values that are not finite (NaN or infinity). Replace them."
+        )
+    return given

@@ -1,0 +1,116 @@
+"""What the cloud tells about the surface around each point: normal and curvature, from local quadrics."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import NotASurfaceError
+
+_BLOCK = 1 << 13  # points fitted at one time
+_RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie on a conic
+
+
+@dataclass(frozen=True)
+class LocalSurface:
+    """A quadric through the neighbours of every point.
+
+    Attributes
+    ----------
+    normals : ndarray, (m, 3)
+        Unit normals.
+    gaussian : ndarray, (m,)
+        Gaussian curvature [1 / L^2].
+    steepest : ndarray, (m,)
+        The larger of the two principal curvatures, without its sign [1 / L].
+    height : ndarray, (m, 3)
+        From the point to the quadric, across it [L].
+    bending : ndarray, (m, 3, 3)
+        Second fundamental form: ``t . bending t`` is the curvature along the unit tangent t, positive where the surface
+        bends away from the normal.
+    misfit : ndarray, (m,)
+        Root mean square distance of the neighbours from the quadric [L].
+    """
+
+    normals: np.ndarray
+    gaussian: np.ndarray
+    steepest: np.ndarray
+    height: np.ndarray
+    bending: np.ndarray
+    misfit: np.ndarray
+
+
+def fit_surface(points, index, weight, rows=None, normals=None):
+    """Fit ``z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2`` around points.
+
+    Parameters
+    ----------
+    points : ndarray, (m, 3)
+        Coordinates.
+    index : ndarray, (k, neighbors) int
+        Neighbours of k points, ordered by distance, the point itself first.
+    weight : ndarray, (k, neighbors)
+        Weights of the neighbours.
+    rows : ndarray, (k,) int, optional
+        The points; all m of them if not given.
+    normals : ndarray, (k, 3), optional
+        Where the axis z points; the direction of least variance of the same neighbours if not given.
+
+    Returns
+    -------
+    LocalSurface
+        Of the k points. The signs of the normals are arbitrary.
+
+    Raises
+    ------
+    NotASurfaceError
+        The points of many neighbourhoods lie along a curve.
+    """
+    rows = np.arange(len(points)) if rows is None else rows
+    count = len(rows)
+    fitted = LocalSurface(*(np.empty(shape) for shape in ((count, 3), count, count, (count, 3), (count, 3, 3), count)))
+    curves = 0
+    for start in range(0, count, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        offset = points[index[block]] - points[rows[block], None]
+        share = weight[block] / weight[block].sum(axis=1, keepdims=True)
+        centered = offset - np.einsum("ik,ikc->ic", share, offset)[:, None]
+        covariance = np.swapaxes(share[:, :, None] * centered, 1, 2) @ centered
+        if normals is None:
+            variance, frame = np.linalg.eigh(covariance)
+            curves += np.count_nonzero(variance[:, 1] < 5e-3 * variance[:, 2])
+        else:
+            frame = frames(normals[block])
+        unit = 3.0 * np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))  # makes the equations well scaled
+        z, v, u = np.moveaxis(offset @ frame / unit[:, None, None], 2, 0)
+        basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
+        weighted = np.swapaxes(basis * share[:, :, None], 1, 2)
+        fit = np.linalg.solve(weighted @ basis + _RIDGE * np.eye(6), weighted @ z[:, :, None])
+        misfit = (z - (basis @ fit)[:, :, 0]) ** 2
+        fit = fit[:, :, 0]
+        slope = 1.0 + fit[:, 1] ** 2 + fit[:, 2] ** 2
+        local = np.stack([np.ones_like(slope), -fit[:, 2], -fit[:, 1]], axis=1) / np.sqrt(slope)[:, None]
+        mean, turn = fit[:, 3] + fit[:, 5], np.hypot(fit[:, 3] - fit[:, 5], fit[:, 4])
+        fitted.normals[block] = np.einsum("iab,ib->ia", frame, local)
+        fitted.gaussian[block] = (4.0 * fit[:, 3] * fit[:, 5] - fit[:, 4] ** 2) / (slope * unit) ** 2
+        fitted.steepest[block] = (np.abs(mean) + turn) / unit
+        form = np.empty((len(fit), 2, 2))
+        form[:, 0, 0], form[:, 1, 1] = -2.0 * fit[:, 3], -2.0 * fit[:, 5]
+        form[:, 0, 1] = form[:, 1, 0] = -fit[:, 4]
+        tangents = frame[:, :, :0:-1]  # u, v
+        fitted.bending[block] = (tangents @ form @ np.swapaxes(tangents, 1, 2)) / unit[:, None, None]
+        fitted.height[block] = (fit[:, 0] * unit)[:, None] * frame[:, :, 0]
+        fitted.misfit[block] = np.sqrt((share * misfit).sum(axis=1)) * unit
+    if curves > 0.01 * count:
+        raise NotASurfaceError(
+            f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane."
+            " Use points of a surface."
+        )
+    return fitted
+
+
+def frames(normals):
+    """Return orthonormal frames as columns (normal, and two tangents), (k, 3, 3)."""
+    axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    tangent = np.cross(normals, axis)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    return np.stack([normals, np.cross(normals, tangent), tangent], axis=2)

@@ -1,0 +1,238 @@
+"""Area elements from the unit-integral condition of the kernel, eqs. (6) to (8) of the paper."""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.special import expit
+
+from ..geometry import arc_length, read_cloud
+from ..kernel import kernel
+from ..options import LaplacianOptions
+from .curvature import kernel_integral, uneven
+from .images import image_excess, mirror, own_images
+
+_FLOOR = 0.05  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
+_STEPS = 60, 40, 20, 20, 10, 10  # of the rounds of the fast areas where the kernel matrix is definite
+_INDEFINITE = (  # where it is not: its least eigenvalue, then steps of each round and what eigenvalues it resolves
+    (-0.005, ((80, 5e-3), (80, 5e-3), (20, 5e-2))),
+    (-0.02, ((80, 1e-2), (80, 1e-2), (20, 5e-2))),
+    (-1.0, ((100, 5e-2), (100, 5e-2))),
+)
+_GROWTH = 4.0  # of a squared residual, that only an eigenvalue below the expected least one can cause
+_EVEN = 1e-9  # changes of h, as a share, that are none
+NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
+
+
+@dataclass(frozen=True)
+class AreaSolution:
+    """Areas and how they were found.
+
+    Attributes
+    ----------
+    areas : ndarray, (n,)
+        Area elements, all positive.
+    products : int
+        Products with the kernel matrix.
+    converged : bool
+        Whether the solver reached its tolerance; the fast areas are a fixed number of steps.
+    """
+
+    areas: np.ndarray
+    products: int
+    converged: bool
+
+
+def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=None, boundary_distance=None):
+    """Estimate the area element of every point, the operator's own, without the operator.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Coordinates [L].
+    normals, options, boundary, boundary_distance
+        See `build_laplacian`.
+
+    Returns
+    -------
+    ndarray, (n,)
+        Areas [L^2]; points at the same place share one area in equal parts, those left out have next to none.
+
+    Raises
+    ------
+    PointCloudError
+        The points have no sound areas; see `build_laplacian`.
+    """
+    cloud = read_cloud(points, options, normals, boundary, boundary_distance)
+    distance = arc_length(cloud) if options.curvature_correction else cloud.neighborhoods.distance
+    areas = solve_areas(cloud, distance, options).areas * cloud.scaled.scale**2
+    return cloud.scaled.share(areas, NO_AREA)
+
+
+def solve_areas(cloud, distance, options, report=lambda: None):
+    """Solve for the areas of the distinct points, in scaled coordinates, by the method the options name.
+
+    Parameters
+    ----------
+    cloud : Cloud
+        Of m distinct points, with p pairs.
+    distance : ndarray, (p,)
+        Distance of each pair: in space, or along the surface.
+    options : LaplacianOptions
+        Its areas and regularization settings.
+    report : callable
+        Called before each product with the kernel matrix; may raise `Cancelled`.
+
+    Returns
+    -------
+    AreaSolution
+
+    Raises
+    ------
+    AreaError
+        Eq. (7), which has no bound, gave areas that are not positive.
+    """
+    lengths = cloud.neighborhoods.lengths
+    target = kernel_integral(lengths, cloud.gaussian) + image_excess(lengths, cloud.rim)
+    matrix = KernelMatrix(cloud.neighborhoods, distance, cloud.rim, report)
+    if options.curvature_correction:
+        target += _gain(matrix, lengths)
+    return SOLVERS[options.areas](matrix, target, cloud.definite, options.regularization)
+
+
+def _gain(matrix, lengths):
+    """Return what h that varies along the surface adds to the integral of the kernel, (m,).
+
+    ``mu2 (h Laplacian(h) / 4 + |grad h|^2 / 8)``, from means over the kernel: that of f is ``f + mu2 h^2 / 4
+    Laplacian(f)``.
+    """
+    if np.ptp(lengths) <= _EVEN * lengths.mean():
+        return np.zeros(len(lengths))
+    density = 1.0 / (matrix @ np.ones(len(lengths)))
+    total = matrix @ density
+    once, twice = ((matrix @ (density * values)) / (total * values) - 1.0 for values in (lengths, lengths**2))
+    return uneven(0.5 * once + 0.25 * twice)
+
+
+class KernelMatrix:
+    """The symmetric matrix A of eq. (6), a_ij = W(distance_ij, h_ij), kept as half its pairs.
+
+    Near a rim the image of a point in it counts as a neighbour too.
+    """
+
+    def __init__(self, neighborhoods, distance, rim, report=lambda: None):
+        self._report = report
+        lengths = neighborhoods.mean(neighborhoods.lengths)
+        own = neighborhoods.lengths
+        values = kernel(distance / lengths) / lengths**2
+        for pairs, image, factor in mirror(neighborhoods, distance, rim):
+            values[pairs] += factor * kernel(image / lengths[pairs]) / lengths[pairs] ** 2
+        self._half = neighborhoods.half(values)
+        self._diagonal = kernel(0.0) / own**2
+        for rows, image, factor in own_images(neighborhoods, rim):
+            self._diagonal[rows] += factor * kernel(image / own[rows]) / own[rows] ** 2
+
+    def __matmul__(self, values):
+        self._report()
+        return self._diagonal * values + self._half @ values + self._half.T @ values
+
+
+def fast_areas(matrix, target, definite=True, rho=None):
+    """Solve A v = b by a few projected rounds of polynomials in A, from the density areas v0 = 1 / (A 1).
+
+    M = V0^(1/2) A V0^(1/2) has its eigenvalues in [0, 1]. Each round adds p(M) times the residual to y in
+    M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue and bounded below it: the
+    smooth part is solved for, and what the kernel cannot see stays near the density areas. Between rounds areas below
+    the floor of 0.05 v0 are put on it, held there, and released when the gradient turns inward; the later rounds, which
+    are shorter, make up for what that changes at large. A fixed number of linear steps, unlike conjugate gradients,
+    does not amplify rounding: the result is the same to 1e-10 for any order of the points.
+
+    Where pairs were left out, between close sheets, or images added, next to rims, or distances are those of noisy
+    points, M has negative eigenvalues too, most often next to none. What belongs to them, and to positive ones as
+    small, is no smooth part: p leaves it alone. Where they turn out to lie lower than expected, the solution starts
+    anew with less resolved; none lies below -1.
+
+    Parameters
+    ----------
+    matrix : KernelMatrix
+        A, (n, n).
+    target : ndarray, (n,)
+        b, the integral that the kernel should have at each point (1 on a flat surface).
+    definite : bool
+        There is no noise, no pairs were left out, and no images added.
+    rho : float, optional
+        Not used: what the kernel cannot see is regularized towards the density areas.
+
+    Returns
+    -------
+    AreaSolution
+    """
+    density = 1.0 / (matrix @ np.ones(len(target)))
+    root = np.sqrt(density)
+    right, floor = root * target, _FLOOR * root
+    products = 1
+
+    def multiply(y):
+        nonlocal products
+        products += 1
+        return root * (matrix @ (root * y))
+
+    for least, rounds in _polynomials()[0 if definite else 1 :]:
+        y, held = root, np.zeros(len(target), dtype=bool)
+        for coefficients in rounds:
+            residual = right - multiply(y)
+            held &= residual < 0.0
+            residual[held] = 0.0
+            change = _polynomial(multiply, residual, held, least, coefficients)
+            if change is None:
+                break
+            y = np.maximum(y + change, floor)
+            held = y <= floor
+        else:
+            break
+    return AreaSolution(root * y, products, True)
+
+
+def _polynomial(multiply, residual, held, least, coefficients):
+    """Evaluate a Chebyshev series in M, over [least, 1], on the free part of a residual; None if M reaches lower."""
+    center, radius = 0.5 * (1.0 + least), 0.5 * (1.0 - least)
+    before, now = 0.0, residual
+    result = coefficients[0] * residual
+    for step, coefficient in enumerate(coefficients[1:]):
+        image = multiply(now)
+        image[held] = 0.0
+        before, now = now, (image - center * now) * ((2.0 if step else 1.0) / radius) - before
+        if now @ now > _GROWTH * (residual @ residual):
+            return None
+        result += coefficient * now
+    return result
+
+
+@functools.cache
+def _polynomials():
+    """Return pairs of a least eigenvalue and the Chebyshev series of each round: definite, then ever less so."""
+
+    def semi_iteration(steps, x):
+        """What `steps` of Chebyshev's semi-iteration make of 1 / x; they reduce what they resolve to a ninth."""
+        least = (1.45 / steps) ** 2
+        ends = np.array([0.0, *np.atleast_1d(x)])
+        values = chebyshev.chebval((1.0 + least - 2.0 * ends) / (1.0 - least), [0.0] * steps + [1.0])
+        return (1.0 - values[1:] / values[0]) / x
+
+    def positive(width, x):
+        """1 / x for x well above the width, with little left near zero and next to nothing below."""
+        return expit(2.0 * x / width) * x / (x * x + width * width)
+
+    def series(function, first, least, degree):
+        middle, half = 0.5 * (1.0 + least), 0.5 * (1.0 - least)
+        return chebyshev.chebinterpolate(lambda t: function(first, middle + half * t), degree)
+
+    result = [(0.0, [series(semi_iteration, steps, 0.0, steps - 1) for steps in _STEPS])]
+    for least, rounds in _INDEFINITE:
+        result.append((least, [series(positive, width, least, steps) for steps, width in rounds]))
+    return result
+
+
+SOLVERS = {"fast": fast_areas}
+"""Function of each choice of `LaplacianOptions.areas`; the wing of the paper adds its own."""

@@ -1,0 +1,63 @@
+"""Curvature: its effect on the kernel, and the mean curvature from the operator applied to the coordinates."""
+
+import numpy as np
+
+from ..kernel import FOURTH_MOMENT, SECOND_MOMENT
+
+_UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which it is known
+_LARGEST = 0.3  # most that curvature may change an area or a weight, where the fit is poor
+
+
+def kernel_integral(lengths, gaussian):
+    """Return the integral of the kernel over the surface around each point, (m,).
+
+    ``1 - mu2 x / 6 + mu4 x^2 / 120`` with x = h^2 K; clipped, as all terms of curvature here. Those of x^2 are exact
+    where K does not change.
+    """
+    return _bent(lengths, gaussian, -SECOND_MOMENT / 6.0, FOURTH_MOMENT / 120.0)
+
+
+def weight_factor(lengths, gaussian):
+    """Return the factor of the pair weights, (m,), ``1 + mu2 x / 4 + (mu2^2 / 16 - mu4 / 80) x^2``.
+
+    With it slow functions have the right Laplacian. A pair takes its ends' mean.
+    """
+    return _bent(lengths, gaussian, SECOND_MOMENT / 4.0, SECOND_MOMENT**2 / 16.0 - FOURTH_MOMENT / 80.0)
+
+
+def second_moment(lengths, gaussian):
+    """Return the trace of the second moment of weights with that factor over 4 areas, (m,).
+
+    The factor times ``1 - mu2 x / 3 + mu4 x^2 / 40``.
+    """
+    return weight_factor(lengths, gaussian) * _bent(lengths, gaussian, -SECOND_MOMENT / 3.0, FOURTH_MOMENT / 40.0)
+
+
+def _bent(lengths, gaussian, first, second):
+    x = lengths**2 * gaussian
+    return 1.0 + np.clip(first * x + second * x * x, -_LARGEST, _LARGEST)
+
+
+def uneven(excess):
+    """Return what an integral of the kernel gains where h varies, next to nothing where it varies too fast to tell."""
+    return excess / (1.0 + (excess / _UNEVEN) ** 2)
+
+
+def mean_curvature(laplacian):
+    """Compute the mean curvature from ``Laplacian x = -2 H n``.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Its normals fix the sign: outward ones give a sphere of radius R the value 1 / R.
+
+    Returns
+    -------
+    ndarray, (n,)
+        Mean of the two principal curvatures [1 / L]; where the kernel reaches beyond a rim, from local quadrics.
+    """
+    points = laplacian.surface_points
+    centered = points - points.mean(axis=0)
+    curvature = -0.5 * np.einsum("ij,ij->i", laplacian.apply(centered), laplacian.normals)
+    # At a rim the natural operator takes the surface as level across it.
+    return np.where(laplacian.near_rim, laplacian.mean_bend, curvature)

@@ -1,0 +1,141 @@
+"""Factors of sparse equations on a surface: fewer pairs, an order by nested dissection, and the solver."""
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from ..errors import SolverError
+
+_LEAF = 30  # points that are divided no further
+_SHARES = (0.4, 0.45, 0.5, 0.55, 0.6)  # of the points on one side, from which the best cut is chosen
+
+
+def dissection_order(matrix, points, report=lambda: None):
+    """Order the unknowns of sparse equations so that their factors stay small.
+
+    Every set of points is cut across its longest axis. The points at the cut that couple both sides come after these,
+    so that nothing fills in between the sides (George, 1973).
+
+    Parameters
+    ----------
+    matrix : sparse array, (m, m)
+        Symmetric.
+    points : ndarray, (m, 3)
+        Where the unknowns are.
+    report : callable
+        Called before each level of cuts; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (m,) int
+        The unknowns in their order.
+
+    Notes
+    -----
+    Next to a minimum degree order, factors of 20,000 points take about the same room and two thirds of the time. And
+    SuperLU finds that order in one go that lets no other thread run, for a second with 100,000 points.
+    """
+    count = len(points)
+    pairs = sparse.triu(matrix, k=1).tocoo()
+    first, second = pairs.row, pairs.col
+    part, open_, place = np.zeros(count, dtype=int), np.ones(count, dtype=bool), np.zeros(count, dtype=np.int64)
+    while True:
+        report()
+        rows = np.flatnonzero(open_)
+        own = part[rows]
+        size = np.bincount(own)
+        if not len(rows) or size.max() <= _LEAF:
+            return np.lexsort((points[:, 0], place))
+        rank = _ranks_along(points[rows], own, size)
+        least = np.full(len(size), np.inf)
+        side, cut = np.zeros(count, dtype=np.int8), np.zeros(count, dtype=bool)
+        for share in _SHARES:
+            beyond = np.zeros(count, dtype=np.int8)
+            beyond[rows] = (rank >= share * size[own]) & (size[own] > _LEAF)
+            step = beyond[second] - beyond[first]
+            for ends in ((first[step > 0], second[step < 0]), (second[step > 0], first[step < 0])):
+                border = np.zeros(count, dtype=bool)
+                for end in ends:
+                    border[end] = True
+                length = np.bincount(own, border[rows], minlength=len(size))
+                better = length < least
+                least[better] = length[better]
+                chosen = rows[better[own]]
+                side[chosen], cut[chosen] = beyond[chosen], border[chosen]
+        # One digit for each level, the highest first: near side, far side, cut; what is in a cut keeps a zero behind.
+        place = 3 * place + np.where(open_, np.where(cut, 2, side), 0)
+        open_ &= ~cut
+        kept = open_[first] & open_[second] & (side[first] == side[second])
+        first, second = first[kept], second[kept]
+        part = 2 * part + side
+        part[open_] = np.unique(part[open_], return_inverse=True)[1].reshape(-1)
+
+
+def _ranks_along(points, part, size):
+    """Rank the points of each part along its longest axis, from 0."""
+    mean = np.stack([np.bincount(part, values) for values in points.T], axis=1) / size[:, None]
+    offset = points - mean[part]
+    products = np.stack([np.bincount(part, offset[:, a] * offset[:, b]) for a in range(3) for b in range(3)], axis=1)
+    axis = np.linalg.eigh(products.reshape(-1, 3, 3))[1][:, :, -1]
+    along = np.einsum("ij,ij->i", offset, axis[part])
+    order = np.lexsort((along, part))
+    rank = np.empty(len(part), dtype=int)
+    rank[order] = np.arange(len(part))
+    return rank - (np.cumsum(size) - size)[part]
+
+
+def factorize(matrix):
+    """Factorise a sparse symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    matrix : sparse array, (m, m)
+        Its unknowns in the order that `dissection_order` gives, or factors become large.
+
+    Returns
+    -------
+    callable
+        Solves for a right-hand side, (m,) or (m, k).
+
+    Raises
+    ------
+    SolverError
+        The matrix is singular: some part of the surface has nothing that holds it.
+
+    Notes
+    -----
+    A symmetric order without pivoting is 30 to 50 times faster here than SuperLU's defaults.
+    """
+    try:
+        factors = splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError as error:
+        raise SolverError(
+            f"The equations of {matrix.shape[0]} points have no single solution ({error}). Fix some points"
+            " on every connected part."
+        ) from error
+    return factors.solve
+
+
+def sparsify(stiffness, share=1e-2):
+    """Leave out the pairs that hardly count, which makes factors smaller.
+
+    Parameters
+    ----------
+    stiffness : csr_array, (n, n)
+        Symmetric, rows sum to zero, nothing positive off the diagonal.
+    share : float
+        Pairs whose weight is below this share of the diagonal at both ends are left out. The kernel falls off so
+        steeply that these are more than half of the pairs, with a few percent of the weight.
+
+    Returns
+    -------
+    csr_array, (n, n)
+        With the same properties; the given one where parts would lose their connection.
+    """
+    pairs, diagonal = stiffness.tocoo(), stiffness.diagonal()
+    kept = -pairs.data > share * np.minimum(diagonal[pairs.row], diagonal[pairs.col])  # not the diagonal
+    weights = sparse.csr_array((-pairs.data[kept], (pairs.row[kept], pairs.col[kept])), shape=stiffness.shape)
+    if connected_components(weights, directed=False)[0] > connected_components(stiffness, directed=False)[0]:
+        return stiffness
+    return (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()

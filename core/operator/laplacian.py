@@ -1,0 +1,287 @@
+"""The symmetrised mesh-free Laplace-Beltrami operator, eq. (10) of the paper."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from ..errors import InvalidPointsError
+from ..geometry import arc_length, check_points, projected_distance, read_cloud
+from ..kernel import SECOND_MOMENT
+from ..options import LaplacianOptions
+from .areas import NO_AREA, solve_areas
+from .spectrum import Spectrum, correct_eigenvalues, solve_spectrum
+from .stiffness import assemble_stiffness
+
+NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that random points bear
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LaplaceBeltrami:
+    """A discrete Laplace-Beltrami operator on points.
+
+    Made by `build_laplacian`. One sign convention: `stiffness` K is positive semi-definite, `apply` gives the operator
+    itself, which is negative semi-definite for the inner product ``f . (areas * g)``.
+
+    Attributes
+    ----------
+    points : ndarray, (n, 3)
+        The caller's points [L], unchanged and in order.
+    surface_points : ndarray, (n, 3)
+        Where the operator takes them to be [L]: other places than `points` only where noise was smoothed.
+    normals : ndarray, (n, 3)
+        Unit normals, as given or estimated.
+    areas : ndarray, (n,)
+        Area elements [L^2], all positive: the lumped mass. Those of points left out are too small to count.
+    mean_bend, gaussian_curvature : ndarray, (n,)
+        Mean [1 / L] and product [1 / L^2] of the two principal curvatures, from local quadrics; the product is zero
+        without the curvature correction.
+    boundary : ndarray, (n,) bool
+        Points at a rim of the surface.
+    near_rim : ndarray, (n,) bool
+        Points whose kernel reaches beyond a rim.
+    rim_distance : ndarray, (n,)
+        Distance to the nearest rim along the surface [L]; infinite where there is none near.
+    rim_direction : ndarray, (n, 3)
+        Unit vector across that rim, out of the surface; zero where it is not known.
+    component : ndarray, (n,) int
+        Connected part of each point, the largest first; -1 for points that were left out.
+    smoothing_lengths : ndarray, (n,)
+        h of each point [L]; the kernel reaches 3 h.
+    stiffness : csr_array, (n, n)
+        Symmetric positive semi-definite, rows sum to zero, no units. At a rim it is the natural one: no flow across.
+    natural_images, fixed_images : csr_array, (n, n)
+        Weights of the mirror images in the rim that `stiffness` holds, and of those that `fixed_rim` puts in their
+        place; symmetric, not negative.
+    options : LaplacianOptions
+        The settings it was built with.
+    notices : list of str
+        What a user should know: merged duplicates, points left out, noise, a solver that stopped early.
+    """
+
+    points: np.ndarray
+    surface_points: np.ndarray
+    normals: np.ndarray
+    areas: np.ndarray
+    mean_bend: np.ndarray
+    gaussian_curvature: np.ndarray
+    boundary: np.ndarray
+    near_rim: np.ndarray
+    rim_distance: np.ndarray
+    rim_direction: np.ndarray
+    component: np.ndarray
+    smoothing_lengths: np.ndarray
+    stiffness: sparse.csr_array
+    natural_images: sparse.csr_array
+    fixed_images: sparse.csr_array
+    options: LaplacianOptions
+    notices: list
+
+    @property
+    def fixed_rim(self):
+        """The operator of functions with fixed values at the rim, such as zero.
+
+        Returns
+        -------
+        stiffness : csr_array, (n, n)
+            Symmetric positive semi-definite, definite where there is a rim: the image of a point in the rim carries
+            ``2 c - f`` instead of f.
+        pull : csr_array, (n, n)
+            ``stiffness @ f = areas * source + pull @ c`` solves -Delta f = source with the values c at the rim; c (n,)
+            holds at every point the value at the nearest rim point.
+        """
+        natural = sparse.diags_array(self.natural_images.sum(axis=1)) - self.natural_images
+        pull = sparse.diags_array(self.fixed_images.sum(axis=1)) + self.fixed_images
+        return (self.stiffness - natural + pull).tocsr(), pull.tocsr()
+
+    def apply(self, values, raw=False):
+        """Apply the operator in its strong form.
+
+        Parameters
+        ----------
+        values : array_like, (n,) or (n, m)
+            A function on the points, or several as columns.
+        raw : bool
+            Leave out the symbol correction, giving ``-K f / areas``.
+
+        Returns
+        -------
+        ndarray
+            Same shape as the values, their Laplacian [unit of values / L^2]: ``L f - mu2 / 8 L(h^2 L f)``, which takes
+            the kernel's width out to second order and stays self-adjoint and negative semi-definite; with `raw`, or
+            without ``options.symbol_correction``, L f.
+
+        Raises
+        ------
+        InvalidPointsError
+            Values of another length than the points.
+        """
+        values = np.asarray(values, dtype=np.float64)
+        if values.ndim not in (1, 2) or len(values) != len(self.areas):
+            raise InvalidPointsError(
+                f"Values have the shape {values.shape}, the operator {len(self.areas)} points. Give one row per point."
+            )
+        areas, lengths = self.areas, self.smoothing_lengths
+        if values.ndim == 2:
+            areas, lengths = areas[:, None], lengths[:, None]
+        result = -(self.stiffness @ values) / areas
+        if raw or not self.options.symbol_correction:
+            return result
+        return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (lengths**2 * result)) / areas
+
+    def eigenpairs(self, count, raw=False, fixed_rim=False, progress=None):
+        """Compute the lowest eigenpairs of the negated operator, eq. (12).
+
+        Parameters
+        ----------
+        count : int
+            How many, the constant mode included.
+        raw : bool
+            Leave out the symbol correction of the eigenvalues.
+        fixed_rim : bool
+            Modes that vanish at the rim, instead of those that meet it level.
+        progress : callable, optional
+            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+        Returns
+        -------
+        Spectrum
+
+        Raises
+        ------
+        TooFewPointsError
+            More modes than the points can have.
+        UnresolvedModesError
+            Modes asked for that vary faster than the smoothing length resolves, unless `raw`.
+        SolverError
+            The eigenvalue solver did not converge.
+        """
+        stiffness = self.fixed_rim[0] if fixed_rim else self.stiffness
+        spectrum = solve_spectrum(self, stiffness, count, progress)
+        return spectrum if raw else self.corrected(spectrum)
+
+    def corrected(self, spectrum):
+        """Apply the symbol correction to the eigenvalues of a raw spectrum.
+
+        Parameters
+        ----------
+        spectrum : Spectrum
+            From ``eigenpairs(..., raw=True)``, or the lowest modes of one.
+
+        Returns
+        -------
+        Spectrum
+            As of `eigenpairs`; the same one without ``options.symbol_correction``.
+
+        Raises
+        ------
+        UnresolvedModesError
+            Modes that vary faster than the smoothing length resolves.
+        """
+        if not self.options.symbol_correction:
+            return spectrum
+        values, vectors = spectrum.eigenvalues, spectrum.eigenvectors
+        return Spectrum(correct_eigenvalues(self, values, vectors), vectors)
+
+
+def build_laplacian(
+    points, normals=None, options=LaplacianOptions(), boundary=None, boundary_distance=None, progress=None
+):
+    """Build the operator from a point cloud.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Coordinates [L].
+    normals : array_like, (n, 3), optional
+        Normals to use as they are, of any length and sign; estimated where not given.
+    options : LaplacianOptions
+        Settings.
+    boundary : array_like, (k,) int or (n,) bool, optional
+        The points at the rim, instead of those that the options would find.
+    boundary_distance : array_like, (n,), optional
+        Distance of every point to the rim along the surface [L], instead of a measured one; infinity where it is far.
+        With `boundary`, measured ones stand next to corners, where there are two rims.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)`` in each stage; may raise `Cancelled`.
+
+    Returns
+    -------
+    LaplaceBeltrami
+
+    Raises
+    ------
+    PointCloudError
+        The input has no sound answer; the text says why and what to do.
+
+    References
+    ----------
+    Petronetto, Paiva, Helou, Stewart, Nonato. Mesh-free discrete Laplace-Beltrami operator. 2013.
+    """
+    report = progress or (lambda stage, fraction: None)
+    points = check_points(points)
+
+    cloud = read_cloud(points, options, normals, boundary, boundary_distance, report)
+    scaled, pairs, notices = cloud.scaled, cloud.neighborhoods, cloud.notices
+    if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
+        notices.append(
+            "The kernel of most points reaches over a third of the object, which is too wide for good results."
+            " Add points, or lower the number of neighbors."
+        )
+
+    report("Areas", 0.5)
+    distance = arc_length(cloud) if options.curvature_correction else pairs.distance
+    solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
+    if not solution.converged:
+        notices.append(f"The areas stopped after {solution.products} steps, close to their best values.")
+
+    report("Operator", 0.8)
+    if not options.curvature_correction:
+        distance = projected_distance(pairs, cloud.normals)
+    stiffness, natural, fixed = assemble_stiffness(
+        cloud, distance, solution.areas, options.curvature_correction, lambda: report("Operator", 0.8)
+    )
+    return LaplaceBeltrami(
+        points=points,
+        surface_points=points + scaled.hand_out(cloud.moved * scaled.scale, 0.0),
+        normals=scaled.hand_out(cloud.normals, (0.0, 0.0, 1.0)),
+        areas=scaled.share(solution.areas * scaled.scale**2, NO_AREA),
+        mean_bend=scaled.hand_out(cloud.mean_bend / scaled.scale, 0.0),
+        gaussian_curvature=scaled.hand_out(cloud.gaussian / scaled.scale**2, 0.0),
+        boundary=scaled.hand_out(cloud.rim.at_rim, False),
+        near_rim=scaled.hand_out(cloud.rim.reached(pairs.lengths), False),
+        rim_distance=scaled.hand_out(cloud.rim.distance[:, 0] * scaled.scale, np.inf),
+        rim_direction=scaled.hand_out(cloud.rim.outward[:, 0], 0.0),
+        component=scaled.hand_out(cloud.label, -1),
+        smoothing_lengths=scaled.hand_out(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
+        stiffness=stiffness,
+        natural_images=natural,
+        fixed_images=fixed,
+        options=options,
+        notices=notices,
+    )
+
+
+def narrow_laplacian(laplacian, neighbors=NARROW):
+    """Build an operator with few neighbours on the same points, to be factorised.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Its normals, rim, and the points that it takes the surface to be at are used.
+    neighbors : int
+        Neighbours inside the kernel's support.
+
+    Returns
+    -------
+    LaplaceBeltrami
+        Less accurate for functions, but it ends sharply at fixed points, and its factors are small.
+    """
+    options = replace(
+        laplacian.options,
+        bandwidth="local",
+        neighbors=neighbors,
+        bandwidth_factor=1.0 / 3.0,  # the support of 3 h ends at the last neighbour
+        projection="off",
+    )
+    return build_laplacian(laplacian.surface_points, laplacian.normals, options, laplacian.boundary)

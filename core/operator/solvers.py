@@ -1,0 +1,178 @@
+"""Conjugate gradients: for symmetric equations, and for symmetric quadratics with lower bounds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SolverError
+
+_STEPS = 20_000  # of `solve_symmetric`, at most
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """Where conjugate gradients ended.
+
+    Attributes
+    ----------
+    values : ndarray, (m,)
+    products : int
+        Products with the matrix.
+    converged : bool
+        The residual fell to the tolerance.
+    definite : bool
+        No direction was found along which the matrix is not positive; with one the values are those before it.
+    """
+
+    values: np.ndarray
+    products: int
+    converged: bool
+    definite: bool = True
+
+
+def conjugate_gradients(matrix, load, start=None, scaling=1.0, rtol=1e-9, products=_STEPS, report=lambda step: None):
+    """Solve ``matrix @ x = load``.
+
+    Parameters
+    ----------
+    matrix : sparse array or LinearOperator, (m, m)
+        Symmetric. A complex one is symmetric too, not Hermitian: products of vectors are taken without conjugation
+        (COCG; van der Vorst and Melissen 1990), which for real ones is the usual method.
+    load : ndarray, (m,)
+        In the range of the matrix.
+    start : ndarray, (m,), optional
+        First guess.
+    scaling : float or ndarray, (m,)
+        Preconditioner, such as the inverse of the diagonal.
+    rtol : float
+        Of the residual against the load.
+    products : int
+        Most products with the matrix.
+    report : callable
+        Called with the number of each step; may raise `Cancelled`.
+
+    Returns
+    -------
+    Iterate
+    """
+    values = np.zeros_like(load) if start is None else start.copy()
+    residual = load.copy() if start is None else load - matrix @ values
+    goal = rtol * np.linalg.norm(load)
+    direction = moment = None
+    for step in range(products):
+        if np.linalg.norm(residual) <= goal:
+            return Iterate(values, step, True)
+        report(step)
+        scaled = scaling * residual
+        moment, previous = residual @ scaled, moment
+        direction = scaled if step == 0 else scaled + (moment / previous) * direction
+        image = matrix @ direction
+        curvature = direction @ image
+        if np.isrealobj(curvature) and curvature <= 0.0:
+            return Iterate(values, step + 1, False, definite=False)
+        length = moment / curvature
+        values += length * direction
+        residual -= length * image
+    return Iterate(values, products, bool(np.linalg.norm(residual) <= goal))
+
+
+def solve_symmetric(matrix, load, start=None, scaling=1.0, progress=None):
+    """Solve positive semi-definite equations to nine digits; parameters as of `conjugate_gradients`.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Called as ``progress("Solve", fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (m,)
+
+    Raises
+    ------
+    SolverError
+        No convergence.
+    """
+
+    def report(step):
+        if progress is not None and step % 20 == 0:
+            progress("Solve", step / (step + 200.0))
+
+    result = conjugate_gradients(matrix, load, start, scaling, report=report)
+    if not result.converged:
+        raise SolverError(
+            f"The equations of {len(load)} points were not solved in {result.products} steps. Fix more points, or raise"
+            " the number of neighbors."
+        )
+    return result.values
+
+
+def bounded_quadratic(product, right, lower, start, norm, products, rtol):
+    """Minimise ``x.Hx / 2 - x.right`` over x >= lower by proportioned conjugate gradients.
+
+    Conjugate gradients on the free unknowns, a projected step where one meets its bound, and a release of held ones
+    when their gradient outweighs that of the free (MPRGP; Dostal and Schoeberl 2005).
+
+    Parameters
+    ----------
+    product : callable
+        x -> H x, H symmetric positive definite.
+    right, lower, start : ndarray, (n,)
+        Right-hand side, bounds, feasible start.
+    norm : float
+        Upper bound of the largest eigenvalue of H.
+    products : int
+        Most products with H.
+    rtol : float
+        Tolerance on the projected gradient, relative to the right-hand side.
+
+    Returns
+    -------
+    x : ndarray, (n,)
+    used : int
+        Products spent.
+    converged : bool
+    """
+    step = 1.9 / norm
+    x = start.copy()
+    gradient = product(x) - right
+    used = 1
+    tolerance = rtol * np.linalg.norm(right)
+
+    def split(gradient, x):
+        held = x <= lower
+        return np.where(held, 0.0, gradient), np.where(held, np.minimum(gradient, 0.0), 0.0)
+
+    free, chopped = split(gradient, x)
+    direction = free
+    while used < products:
+        if free @ free + chopped @ chopped <= tolerance**2:
+            return x, used, True
+        reduced = np.minimum(free, (x - lower) / step)
+        if chopped @ chopped <= reduced @ free:
+            image = product(direction)
+            used += 1
+            curvature = direction @ image
+            length = (gradient @ direction) / curvature
+            falling = direction > 0.0
+            room = np.min((x[falling] - lower[falling]) / direction[falling], initial=np.inf)
+            if length <= room:
+                x = np.maximum(x - length * direction, lower)
+                gradient = gradient - length * image
+                free, chopped = split(gradient, x)
+                direction = free - ((free @ image) / curvature) * direction
+                continue
+            half = x - room * direction
+            free = split(gradient - room * image, half)[0]
+            x = np.maximum(half - step * free, lower)
+            gradient = product(x) - right
+            used += 1
+        else:
+            image = product(chopped)
+            used += 1
+            length = (gradient @ chopped) / (chopped @ image)
+            x = x - length * chopped
+            gradient = gradient - length * image
+        free, chopped = split(gradient, x)
+        direction = free
+    return x, used, False
