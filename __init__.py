@@ -3,38 +3,14 @@
 
 def _modules():
     """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
-    from .operators import (
-        analyze,
-        bake,
-        cache,
-        command,
-        convert,
-        counting,
-        deform,
-        exporting,
-        fields,
-        importing,
-        job,
-        live,
-        minimal,
-        segment,
-        selecting,
-        smooth,
-        spectrum,
-    )
-    from .ui import (
-        applications,
-        colormap,
-        legend,
-        menus,
-        overlay,
-        panel,
-        points,
-        presets,
-        range_selection,
-        settings,
-        swatches,
-    )
+    from .operators.deform import bake, live
+    from .operators.deform import tools as deform
+    from .operators.files import command, exporting, importing
+    from .operators.objects import counting, settings
+    from .operators.running import cache, job
+    from .operators.tools import analyze, convert, fields, minimal, segment, smooth, spectrum
+    from .operators.tools import select as selecting
+    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, swatches
     from .ui import deform as deform_panel
 
     return (

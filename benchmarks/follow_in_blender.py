@@ -37,7 +37,7 @@ def bound_object(points, handles, anchors):
 
 def follow(points, handles, anchors):
     """Return the seconds of each quick update, and those of a settled one."""
-    live = importlib.import_module(f"{MODULE}.operators.live")
+    live = importlib.import_module(f"{MODULE}.operators.deform.live")
     obj = bound_object(points, handles, anchors)
     empty, view_layer = obj.meshfree.deform.handle_items[0].empty, bpy.context.view_layer
     (handler,) = (each for each in bpy.app.handlers.depsgraph_update_post if each.__module__ == live.__name__)

@@ -45,7 +45,7 @@ def colored_sphere(laplacian, values, amplitude=0.0):
     """Add a sphere that shows values, displaced by them."""
     points = studio.part("core").displace_by_mode(laplacian, values, amplitude) if amplitude else laplacian.points
     obj = studio.make_object(points, "Sphere")
-    studio.part("operators.attributes").write_attribute(obj.data, "Mode", values / np.abs(values).max())
+    studio.part("operators.objects.attributes").write_attribute(obj.data, "Mode", values / np.abs(values).max())
     studio.show(obj, "Mode")
     return obj
 
@@ -71,7 +71,7 @@ def domains(points, mode, like=None, radius=studio.TOUCHING, **settings):
     """
     from benchmarks.labels import matched
 
-    attributes = studio.part("operators.attributes")
+    attributes = studio.part("operators.objects.attributes")
     obj = studio.make_object(points, "Domains")
     for name, value in settings.items():
         setattr(obj.meshfree, name, value)

@@ -27,7 +27,7 @@ def scan(name, copies=1):
 
 def own_points(obj):
     """Vertices of an object in its own space, (n, 3)."""
-    return studio.part("operators.reading").own_positions(obj.data)
+    return studio.part("operators.objects.reading").own_positions(obj.data)
 
 
 def figure12(path):

@@ -205,7 +205,7 @@ def aim(scene, points, view, margin=0.05, room=LEGEND_WIDTH):
 def show(obj, attribute, radius=TOUCHING):
     """Show an attribute of an object as colours on its points, whose radius is given in units of their spacing."""
     activate(obj)
-    bpy.ops.meshfree.colormap(attribute=attribute, radius=radius * part("operators.reading").spacing(obj.data))
+    bpy.ops.meshfree.colormap(attribute=attribute, radius=radius * part("operators.objects.reading").spacing(obj.data))
 
 
 def show_shape(obj, normals="", like=None):
@@ -213,14 +213,14 @@ def show_shape(obj, normals="", like=None):
 
     An attribute of normals makes the shading smooth.
     """
-    modifier = add_display(obj, CLOSED * part("operators.reading").spacing((like or obj).data))
-    part("operators.modifiers").set_input(modifier, "Material", paint("Clay", CLAY, normals))
+    modifier = add_display(obj, CLOSED * part("operators.objects.reading").spacing((like or obj).data))
+    part("operators.objects.modifiers").set_input(modifier, "Material", paint("Clay", CLAY, normals))
 
 
 def mark(points, color, radius):
     """Add points of one colour to the scene, (n, 3), such as the handles of a deformation."""
     obj = make_object(points, "Marks")
-    part("operators.modifiers").set_input(add_display(obj, radius), "Material", paint("Mark", color))
+    part("operators.objects.modifiers").set_input(add_display(obj, radius), "Material", paint("Mark", color))
     return obj
 
 
@@ -228,7 +228,7 @@ def add_display(obj, radius):
     """Make an object's vertices round points of this radius, and return the modifier."""
     modifier = part("ui.display").find_display(obj) or obj.modifiers.new("Points", "NODES")
     modifier.node_group = part("ui.nodes").display_group()
-    part("operators.modifiers").set_input(modifier, "Radius", radius)
+    part("operators.objects.modifiers").set_input(modifier, "Radius", radius)
     return modifier
 
 
@@ -325,7 +325,7 @@ def activate(obj):
 def group(obj, chosen, role, name="", grown=0.0):
     """Put points of an object, (n,) bool, and those within a distance of them, into a vertex group."""
     activate(obj)
-    part("operators.selecting").select(bpy.context, obj, chosen)
+    part("operators.tools.select").select(bpy.context, obj, chosen)
     if grown:
         bpy.ops.meshfree.select_grow(distance=grown)
     bpy.ops.meshfree.group_from_selection(role=role, name=name)
@@ -357,12 +357,12 @@ def deform(obj, move, turn=(0.0, 0.0, 0.0)):
 
 def deformed_row(rest, obj, path, view=VIEW, size=(960, 340)):
     """Render an object at rest and deformed, with its handles and anchors, and deformed with its displacement."""
-    displacement = part("operators.attributes").read_attribute(obj.data, "lb_displacement")
+    displacement = part("operators.objects.attributes").read_attribute(obj.data, "lb_displacement")
     activate(obj)
     bpy.ops.meshfree.deform_apply()
     bpy.ops.meshfree.deform_unbind()
     colored = make_object(world_points(obj), "Colored")
-    part("operators.attributes").write_attribute(colored.data, "lb_displacement", displacement)
+    part("operators.objects.attributes").write_attribute(colored.data, "lb_displacement", displacement)
     colored.meshfree.coverage = 100.0
     show(colored, "lb_displacement")
     for shape in (rest, obj):
@@ -370,9 +370,9 @@ def deformed_row(rest, obj, path, view=VIEW, size=(960, 340)):
         bpy.ops.meshfree.analyze(show=False)
         show_shape(shape, normals="lb_normal")
     line_up([rest, obj, colored], view)
-    radius = MARKS * part("operators.reading").spacing(rest.data)
+    radius = MARKS * part("operators.objects.reading").spacing(rest.data)
     for name, color in (("Handle", HANDLES), ("Anchor", ANCHORS)):
-        members = part("operators.groups").chosen_members(obj, name, name)
+        members = part("operators.objects.groups").chosen_members(obj, name, name)
         for shape in (rest, obj):
             mark(world_points(shape)[members], color, radius)
     take(path, colored, view, size)

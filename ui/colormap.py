@@ -4,8 +4,8 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core import PointCloudError
-from ..operators.ready import ReadyOperator
-from .color_choices import COLOR_CHOICES, color_choice
+from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
+from ..operators.running.ready import ReadyOperator
 from .show import show_attribute, use_material_preview
 
 

@@ -2,12 +2,12 @@
 
 import bpy
 
-from ..operators import live
-from ..operators.binding import copied_from, handle_names, handled_object, is_bound, stale_reason
-from ..operators.deform_nodes import find_deform, is_baked
-from ..operators.groups import search_group
-from ..operators.modifiers import input_property
-from ..operators.reading import obstacle
+from ..operators.deform import live
+from ..operators.deform.binding import copied_from, handle_names, handled_object, is_bound, stale_reason
+from ..operators.deform.nodes import find_deform, is_baked
+from ..operators.objects.groups import search_group
+from ..operators.objects.modifiers import input_property
+from ..operators.objects.reading import obstacle
 from .panel import SidebarPanel
 
 _WIDTH = 38  # letters in a line of the panel

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..operators.attributes import BOUNDARY, COMPONENT, DISPLACEMENT, DISTANCE, read_attribute
-from ..operators.modifiers import DISPLAY_TAG, get_input, is_display
+from ..operators.objects.attributes import BOUNDARY, COMPONENT, DISPLACEMENT, DISTANCE, read_attribute
+from ..operators.objects.modifiers import DISPLAY_TAG, get_input, is_display
 from .nodes import ATTRIBUTE, COLORS, RANGE
 from .value_range import CLASSES
 

@@ -4,7 +4,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..core import PointCloudError
-from ..operators.ready import ReadyOperator
+from ..operators.running.ready import ReadyOperator
 from .display import shown_attribute
 from .nodes import add_node, new_tree
 from .scale import shown_scale

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..operators.importing import OWN
+from ..operators.files.importing import OWN
 
 _TOOLS = (
     ("analyze", "spectrum", "colormap", "legend"),

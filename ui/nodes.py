@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..operators.modifiers import DISPLAY_TAG, add_input, add_node, is_intact, new_group
+from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, is_intact, new_group
 from . import colormaps
 from .value_range import CLASSES, STEPPED
 

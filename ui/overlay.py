@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 
 from ..core import PointCloudError
-from ..operators.attributes import mode_number
-from ..operators.result import EIGENVALUES
+from ..operators.objects.attributes import mode_number
+from ..operators.objects.result import EIGENVALUES
 from . import canvas, plots
 from .display import range_node, shown_attribute, shown_values, without_unreached
 from .scale import shown_scale

@@ -2,13 +2,13 @@
 
 import bpy
 
-from ..operators.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
-from ..operators.binding import handled_object
-from ..operators.groups import search_group
-from ..operators.job import running
-from ..operators.modifiers import is_own
-from ..operators.reading import obstacle, sharing_objects
-from ..operators.result import EIGENVALUES, area_text, is_analyzed, is_stale
+from ..operators.deform.binding import handled_object
+from ..operators.objects.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
+from ..operators.objects.groups import search_group
+from ..operators.objects.modifiers import is_own
+from ..operators.objects.reading import obstacle, sharing_objects
+from ..operators.objects.result import EIGENVALUES, area_text, is_analyzed, is_stale
+from ..operators.running.job import running
 from .display import find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
 

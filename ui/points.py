@@ -2,10 +2,10 @@
 
 import bpy
 
-from ..operators.convert import MESHFREE_OT_convert
-from ..operators.counting import members
-from ..operators.groups import ANCHOR, FIXED, HANDLE, RIM, SOURCE, VALUE, has_group
-from ..operators.reading import TYPES
+from ..operators.objects.counting import members
+from ..operators.objects.groups import ANCHOR, FIXED, HANDLE, RIM, SOURCE, VALUE, has_group
+from ..operators.objects.reading import TYPES
+from ..operators.tools.convert import MESHFREE_OT_convert
 from .panel import SidebarPanel
 from .swatches import swatch
 

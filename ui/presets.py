@@ -4,8 +4,8 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ..operators.options import NAMES, PRESETS, apply_preset
-from ..operators.ready import ReadyOperator
+from ..operators.objects.options import NAMES, PRESETS, apply_preset
+from ..operators.running.ready import ReadyOperator
 
 _BUILT_IN = (
     ("DEFAULT", "Default", "What serves most scans"),

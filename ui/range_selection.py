@@ -4,7 +4,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..core import PointCloudError
-from ..operators.selecting import SelectionOperator, select, selection
+from ..operators.tools.select import SelectionOperator, select, selection
 from .display import label, shown_attribute, shown_range, shown_values
 
 

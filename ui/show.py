@@ -4,12 +4,12 @@ import math
 
 import bpy
 
-from ..operators.attributes import MEAN_CURVATURE, read_attribute
-from ..operators.binding import handle_names, positions_now
-from ..operators.groups import ANCHOR, HANDLE, RIM, ROLES
-from ..operators.modifiers import DISPLAY_TAG, get_input, set_input
-from ..operators.reading import TYPES, fingerprint, spacing, typical_distance
-from ..operators.stages import redraw_views
+from ..operators.deform.binding import handle_names, positions_now
+from ..operators.objects.attributes import MEAN_CURVATURE, read_attribute
+from ..operators.objects.groups import ANCHOR, HANDLE, RIM, ROLES
+from ..operators.objects.modifiers import DISPLAY_TAG, get_input, set_input
+from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
+from ..operators.running.stages import redraw_views
 from . import colormaps, legend
 from .display import NAME, component, find_display, find_material, numbers, shown_attribute, without_unreached
 from .nodes import color_by_direction, color_by_number, color_plain, display_group, is_plain

@@ -2,7 +2,7 @@
 
 import bpy.utils.previews
 
-from ..operators.groups import ROLES
+from ..operators.objects.groups import ROLES
 from . import colormaps
 
 _SIZE = 16  # pixels

@@ -1,6 +1,6 @@
 """In which unit the numbers of an attribute are written."""
 
-from ..operators.attributes import AREA, DISPLACEMENT, DISTANCE, GAUSSIAN_CURVATURE, MEAN_CURVATURE
+from ..operators.objects.attributes import AREA, DISPLACEMENT, DISTANCE, GAUSSIAN_CURVATURE, MEAN_CURVATURE
 
 EIGENVALUE_POWER = -2
 _POWERS = {AREA: 2, MEAN_CURVATURE: -1, GAUSSIAN_CURVATURE: -2, DISTANCE: 1, DISPLACEMENT: 1}  # of a length

@@ -65,4 +65,4 @@ def core(installed):
 @pytest.fixture
 def modifiers(extension):
     """The module that sets inputs of the extension's own modifiers."""
-    return importlib.import_module(f"{extension.__name__}.operators.modifiers")
+    return importlib.import_module(f"{extension.__name__}.operators.objects.modifiers")

@@ -215,7 +215,7 @@ class TestStale:
     def is_stale(self, extension, obj):
         from importlib import import_module
 
-        result = import_module(f"{extension.__name__}.operators.result")
+        result = import_module(f"{extension.__name__}.operators.objects.result")
 
         def after_update():
             bpy.context.view_layer.update()

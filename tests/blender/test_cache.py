@@ -35,19 +35,21 @@ AGAIN = {
     "minimal_surface": ({"steps": 3}, {"steps": 3, "target": "IN_PLACE"}),
 }
 COSTLY = {  # where each is called from
-    "operators.cache": ("build_laplacian", "mean_curvature"),
-    "operators.minimal": ("minimal_surface",),
-    "core.solvers": ("build_laplacian", "splu", "cg"),
-    "core.spectrum": ("eigsh",),
-    "core.filters": ("eigsh",),
-    "core.geodesics": ("dijkstra",),
-    "core.smoothing": ("match_size",),
+    "operators.running.cache": ("build_laplacian", "mean_curvature"),
+    "operators.tools.minimal": ("minimal_surface",),
+    "core.operator.laplacian": ("build_laplacian",),
+    "core.operator.factors": ("splu",),
+    "core.operator.solvers": ("conjugate_gradients",),
+    "core.operator.spectrum": ("eigsh",),
+    "core.applications.filters": ("eigsh",),
+    "core.applications.geodesics": ("dijkstra",),
+    "core.applications.smoothing": ("match_size",),
 }
 
 
 @pytest.fixture
 def cache(extension):
-    module = importlib.import_module(f"{extension.__name__}.operators.cache")
+    module = importlib.import_module(f"{extension.__name__}.operators.running.cache")
     module.clear()
     return module
 

@@ -16,7 +16,7 @@ POINTS = sphere_points()
 @pytest.fixture
 def run(extension, capfd):
     """Run the command line; return the exit code and the JSON lines."""
-    command = importlib.import_module(f"{extension.__name__}.operators.command")
+    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
 
     def run(*arguments):
         code = command.run([str(argument) for argument in arguments])
@@ -292,7 +292,7 @@ def test_wrong_usage_has_exit_code_2(run, capfd, arguments):
 
 
 def test_help(extension, capfd):
-    command = importlib.import_module(f"{extension.__name__}.operators.command")
+    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
     assert command.run(["analyze", "--help"]) == 0
     shown = capfd.readouterr().out
     for text in ("--out-dir", "--modes", "--bandwidth", "--rim-group NAME", "--no-sheets", "one JSON line per input"):

@@ -23,12 +23,12 @@ HEIGHTS = (0.0, 0.5, 1.5, -1.0)  # of the animated handle at frames 1 to 4
 @pytest.fixture
 def live(extension):
     """The module that lets bound objects follow."""
-    return importlib.import_module(f"{extension.__name__}.operators.live")
+    return importlib.import_module(f"{extension.__name__}.operators.deform.live")
 
 
 @pytest.fixture
 def binding(extension):
-    return importlib.import_module(f"{extension.__name__}.operators.binding")
+    return importlib.import_module(f"{extension.__name__}.operators.deform.binding")
 
 
 @pytest.fixture
@@ -425,7 +425,7 @@ class TestBake:
         """A bake in steps, as a window takes them, at frame 3."""
         animate(bind())
         bpy.context.scene.frame_set(3)
-        bake = importlib.import_module(f"{extension.__name__}.operators.bake")
+        bake = importlib.import_module(f"{extension.__name__}.operators.deform.bake")
         operator = SimpleNamespace(first=1, last=4, bl_label="Bake", _kept=bake._Kept(bpy.context.scene, strip))
         operator._frames = lambda progress: bake.MESHFREE_OT_deform_bake._frames(operator, progress)
         return operator, bake

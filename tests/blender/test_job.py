@@ -13,14 +13,14 @@ from tests.blender.clouds import add_object, everything, sphere_points
 
 @pytest.fixture
 def jobs(extension):
-    module = importlib.import_module(f"{extension.__name__}.operators.job")
+    module = importlib.import_module(f"{extension.__name__}.operators.running.job")
     yield module
     assert module.running() is None
 
 
 @pytest.fixture
 def stages(extension):
-    return importlib.import_module(f"{extension.__name__}.operators.stages")
+    return importlib.import_module(f"{extension.__name__}.operators.running.stages")
 
 
 class Work:
@@ -380,7 +380,7 @@ def test_disabling_the_extension_ends_it(operator, jobs, obj):
 
 
 def test_growing_a_selection_in_edit_mode(operator, extension, obj):
-    selecting = importlib.import_module(f"{extension.__name__}.operators.selecting")
+    selecting = importlib.import_module(f"{extension.__name__}.operators.tools.select")
     obj.data.vertices.foreach_set("select", np.arange(200) < 3)
     obj.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")
@@ -407,7 +407,7 @@ def test_growing_a_selection_in_edit_mode(operator, extension, obj):
 
 
 def test_several_objects_are_computed_one_after_the_other(extension):
-    application = importlib.import_module(f"{extension.__name__}.operators.application")
+    application = importlib.import_module(f"{extension.__name__}.operators.running.application")
     told = []
     plans = [(name, lambda progress, name=name: progress(name, 0.5) or name) for name in "AB"]
     assert application.compute_all(plans, lambda *progress: told.append(progress)) == ["A", "B"]

@@ -119,11 +119,11 @@ def test_memory_is_given_back(extension):
     import weakref
     from importlib import import_module
 
-    cache = import_module(f"{extension.__name__}.operators.cache")
+    cache = import_module(f"{extension.__name__}.operators.running.cache")
     obj = add_object(sphere_points())
     bpy.ops.meshfree.analyze(show=False)
-    options = import_module(f"{extension.__name__}.operators.options").laplacian_options(obj.meshfree)
-    reading = import_module(f"{extension.__name__}.operators.reading").read_points(bpy.context, obj)
+    options = import_module(f"{extension.__name__}.operators.objects.options").laplacian_options(obj.meshfree)
+    reading = import_module(f"{extension.__name__}.operators.objects.reading").read_points(bpy.context, obj)
     kept = weakref.ref(cache.build(reading.points, options, None, lambda *_: None).laplacian)
     assert kept() is not None
     bpy.ops.preferences.addon_disable(module=extension.__name__)

@@ -78,7 +78,7 @@ class TestCopiesOfBoundObjects:
         lift(empty_of(bound), 0.5)
         assert_allclose(displacement(copy), before, atol=1e-6)
         assert displacement(bound)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
-        reason = module("operators.binding").stale_reason
+        reason = module("operators.deform.binding").stale_reason
         assert reason(bound) == ""
         assert 'has no handles of its own, "Cloud" has them' in reason(copy)
         assert any(text.startswith("Copy. It has no handles") for text in draw())
@@ -102,7 +102,7 @@ class TestCopiesOfBoundObjects:
         lift(empty_of(copy), 0.5)
         assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
         assert_allclose(displacement(bound), before)
-        assert [module("operators.binding").stale_reason(obj) for obj in (bound, copy)] == ["", ""]
+        assert [module("operators.deform.binding").stale_reason(obj) for obj in (bound, copy)] == ["", ""]
 
     @pytest.mark.parametrize("name", ["reset", "unbind"])
     def test_nothing_is_taken_from_the_original(self, bound, name):
@@ -131,14 +131,14 @@ class TestCopiesOfBoundObjects:
         copy = duplicate(bound, linked=True)
         lift(empty_of(bound), 0.5)
         assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
-        reason = module("operators.binding").stale_reason
+        reason = module("operators.deform.binding").stale_reason
         assert reason(bound) == ""
         assert 'shares its mesh with "Cloud", whose handles move both' in reason(copy)
 
     def test_the_handle_leads_to_the_original(self, bound, module):
         copy = duplicate(bound)
         copy.name = "A"  # before the other in the scene's order, or not
-        assert module("operators.binding").handled_object(empty_of(bound), bpy.context.scene) == bound
+        assert module("operators.deform.binding").handled_object(empty_of(bound), bpy.context.scene) == bound
 
     def test_appended_to_another_file_it_follows(self, bound, tmp_path, module):
         path = str(tmp_path / "bound.blend")
@@ -146,7 +146,7 @@ class TestCopiesOfBoundObjects:
         bpy.ops.wm.read_homefile(use_empty=True)
         bpy.ops.wm.append(filepath=f"{path}/Object/Cloud", directory=f"{path}/Object/", filename="Cloud")
         appended = bpy.data.objects["Cloud"]
-        assert module("operators.binding").stale_reason(appended) == ""
+        assert module("operators.deform.binding").stale_reason(appended) == ""
         lift(empty_of(appended), 0.5)
         assert displacement(appended)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
 
@@ -365,7 +365,7 @@ class TestOrdinaryEdits:
         area, normals = cloud.meshfree.total_area, attribute(cloud, "lb_normal")
         outward = np.einsum("ij,ij->i", normals, local_points(cloud))
         bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
-        assert module("operators.result").is_stale(cloud)
+        assert module("operators.objects.result").is_stale(cloud)
         bpy.ops.meshfree.analyze()
         assert cloud.meshfree.total_area == pytest.approx(area, rel=1e-4)
         again = np.einsum("ij,ij->i", attribute(cloud, "lb_normal"), local_points(cloud))
@@ -378,7 +378,7 @@ class TestOrdinaryEdits:
         bpy.ops.meshfree.analyze(modes=5)
         choose(cloud, other)
         bpy.ops.object.join()
-        assert module("operators.result").is_stale(cloud)
+        assert module("operators.objects.result").is_stale(cloud)
         bpy.ops.meshfree.analyze()
         assert cloud.meshfree.part_count == 2
         assert "lb_eigenvalues" not in cloud
@@ -393,8 +393,8 @@ class TestOrdinaryEdits:
         bpy.ops.mesh.separate(type="SELECTED")
         bpy.ops.object.mode_set(mode="OBJECT")
         part = bpy.data.objects["Cloud.001"]
-        assert module("operators.result").is_stale(cloud)
-        assert module("operators.result").is_stale(part)
+        assert module("operators.objects.result").is_stale(cloud)
+        assert module("operators.objects.result").is_stale(part)
         for obj in (cloud, part):
             choose(obj)
             assert bpy.ops.meshfree.analyze() == {"FINISHED"}
@@ -422,7 +422,7 @@ class TestOrdinaryEdits:
 
 
 def test_counts_of_large_groups_come_by_and_by(cloud, module, monkeypatch):
-    counting = module("operators.counting")
+    counting = module("operators.objects.counting")
     add_group(cloud, "Handle", np.arange(30))
     registered = []
 
@@ -447,7 +447,7 @@ def test_counts_of_large_groups_come_by_and_by(cloud, module, monkeypatch):
     monkeypatch.setattr(counting, "_BIT", 0.0001)
     cloud.meshfree.rim_group = "Handle"
     assert counting.members(cloud, "Handle", glance=True) is None
-    assert not module("operators.reading").fingerprint(cloud, glance=True)
+    assert not module("operators.objects.reading").fingerprint(cloud, glance=True)
     exact = counting.members(cloud, "Handle")
     counting.renew_counts(cloud)
     add_group(cloud, "Anchor", np.arange(7))
@@ -474,7 +474,7 @@ class TestConverting:
         return cloud
 
     def test_there_and_back(self, ready, module):
-        display, result = module("ui.display"), module("operators.result")
+        display, result = module("ui.display"), module("operators.objects.result")
         material, values = display.find_material(ready), attribute(ready, "lb_eigenvector_002")
         eigenvalues, points = list(ready["lb_eigenvalues"]), local_points(ready)
         for target in ("POINTCLOUD", "MESH"):
@@ -490,10 +490,10 @@ class TestConverting:
             assert material.users == 1
             ((count, *_),) = display_points(obj)
             assert count == 600
-            weights = module("operators.groups").group_weights
+            weights = module("operators.objects.groups").group_weights
             assert_allclose(weights(obj, "Handle"), np.arange(600) < 50)
             assert_allclose(weights(obj, "Anchor"), 0.5 * ((np.arange(600) >= 50) & (np.arange(600) < 80)))
-            assert (module("operators.selecting").selection(obj) == (np.arange(600) < 20)).all()
+            assert (module("operators.tools.select").selection(obj) == (np.arange(600) < 20)).all()
 
     def test_what_is_refused(self, bound):
         before = everything(bound)

@@ -215,7 +215,7 @@ def test_panel_tells_of_parts_rims_and_points_left_out_where_there_are_any():
 
 
 def test_panel_shows_every_setting_that_changes_results(extension):
-    options = importlib.import_module(f"{extension.__name__}.operators.options")
+    options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
     add_object(sphere_points()).meshfree.rim_group = "Missing"
     texts = draw()
     assert [name for name in (*options.NAMES, "rim_group") if texts.count(name) != 1] == []
@@ -289,7 +289,7 @@ def test_panel_while_something_runs(extension, monkeypatch):
 
 
 def test_every_option_of_core_is_a_setting_with_its_default(extension, core):
-    options = importlib.import_module(f"{extension.__name__}.operators.options")
+    options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
     obj = add_object(sphere_points())
     assert options.laplacian_options(obj.meshfree) == core.LaplacianOptions(orient=True)
     properties = obj.meshfree.bl_rna.properties

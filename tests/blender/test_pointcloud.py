@@ -220,7 +220,7 @@ def test_results_go_stale_when_points_move(extension):
     cloud.meshfree.rim_group = ""
     bpy.ops.meshfree.analyze()
     assert cloud.meshfree.point_count == 1000
-    result = importlib.import_module(f"{extension.__name__}.operators.result")
+    result = importlib.import_module(f"{extension.__name__}.operators.objects.result")
     assert not result.is_stale(cloud)
     cloud.data.points[0].co.x += 0.1
     assert result.is_stale(cloud)

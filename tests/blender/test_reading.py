@@ -12,7 +12,7 @@ from tests.blender.clouds import RESULTS, add_object, attribute, everything, loc
 
 @pytest.fixture
 def reading(extension):
-    return importlib.import_module(f"{extension.__name__}.operators.reading")
+    return importlib.import_module(f"{extension.__name__}.operators.objects.reading")
 
 
 def read(reading, obj):

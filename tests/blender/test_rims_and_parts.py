@@ -12,7 +12,7 @@ from tests.blender.clouds import add_group, add_object, attribute, grid_points, 
 
 @pytest.fixture
 def result(extension):
-    return importlib.import_module(f"{extension.__name__}.operators.result")
+    return importlib.import_module(f"{extension.__name__}.operators.objects.result")
 
 
 def sheet():
@@ -112,7 +112,7 @@ class TestChangesOfTheGroup:
         assert (attribute(obj, "lb_boundary") == np.array(in_group(obj, "Part"))).all()
 
     def test_panel_looks_at_members_only_now_and_then(self, extension, obj, result, monkeypatch):
-        counting = importlib.import_module(f"{extension.__name__}.operators.counting")
+        counting = importlib.import_module(f"{extension.__name__}.operators.objects.counting")
         monkeypatch.setattr(counting, "_PATIENCE", 1e9)
         assert not result.is_stale(obj)
         obj.vertex_groups["Rim"].add([500], 1.0, "REPLACE")

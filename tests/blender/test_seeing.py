@@ -70,8 +70,8 @@ def test_maps_by_name_change_the_colors_at_once(extension, display, obj, name):
 
 
 def test_changes_are_edits_of_values_and_compute_nothing(extension, display, obj, monkeypatch):
-    monkeypatch.setattr(module(extension, "operators.cache"), "build", None)
-    monkeypatch.setattr(module(extension, "operators.cache"), "lowest_modes", None)
+    monkeypatch.setattr(module(extension, "operators.running.cache"), "build", None)
+    monkeypatch.setattr(module(extension, "operators.running.cache"), "lowest_modes", None)
     material = display.find_material(obj)
     before = {node.name: node.as_pointer() for node in material.node_tree.nodes}
     for name, value in DISPLAY_SETTINGS.items():
@@ -143,7 +143,7 @@ def test_settings_answer_in_edit_mode(extension, display, modifiers, obj):
     low, high = bounds(display, obj)
     assert before[0] < low < high < before[1]
     for name in ("lb_boundary", "lb_component", "lb_normal"):  # of other types
-        values = module(extension, "operators.attributes").read_attribute(obj.data, name)
+        values = module(extension, "operators.objects.attributes").read_attribute(obj.data, name)
         bpy.ops.object.mode_set(mode="OBJECT")
         assert (values == attribute(obj, name)).all()
         assert values.dtype == attribute(obj, name).dtype
@@ -691,7 +691,7 @@ def test_select_by_range_says_what_is_wrong(obj):
 
 @pytest.mark.parametrize("preset", ["DEFAULT", "PAPER", "CLEAN", "NOISY"])
 def test_presets_are_options_of_core(extension, core, preset):
-    options = module(extension, "operators.options")
+    options = module(extension, "operators.objects.options")
     obj = add_object(sphere_points())
     obj.meshfree.neighbors, obj.meshfree.regularization = 33, 0.5
     bpy.ops.meshfree.apply_preset(preset=preset)

@@ -59,7 +59,7 @@ def test_fewer_modes_remove_the_surplus(obj):
 
 
 def test_repeating_re_uses_the_operator(extension, obj, monkeypatch):
-    cache = importlib.import_module(f"{extension.__name__}.operators.cache")
+    cache = importlib.import_module(f"{extension.__name__}.operators.running.cache")
     built, curved = [], []
     build, curve = cache.build_laplacian, cache.mean_curvature
     monkeypatch.setattr(cache, "build_laplacian", lambda *args, **rest: built.append(1) or build(*args, **rest))

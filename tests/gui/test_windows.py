@@ -65,7 +65,7 @@ import importlib, sys
 def part(name):
     return importlib.import_module({ROOT} + "." + name)
 
-live, job = part("operators.live"), part("operators.job")
+live, job = part("operators.deform.live"), part("operators.running.job")
 """
 BINDING = "job.running() is not None and job.running().label == 'Bind'"
 

@@ -1,0 +1,1 @@
+"""Deformation by handles: binding, following them live, baking."""

@@ -1,0 +1,198 @@
+"""Bake an animated deformation into the file, so that it plays and renders where the extension is not installed."""
+
+import bpy
+import numpy as np
+from bpy.props import IntProperty
+
+from ...core import PointCloudError
+from ..objects.attributes import DISPLACEMENT, point_count, read_attribute, tag_changed, write_attribute
+from ..objects.reading import find_object
+from ..running.job import Job, JobOperator, SteppedJob, all_steps
+from ..running.stages import Stages
+from . import live
+from .binding import POSE, stale_reason
+from .nodes import find_deform, is_baked, show_baked
+from .tools import BoundOperator, check_fresh, delete_bake
+
+_LAST = 1048574  # frame of Blender
+_PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
+
+
+class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
+    """Keep the deformation of each frame in the file, for machines without the extension"""
+
+    bl_idname = "meshfree.deform_bake"
+    bl_label = "Bake"
+
+    first: IntProperty(
+        name="First Frame",
+        description="First frame to bake; 0 for both takes the range of the scene",
+        default=0,
+        min=0,
+        max=_LAST,
+    )
+    last: IntProperty(name="Last Frame", description="Last frame to bake", default=0, min=0, max=_LAST)
+
+    def invoke(self, context, event):
+        self._attended = True
+        self.first, self.last = context.scene.frame_start, context.scene.frame_end
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context):
+        obj, scene, attended = self.subject(context), context.scene, self.takes_window()
+        if not self.first and not self.last:
+            self.first, self.last = scene.frame_start, scene.frame_end
+        try:
+            check_fresh(obj)
+            if self.last < self.first:
+                raise PointCloudError(
+                    f"The last frame, {self.last}, comes before the first one, {self.first}. Swap them."
+                )
+            self._kept = _Kept(scene, obj)
+            if attended:
+                return self.start(context, [obj], self._prepared_frames, SteppedJob)
+            try:
+                with Stages(context.window_manager, self.bl_label) as stages:
+                    frames = all_steps(self._frames(stages))
+            finally:
+                self.leave(context)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return self.finish(context, [obj], frames, stages.seconds)
+
+    def _prepared_frames(self, progress):
+        """Make the factors in a thread first, if there are none; see `_frames`."""
+        obj = self._kept.find()[1]
+        if live.find(obj) is None:
+            work = Job(self.bl_label, [], live.plan_settled(obj)[0])
+            try:
+                while not work.ended:
+                    progress(work.stage, 0.0)
+                    yield
+                live.keep(self._kept.find()[1], work.result()[0])
+            finally:
+                work.stop()
+        return (yield from self._frames(progress))
+
+    def _frames(self, progress):
+        """Read the displacements of all frames, one at each step; return them as a list."""
+        frames = []
+        for number in range(self.first, self.last + 1):
+            progress("Frames", len(frames) / (self.last + 1 - self.first))
+            scene, obj = self._kept.find()
+            if frames and not self._kept.holds():
+                raise PointCloudError(
+                    f'The handles of "{obj.name}" or the frame were changed meanwhile. Nothing was baked.'
+                )
+            scene.frame_set(number)
+            self._kept.expect()
+            live.update(obj, waits=live.find(obj) is None)
+            reason = stale_reason(obj, glance=True, trusting=True)
+            if reason:
+                raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
+            frames.append(read_attribute(obj.data, DISPLACEMENT))
+            yield
+        return frames
+
+    def leave(self, context):
+        """Go back to the frame and the handles that were shown."""
+        self._kept.put_back()
+
+    def finish(self, context, objects, results, seconds):
+        """Write what was baked."""
+        (obj,) = objects
+        mesh = bpy.data.meshes.new(f"{obj.name} Bake")
+        mesh.vertices.add(point_count(obj.data))
+        for number, displacement in enumerate(results):
+            write_attribute(mesh, str(number), displacement, "FLOAT_VECTOR")
+        cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
+        show_baked(find_deform(obj), cache, self.first, len(results))
+        size = np.prod([len(results), *results[0].shape]) * 4 / 2**20
+        text = f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file"
+        self.report({"INFO"}, text)
+        return {"FINISHED"}
+
+
+class _Kept:
+    """The frame, the handles and the displacements that are shown while others are looked at."""
+
+    def __init__(self, scene, obj):
+        self._scene, self._uid = scene.session_uid, obj.session_uid
+        self._time = scene.frame_current, scene.frame_subframe
+        self._places = self._expected = self._now()
+        self._displacement = read_attribute(obj.data, DISPLACEMENT)
+        self._pose = obj.data[POSE].to_list()
+
+    def find(self):
+        """Return the scene and the object; None for what is gone."""
+        scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self._scene), None)
+        return scene, find_object(self._uid)
+
+    def _now(self):
+        """Read the frame, the binding, and where the object and the empties of its handles are, keyframes or not."""
+        scene, obj = self.find()
+        if scene is None or obj is None:
+            return None
+        settings = obj.meshfree.deform
+        things = {item.empty.session_uid: item.empty for item in settings.handle_items if item.empty}
+        places = {
+            uid: {name: tuple(getattr(thing, name)) for name in _PLACE}
+            for uid, thing in (things | {obj.session_uid: obj}).items()
+        }
+        return scene.frame_current, settings.binding_id, places
+
+    def expect(self):
+        """Remember what is there now."""
+        self._expected = self._now()
+
+    def holds(self) -> bool:
+        """Whether that is still there: nobody has moved anything since."""
+        obj = self.find()[1]
+        return (
+            self._expected is not None
+            and self._now() == self._expected
+            and point_count(obj.data) == len(self._displacement)
+        )
+
+    def put_back(self):
+        """Show again what was shown; handles that somebody has moved meanwhile stay where they are."""
+        scene, obj = self.find()
+        if scene is None:
+            return
+        holds = self.holds()
+        frame, subframe = self._time
+        scene.frame_set(frame, subframe=subframe)
+        if not holds:
+            return
+        for uid, place in self._places[2].items():
+            thing = find_object(uid)
+            for name, value in place.items():
+                if tuple(getattr(thing, name)) != value:  # it had been moved since its keyframe
+                    setattr(thing, name, value)
+        write_attribute(obj.data, DISPLACEMENT, self._displacement)
+        obj.data[POSE] = self._pose
+        tag_changed(obj.data)
+
+
+class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
+    """Remove what was baked, and let the points follow the handles again"""
+
+    bl_idname = "meshfree.deform_free"
+    bl_label = "Delete Bake"
+    works_stale = True
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        obj = cls.subject(context)
+        return reason or ("" if is_baked(obj) else (f'Nothing of "{obj.name}" is baked'))
+
+    def change(self, context, obj):
+        delete_bake(obj)
+        context.view_layer.update()
+        live.update(obj)
+        return f"{obj.name}: follows its handles again"
+
+
+CLASSES = (MESHFREE_OT_deform_bake, MESHFREE_OT_deform_free)

@@ -1,0 +1,412 @@
+"""What binds an object to its handles, all of it kept in the file, and whether it still holds.
+
+The points at rest are the attribute `lb_rest`, their displacements `lb_displacement`, both in local space. Which
+empties move which groups is in `Object.meshfree.deform`.
+"""
+
+import re
+import zlib
+from dataclasses import dataclass
+from uuid import uuid4
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...core import PointCloudError
+from ..objects.attributes import (
+    DISPLACEMENT,
+    REST,
+    own_positions,
+    point_count,
+    read_attribute,
+    tag_changed,
+    write_attribute,
+)
+from ..objects.counting import members, summarize
+from ..objects.groups import ANCHOR, chosen_weights, has_group, is_chosen
+from ..objects.options import settings_values
+from ..objects.reading import TYPES, fingerprint, sharing_objects
+from .nodes import find_deform, is_baked
+
+WRITES = DISPLACEMENT, REST
+POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
+_bound = b"", ()  # session_uids of all objects when the bound ones were looked for, and the places of these
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Which points are moved and which stay.
+
+    Attributes
+    ----------
+    names : list of str
+        The groups of the handles.
+    moved, owner : ndarray, (h,) int
+        The points that are moved, and for each the number of its group.
+    kept : ndarray, (a,) int
+        The points that stay.
+    strength : ndarray, (h + a,)
+        Their weights in their groups.
+    checksum : str
+        Text that differs where any of it does.
+    """
+
+    names: list
+    moved: np.ndarray
+    owner: np.ndarray
+    kept: np.ndarray
+    strength: np.ndarray
+    checksum: str
+
+
+def handle_names(obj) -> list:
+    """Names of the groups that are handles: the one that the settings name, and the same with a number."""
+    base = obj.meshfree.deform.handles
+    pattern = re.compile(re.escape(base) + r"(\.\d+)?")
+    groups = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
+    return sorted(group.name for group in groups if pattern.fullmatch(group.name) and has_group(obj, group.name))
+
+
+def read_constraints(obj) -> Constraints:
+    """Read which points are moved and which stay.
+
+    Raises
+    ------
+    PointCloudError
+        There are no handles, or points that are in several groups.
+    """
+    settings = obj.meshfree.deform
+    names = handle_names(obj) or [settings.handles]  # which says what is missing
+    weights = np.array([chosen_weights(obj, name, "Handles") for name in names])
+    several = int(np.count_nonzero(np.count_nonzero(weights > 0.0, axis=0) > 1))
+    if several:
+        raise PointCloudError(
+            f'{several} points of "{obj.name}" are in more than one of the groups {", ".join(names)}. Leave'
+            " each in one."
+        )
+    anchors = np.zeros(weights.shape[1])
+    if is_chosen(obj, settings.anchors, ANCHOR):
+        anchors = chosen_weights(obj, settings.anchors, "Anchors")
+    moved, kept = np.flatnonzero(weights.max(axis=0) > 0.0), np.flatnonzero(anchors > 0.0)
+    owner = weights.argmax(axis=0)[moved]
+    strength = np.concatenate([weights.max(axis=0)[moved], anchors[kept]])
+    checksum = _groups_checksum(names, [summarize(held) for held in (*weights, anchors)])
+    return Constraints(names, moved, owner, kept, strength, checksum)
+
+
+def _groups_checksum(names, found) -> str:
+    """Checksum of the members of the groups of the handles, given by name, and of the anchors."""
+    return f"{zlib.crc32(repr((names, [group.weighted for group in found])).encode()):08x}"
+
+
+def _groups_now(obj, glance, trusting):
+    """Return the checksum of the groups and which points are moved in Edit Mode; None, while these are not counted."""
+    names = handle_names(obj)
+    found = [members(obj, name, glance, trusting) for name in (*names, obj.meshfree.deform.anchors)]
+    if None in found:
+        return None
+    by_empty = _moved_by_empties(obj)
+    edited = [group.rows for name, group in zip(names, found[:-1], strict=True) if name not in by_empty]
+    return _groups_checksum(names, found), np.concatenate(edited) if edited else np.empty(0, int)
+
+
+def forget_bound(settings=None, context=None):
+    """Look for the bound objects again when they are needed."""
+    global _bound
+    _bound = b"", ()
+
+
+def bound_objects(scene=None) -> list:
+    """Find all bound objects, or those of a scene.
+
+    No object is looked at while they are the same as at the last call, for this is called at each move of the mouse:
+    to look at 5,000 takes 9 ms.
+    """
+    global _bound
+    objects = bpy.data.objects
+    uids = np.empty(len(objects), np.int32)
+    objects.foreach_get("session_uid", uids)
+    known, places = _bound
+    if uids.tobytes() != known:  # in the order of their names
+        places = [place for place, obj in enumerate(objects) if obj.type in TYPES and is_bound(obj)]
+        _bound = uids.tobytes(), places
+    found = [objects[place] for place in places]
+    return found if scene is None else [obj for obj in found if is_there(obj, scene)]
+
+
+def is_bound(obj) -> bool:
+    """Whether an object was bound to handles, and follows them unless something has changed."""
+    return obj is not None and obj.meshfree.deform.is_bound
+
+
+def handled_object(obj, scene):
+    """Return an object itself, or if it is an empty that moves handles, the one in the scene that it moves."""
+    if obj is None or obj.type in TYPES:
+        return obj
+    for other in bound_objects(scene):
+        if any(item.empty == obj for item in other.meshfree.deform.handle_items) and copied_from(other) is None:
+            return other
+    return obj
+
+
+def copied_from(obj):
+    """Return the bound object whose empties a copy of it still names, since they were not copied too; None for others.
+
+    Empties go with the object that they are children of, so that a copy stays as it is when it is moved.
+    """
+    empties = [item.empty for item in obj.meshfree.deform.handle_items if item.has_empty and is_there(item.empty)]
+    parents = [empty.parent for empty in empties]
+    if not is_bound(obj) or obj in parents:
+        return None
+    for parent in parents:
+        bound = parent is not None and parent.type in TYPES and is_bound(parent)
+        if bound and any(item.empty in empties for item in parent.meshfree.deform.handle_items):
+            return parent
+    return None
+
+
+def edited_rows(obj, constraints):
+    """Return which of the moved points have no empty, and are moved in Edit Mode, (h,) bool."""
+    by_empty = _moved_by_empties(obj)
+    return ~np.isin(constraints.owner, [index for index, name in enumerate(constraints.names) if name in by_empty])
+
+
+def _moved_by_empties(obj) -> set:
+    """Names of the groups of handles that empties move."""
+    return {item.name for item in obj.meshfree.deform.handle_items if item.has_empty}
+
+
+def moves_in_edit_mode(obj) -> bool:
+    """Whether some group of handles has no empty."""
+    return any(not item.has_empty for item in obj.meshfree.deform.handle_items)
+
+
+def settings_text(obj) -> str:
+    """Text of the settings of the operator that deformations depend on."""
+    return repr((settings_values(obj.meshfree), obj.meshfree.rim_group, obj.meshfree.use_modifiers))
+
+
+def stale_reason(obj, glance=False, trusting=False) -> str:
+    """Say why a bound object no longer follows its handles, and what to do; empty if it does.
+
+    A glance is quick enough for a panel; see `fingerprint`. One that trusts is quick enough for a drag: it takes the
+    groups as they were seen last.
+    """
+    settings = obj.meshfree.deform
+    count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
+    if is_baked(obj):
+        return "Its animation is baked. Delete the bake to let it follow the handles again"
+    original = copied_from(obj)
+    if original is not None and original.data == obj.data:
+        return f'It shares its mesh with "{original.name}", whose handles move both'
+    if original is not None:
+        return f'It has no handles of its own, "{original.name}" has them. Bind again to get copies of them'
+    if count != settings.point_count:
+        return f"It had {settings.point_count:,} points and has {count:,} now. Bind again"
+    gone = [item.name for item in settings.handle_items if item.has_empty and not is_there(item.empty)]
+    if gone:
+        return f"The empty of {', '.join(gone)} was deleted. Bind again to get a new one"
+    if find_deform(obj) is None:
+        return 'The modifier "Mesh-Free Deform" or an input of its nodes was removed. Bind again'
+    if settings.settings_used != settings_text(obj):
+        return "Settings changed. Bind again"
+    others = [other.name for other in sharing_objects(obj) if is_bound(other) and copied_from(other) != obj]
+    if others:
+        return f'It shares its mesh with "{others[0]}", which is bound, too. Make it a single user'
+    if in_edit_mesh(obj):  # groups and positions are only known to be right when one leaves it
+        return ""
+    if any(obj.data.attributes.get(name) is None for name in WRITES):
+        return f"The attributes {WRITES[0]} and {WRITES[1]} were removed. Bind again"
+    groups = _groups_now(obj, glance, trusting)
+    if groups is None:
+        return ""
+    checksum, edited = groups
+    if settings.groups_used != checksum:
+        return "The groups of handles or anchors changed. Bind again"
+    known = fingerprint(obj, glance, left_out=edited)
+    if known and settings.fingerprint != known:
+        return "The points at rest were moved. Bind again"
+    return ""
+
+
+def is_there(obj, scene=None) -> bool:
+    """Whether an object, such as the empty of a handle, is still in a scene, or in some scene."""
+    if obj is None:
+        return False
+    scenes = bpy.data.scenes if scene is None else [scene]
+    if any(obj.visible_get(view_layer=layer) for each in scenes for layer in each.view_layers):
+        return True
+    found = obj.users_scene  # takes 1 ms for 5,000 objects
+    return scene in found if scene is not None else bool(found)
+
+
+def in_edit_mesh(obj) -> bool:
+    """Whether a mesh is in Edit Mode, by this object or another one, so that its data are out of reach as arrays."""
+    return obj.type == "MESH" and obj.data.is_editmode
+
+
+def relative_matrix(obj, empty, depsgraph=None):
+    """Return the matrix of an empty in the space of an object, (4, 4) float64, as a depsgraph has evaluated them."""
+    if depsgraph is not None:
+        obj, empty = obj.evaluated_get(depsgraph), empty.evaluated_get(depsgraph)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
+        raise PointCloudError(
+            f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
+        )
+    return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
+
+
+def read_pose(obj, depsgraph=None):
+    """Read all that the displacements depend on while the binding holds, to compare it with `written_pose`.
+
+    Returns
+    -------
+    ndarray
+        Checksum of the settings, of positions where handles are moved in Edit Mode, and for each empty the 16 numbers
+        of the matrix that takes its group, in local space, from rest to where it is now.
+    """
+    settings = obj.meshfree.deform
+    positions = zlib.crc32(positions_now(obj)) if moves_in_edit_mode(obj) else 0
+    numbers = [zlib.crc32(repr((solver_settings(settings), settings.steps)).encode()), positions]
+    for item in settings.handle_items:
+        there = item.has_empty and is_there(item.empty)
+        numbers += empty_change(obj, item, depsgraph).ravel().tolist() if there else []
+    return np.array(numbers)
+
+
+def empty_change(obj, item, depsgraph=None):
+    """Return how an empty has moved its handles since they were bound, in local space, (4, 4)."""
+    rest = np.reshape(item.rest, (4, 4)).astype(np.float64)
+    return relative_matrix(obj, item.empty, depsgraph) @ np.linalg.inv(rest)
+
+
+def solver_settings(settings) -> tuple:
+    """Values of the settings that the factors depend on."""
+    return settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0
+
+
+def positions_now(obj):
+    """Read the positions of the points in local space, with changes of Edit Mode that are not yet in the mesh."""
+    if not in_edit_mesh(obj):
+        return own_positions(obj.data)
+    obj.update_from_editmode()
+    positions = np.empty((len(obj.data.vertices), 3), np.float32)
+    obj.data.vertices.foreach_get("co", positions.reshape(-1))
+    return positions
+
+
+def read_rest(obj):
+    """Read the points at rest in local space, (n, 3) float32."""
+    if not in_edit_mesh(obj):
+        return read_attribute(obj.data, REST)
+    edited = bmesh.from_edit_mesh(obj.data)
+    layer = edited.verts.layers.float_vector[REST]
+    return np.array([vertex[layer][:] for vertex in edited.verts], np.float32)
+
+
+def record(obj, rest, matrix, constraints, empties):
+    """Keep in the file what an object is bound with.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    rest : ndarray, (n, 3)
+        Points at rest in local space.
+    matrix : ndarray, (3, 3)
+        From local space to the lengths of the world.
+    constraints : Constraints
+    empties : list
+        For each group of handles the empty that moves it and its matrix at rest in local space, (4, 4), or None.
+    """
+    settings = obj.meshfree.deform
+    settings.handle_items.clear()
+    for name, moved_by in zip(constraints.names, empties, strict=True):
+        item = settings.handle_items.add()
+        item.name, item.has_empty = name, moved_by is not None
+        if moved_by is not None:
+            item.empty, item.rest = moved_by[0], np.reshape(moved_by[1], -1)
+    write_attribute(obj.data, REST, rest)
+    settings.matrix = np.reshape(matrix, -1)
+    settings.groups_used, settings.settings_used = constraints.checksum, settings_text(obj)
+    settings.point_count = len(rest)
+    settings.is_bound = True
+    renew(obj, constraints)
+
+
+def renew(obj, constraints):
+    """Take the points of a bound object as they are now as the ones at rest, which `lb_rest` holds."""
+    settings = obj.meshfree.deform
+    # Points that are moved in Edit Mode count as if they stayed.
+    settings.fingerprint = fingerprint(obj, left_out=constraints.moved[edited_rows(obj, constraints)])
+    settings.binding_id = uuid4().hex
+
+
+def forget(obj):
+    """Remove from the file what an object is bound with."""
+    settings = obj.meshfree.deform
+    settings.is_bound = False
+    settings.handle_items.clear()
+    for name in WRITES:
+        if obj.data.attributes.get(name) is not None:
+            obj.data.attributes.remove(obj.data.attributes[name])
+    obj.data.pop(POSE, None)
+    modifier = find_deform(obj)
+    if modifier is not None:
+        obj.modifiers.remove(modifier)
+
+
+def goal(obj, constraints, rest, depsgraph=None):
+    """Return where the moved points are to be in local space, (h, 3).
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    constraints : Constraints
+    rest : ndarray, (n, 3)
+        Points at rest in local space.
+    depsgraph : bpy.types.Depsgraph, optional
+        Where the empties are read; otherwise as the viewport shows them.
+    """
+    placed = rest[constraints.moved].astype(np.float64)
+    edited = edited_rows(obj, constraints)
+    if edited.any():
+        placed[edited] = positions_now(obj)[constraints.moved[edited]]
+    for item in obj.meshfree.deform.handle_items:
+        if item.has_empty and is_there(item.empty) and item.name in constraints.names:
+            change = empty_change(obj, item, depsgraph)
+            rows = constraints.owner == constraints.names.index(item.name)
+            placed[rows] = placed[rows] @ change[:3, :3].T + change[:3, 3]
+    return placed
+
+
+def written_pose(obj):
+    """Return what the displacements were computed for, and whether in full, or None."""
+    known = obj.data.get(POSE)
+    return (np.array(known[1:]), bool(known[0])) if known is not None else (None, False)
+
+
+def same_pose(one, other) -> bool:
+    """Whether the displacements of two poses are the same up to rounding."""
+    return (
+        one is not None
+        and one.shape == other.shape
+        and (one[:2] == other[:2]).all()
+        and np.allclose(one[2:], other[2:], rtol=1e-6, atol=1e-7)
+    )
+
+
+def write_displacement(obj, displacement, pose, settled: bool):
+    """Write displacements in local space, (n, 3), in Edit Mode too, and what they were computed for."""
+    data = obj.data
+    if in_edit_mesh(obj):
+        edited = bmesh.from_edit_mesh(data)
+        layer = edited.verts.layers.float_vector[DISPLACEMENT]
+        for vertex, moved in zip(edited.verts, displacement.tolist(), strict=True):
+            vertex[layer] = moved
+        bmesh.update_edit_mesh(data, loop_triangles=False, destructive=False)
+    else:
+        write_attribute(data, DISPLACEMENT, displacement)
+        tag_changed(data)
+    data[POSE] = [float(settled), *pose.tolist()]

@@ -1,0 +1,352 @@
+"""Deform objects by handles: bind once, then move the handles; take the result over, or take it back."""
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty
+from mathutils import Matrix, Vector
+
+from ...core import PointCloudError
+from ..objects.attributes import REST, own_positions, point_count, read_attribute, write_own_positions
+from ..objects.groups import HANDLE, assign, check_assignable, has_group
+from ..objects.modifiers import get_input
+from ..objects.positions import add_key, check_movable
+from ..objects.reading import read_points, shape_keys
+from ..objects.result import length_text
+from ..running.application import ApplicationOperator
+from ..running.job import busy
+from ..running.ready import ReadyOperator
+from ..tools.select import SelectionOperator, groups_changed, selected
+from . import live
+from .binding import (
+    POSE,
+    WRITES,
+    copied_from,
+    edited_rows,
+    forget,
+    handle_names,
+    handled_object,
+    is_bound,
+    is_there,
+    read_constraints,
+    read_pose,
+    record,
+    relative_matrix,
+    renew,
+    stale_reason,
+    write_displacement,
+)
+from .nodes import add_deform, find_deform, is_baked, show_live
+
+
+class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
+    """Make the selected points one more handle: a group of its own, which Bind gives an empty"""
+
+    bl_idname = "meshfree.handle_add"
+    bl_label = "Add Handle"
+
+    surface = False
+
+    def prepare(self, context, obj):
+        chosen = selected(obj)
+        base = obj.meshfree.deform.handles or HANDLE
+        names = [base, *(f"{base}.{number:03d}" for number in range(1, 1000))]
+        name = next(name for name in names if not has_group(obj, name))
+        others = handle_names(obj)
+        check_assignable(obj, name, must_exist=False)
+        for other in others:
+            check_assignable(obj, other, must_exist=True)
+
+        def change():
+            for other in others:  # a point has one handle
+                assign(obj, other, chosen, "REMOVE", 1.0)
+            assign(obj, name, chosen, "REPLACE", 1.0)
+            groups_changed(obj)
+            return f'{np.count_nonzero(chosen):,} points are in the group "{name}"'
+
+        return change
+
+
+class HandledOperator(ReadyOperator):
+    """An operator on the active object, or on the one that the active empty moves."""
+
+    @classmethod
+    def subject(cls, context):
+        return handled_object(context.object, context.scene)
+
+
+class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Operator):
+    """Prepare the deformation: the points of some groups are moved, those of another stay, and all others follow"""
+
+    bl_idname = "meshfree.deform_bind"
+    bl_label = "Bind"
+    only_active = True
+    asks = False
+    writes = WRITES
+
+    def plan(self, context, obj):
+        settings = obj.meshfree.deform
+        constraints = read_constraints(obj)
+        reading = read_points(context, obj)
+        rest = reading.local(reading.points).astype(np.float32)
+        items = settings.handle_items
+        kept = {item.name: item for item in items if item.has_empty and is_there(item.empty)}
+        by_empty = [settings.add_empties or name in kept for name in constraints.names]
+        edited = constraints.moved[~np.array(by_empty)[constraints.owner]]
+        if len(edited) and (shape_keys(obj) is not None or obj.meshfree.use_modifiers):
+            raise PointCloudError(
+                f'The {len(edited)} handles of "{obj.name}" have no empty, and to move them in Edit Mode takes'
+                " a mesh without shape keys whose modifiers are not used. Turn on Add Empties."
+            )
+        if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
+            rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
+        make = live.plan_factors(obj, rest, reading.matrix, constraints)
+        return lambda progress: (make(progress), by_empty)
+
+    def write(self, context, obj, result):
+        made, by_empty = result
+        items = obj.meshfree.deform.handle_items
+        kept = {item.name: (item.empty, tuple(item.rest)) for item in items if item.has_empty and is_there(item.empty)}
+        if copied_from(obj) is not None:
+            kept = {name: (_copy_empty(obj, empty), rest) for name, (empty, rest) in kept.items()}
+        empties = []
+        for index, name in enumerate(made.constraints.names):
+            moved_by = kept.get(name)
+            if by_empty[index] and moved_by is None:
+                rows = made.constraints.moved[made.constraints.owner == index]
+                empty = _add_empty(context, obj, name, made.rest, rows)
+                moved_by = empty, relative_matrix(obj, empty)
+            empties.append(moved_by)
+        record(obj, made.rest, made.matrix, made.constraints, empties)
+        add_deform(obj)
+        # Blender crashes when it draws what a render's handlers change, and handles are there to be animated.
+        context.scene.render.use_lock_interface = True
+        live.keep(obj, made)
+        obj.data.pop(POSE, None)
+        write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False)
+        live.update(obj)
+        self.warn(made.deformer.notices)
+        moved, stay = len(made.constraints.moved), len(made.constraints.kept)
+        way = (f'Move "{empties[0][0].name}"') if empties[0] else ("Move the handles in Edit Mode")
+        return f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"
+
+
+def _add_empty(context, obj, name, rest, rows):
+    """Add an empty in the middle of a group of handles, which goes with the object."""
+    points = rest[rows].astype(np.float64)
+    empty = bpy.data.objects.new(f"{obj.name} {name}", None)
+    empty.empty_display_type = "SPHERE"
+    empty.empty_display_size = max(
+        0.5 * np.linalg.norm(np.ptp(points, axis=0)), 0.03 * np.linalg.norm(np.ptp(rest, axis=0))
+    )
+    empty.parent = obj
+    empty.location = Vector(points.mean(axis=0))
+    for collection in obj.users_collection:
+        collection.objects.link(empty)
+    context.view_layer.update()
+    return empty
+
+
+def _copy_empty(obj, empty):
+    """Give a copied object an empty of its own, as its original has it, animation included."""
+    copy = empty.copy()
+    copy.parent = obj
+    for collection in obj.users_collection:
+        collection.objects.link(copy)
+    return copy
+
+
+class BoundOperator(HandledOperator):
+    """An operator on a bound object."""
+
+    works_stale = False  # whether the handles may have lost their hold
+
+    @classmethod
+    def obstacle(cls, context):
+        return busy() or super().obstacle(context) or not_bound(cls.subject(context))
+
+    def execute(self, context):
+        obj = self.subject(context)
+        try:
+            if not self.works_stale:
+                check_fresh(obj)
+                context.view_layer.update()
+                live.update(obj)  # all steps, should only the first one have been taken
+            message = self.change(context, obj)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, message)
+        return {"FINISHED"}
+
+
+def not_bound(obj) -> str:
+    """Say that an object is not bound, and what to do; empty if it is."""
+    return "" if is_bound(obj) else (f'"{obj.name}" is not bound. Bind it to its handles first')
+
+
+def check_fresh(obj):
+    """Refuse an object that no longer follows its handles."""
+    reason = stale_reason(obj)
+    if reason:
+        raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
+
+
+class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.Operator):
+    """Let all points follow the handles to where they are now, which happens by itself when they are moved"""
+
+    bl_idname = "meshfree.deform_update"
+    bl_label = "Update"
+    only_active = True
+    asks = False
+    writes = WRITES
+
+    @classmethod
+    def obstacle(cls, context):
+        return super().obstacle(context) or not_bound(cls.subject(context))
+
+    def plan(self, context, obj):
+        check_fresh(obj)
+        compute, pose = live.plan_settled(obj)
+        return lambda progress: (pose, *compute(progress))
+
+    def write(self, context, obj, result):
+        pose, made, points, displacement = result
+        live.keep(obj, made)
+        live.write(obj, made, points, displacement, pose)
+        if not made.deformer.converged:
+            self.warn([("The turns of details were still changing. Raise Steps.")])
+        distance = np.linalg.norm(points - made.deformer.points, axis=1)
+        return f"{obj.name}: moved at most by {length_text(distance.max())}"
+
+
+class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
+    """Move the points themselves to where the deformation shows them, and go on from there"""
+
+    bl_idname = "meshfree.deform_apply"
+    bl_label = "Apply"
+
+    def change(self, context, obj):
+        check_movable(obj, "IN_PLACE")
+        settings, constraints = obj.meshfree.deform, read_constraints(obj)
+        positions = (read_attribute(obj.data, REST) + shown_displacement(obj)).astype(np.float32)
+        empties = [
+            (item.empty, relative_matrix(obj, item.empty)) if item.has_empty else None for item in settings.handle_items
+        ]
+        write_own_positions(obj.data, positions)
+        record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
+        write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
+        return f"{obj.name}: {len(positions):,} points are at rest where they are now"
+
+
+class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
+    """Keep the deformation as a shape key of value zero, and put the handles back"""
+
+    bl_idname = "meshfree.deform_to_shape_key"
+    bl_label = "To Shape Key"
+
+    @classmethod
+    def obstacle(cls, context):
+        keyless = "Point clouds have no shape keys. Apply the deformation, or bake it"
+        return super().obstacle(context) or ("" if cls.subject(context).type == "MESH" else keyless)
+
+    def change(self, context, obj):
+        check_movable(obj, "SHAPE_KEY")
+        constraints = read_constraints(obj)
+        if edited_rows(obj, constraints).any():
+            raise PointCloudError(
+                f'Handles of "{obj.name}" are moved in Edit Mode, which a mesh with shape keys does not allow.'
+                " Turn on Add Empties and bind again."
+            )
+        key = add_key(obj, "Deform", shown_displacement(obj))
+        put_back(context, obj)
+        known = live.find(obj)
+        renew(obj, constraints)
+        if known is not None:
+            live.keep(obj, known)
+        return f'{obj.name}: the deformation is the shape key "{key.name}"'
+
+
+class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
+    """Put the handles back to where they were bound, and all points to rest"""
+
+    bl_idname = "meshfree.deform_reset"
+    bl_label = "Reset"
+    works_stale = True
+
+    def change(self, context, obj):
+        put_back(context, obj)
+        return f"{obj.name}: handles and points are at rest"
+
+
+class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
+    """Let go of the handles: points go back to rest, and the modifier and its attributes are removed"""
+
+    bl_idname = "meshfree.deform_unbind"
+    bl_label = "Unbind"
+    works_stale = True
+
+    delete_empties: BoolProperty(
+        name="Delete Empties", description="Delete the empties that moved the handles", default=True
+    )
+
+    def change(self, context, obj):
+        others = [other for other in bpy.data.objects if other != obj]  # copies, too, which may be bound to them again
+        used = {item.empty for other in others for item in other.meshfree.deform.handle_items}
+        empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
+        put_back(context, obj)
+        if is_baked(obj):
+            delete_bake(obj)
+        forget(obj)
+        if self.delete_empties:
+            for empty in empties:
+                if empty.type == "EMPTY" and empty not in used:
+                    bpy.data.objects.remove(empty)
+        return f"{obj.name}: is no longer bound"
+
+
+def shown_displacement(obj):
+    """Read the displacements in local space as the modifier shows them, (n, 3)."""
+    return read_attribute(obj.data, WRITES[0]) * get_input(find_deform(obj), "Strength")
+
+
+def put_back(context, obj):
+    """Put handles and points of a bound object to where they were bound, as far as its points are still the same.
+
+    Handles of the object that it is a copy of stay where they are.
+    """
+    settings = obj.meshfree.deform
+    own = copied_from(obj) is None
+    for item in settings.handle_items:
+        if own and item.has_empty and is_there(item.empty):
+            item.empty.matrix_world = obj.matrix_world @ Matrix(np.reshape(item.rest, (4, 4)).tolist())
+    data = obj.data
+    same = settings.point_count == point_count(data) and all(name in data.attributes for name in WRITES)
+    if same and any(not item.has_empty for item in settings.handle_items):
+        constraints = read_constraints(obj)
+        rows = constraints.moved[edited_rows(obj, constraints)]
+        positions = own_positions(data)
+        positions[rows] = read_attribute(data, REST)[rows]
+        write_own_positions(obj.data, positions)
+    context.view_layer.update()
+    if same:
+        write_displacement(obj, np.zeros((point_count(data), 3)), read_pose(obj), settled=True)
+
+
+def delete_bake(obj):
+    """Let a baked object follow its handles again, and remove what was baked."""
+    modifier = find_deform(obj)
+    cache = get_input(modifier, "Cache")
+    show_live(modifier)
+    if cache is not None and not cache.users:  # a copy of the object may show it, too
+        bpy.data.meshes.remove(cache.data)  # and the object that shows it
+
+
+CLASSES = (
+    MESHFREE_OT_handle_add,
+    MESHFREE_OT_deform_bind,
+    MESHFREE_OT_deform_update,
+    MESHFREE_OT_deform_apply,
+    MESHFREE_OT_deform_to_shape_key,
+    MESHFREE_OT_deform_reset,
+    MESHFREE_OT_deform_unbind,
+)

@@ -1,0 +1,229 @@
+"""The command line: `blender --command meshfree VERB FILE ...`, from files to files without a window."""
+
+import argparse
+import json
+import math
+from pathlib import Path
+
+import bpy
+
+from ...core import PointCloudError
+from ..objects import options
+from ..objects.attributes import point_count
+from ..objects.reading import obstacle, sharing_objects
+from ..objects.result import analysis_names, check_writable, write_result
+from ..running.application import done
+from ..tools.analyze import WRITE_LIMIT, analyze_object
+from . import objects as files
+
+# Operators that need nothing picked, beside the analysis.
+VERBS = ("smooth", "mode_shape", "segment", "signature", "minimal_surface")
+_SETTINGS = (*options.ALL_NAMES, "make_single_user")  # of the object
+_handles = []
+
+
+def attach():
+    """Add the command to Blender."""
+    _handles.append(bpy.utils.register_cli_command("meshfree", run))
+
+
+def detach():
+    """Take the command away again."""
+    while _handles:
+        bpy.utils.unregister_cli_command(_handles.pop())
+
+
+def run(argv) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv : list of str
+        What follows ``--command meshfree``.
+
+    Returns
+    -------
+    int
+        Exit code: 0 if all files succeeded, 1 if any failed, 2 for wrong usage.
+    """
+    try:
+        arguments = _parse(argv)
+    except SystemExit as stop:  # how argparse ends after --help and wrong usage; Blender itself shall end in order
+        return stop.code or 0
+    failed = False
+    for path in arguments.inputs:
+        try:
+            result = _process(path, arguments)
+        except (PointCloudError, OSError, RuntimeError) as error:  # Blender's importers raise RuntimeError
+            failed = True
+            result = {"error": str(error).strip().removeprefix("Error: ")}  # as operators raise what they report
+        print(json.dumps({"file": str(path), **result}), flush=True)
+    return 1 if failed else 0
+
+
+def _parse(argv):
+    parser = argparse.ArgumentParser(prog="blender --command meshfree")
+    commands = parser.add_subparsers(dest="command", required=True)
+    analyze = commands.add_parser(
+        "analyze",
+        help="areas, normals, curvature, rims and vibration modes of point clouds",
+        description="Analyze point clouds. Writes one JSON line per input: points, total area, connected parts, points"
+        " at a rim, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1 if any"
+        " input failed.",
+    )
+    analyze.add_argument("--modes", type=int, default=0, metavar="N", help="how many vibration modes to compute")
+    analyze.add_argument(
+        "--write-limit", type=int, default=WRITE_LIMIT, metavar="N", help="modes written as attributes at most"
+    )
+    _add_files(analyze)
+    parsers = {"analyze": analyze}
+    for verb in VERBS:
+        operator = _operator(verb).get_rna_type()
+        parsers[verb] = commands.add_parser(
+            verb.replace("_", "-"),
+            help=operator.description.lower(),
+            description=f"{operator.description}. Writes one JSON line per input: points, what was done, seconds per"
+            " stage, notices; or the error. The exit code is 1 if any input failed.",
+        )
+        for setting in _choices(verb):
+            _add_setting(parsers[verb], setting)
+        _add_files(parsers[verb])
+
+    arguments = parser.parse_args(argv)
+    arguments.command = arguments.command.replace("-", "_")
+    chosen = parsers[arguments.command]
+    if arguments.command == "analyze" and (arguments.modes < 0 or arguments.write_limit < 1):
+        chosen.error("--modes takes a number of at least 0, --write-limit one of at least 1")
+    if arguments.out is not None and len(arguments.inputs) > 1:
+        chosen.error("--out takes one input; use --out-dir for many")
+    if arguments.out is not None and arguments.out.suffix.lower() not in files.OUTPUTS:
+        chosen.error(f"--out must end in {', '.join(files.OUTPUTS)}")
+    outputs = [_output_path(path, arguments) for path in arguments.inputs]
+    if arguments.out_dir is not None and len(set(outputs)) < len(outputs):
+        chosen.error("some inputs have the same name and would overwrite each other in --out-dir")
+    return arguments
+
+
+def _operator(verb):
+    return getattr(bpy.ops.meshfree, verb)
+
+
+def _choices(verb):
+    """Properties of an operator that make sense on the command line; points are moved in place there."""
+    left_out = {"rna_type", "show", "target", "animate", "period"}
+    return [item for item in _operator(verb).get_rna_type().properties if item.identifier not in left_out]
+
+
+def _add_files(parser):
+    """Add what all verbs take: inputs, outputs, and the settings of the object."""
+    parser.add_argument(
+        "inputs",
+        nargs="+",
+        type=Path,
+        metavar="IN",
+        help=f"point clouds: {', '.join(files.INPUTS)}. Text has columns x y z and may have a header",
+    )
+    target = parser.add_mutually_exclusive_group()
+    target.add_argument("--out", type=Path, metavar="FILE", help=f"output of one input: {', '.join(files.OUTPUTS)}")
+    target.add_argument("--out-dir", type=Path, metavar="DIR", help="folder for the outputs of all inputs")
+    parser.add_argument(
+        "--format", choices=[suffix[1:] for suffix in files.OUTPUTS], default="blend", help="outputs in the folder"
+    )
+    parser.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
+    settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
+    for name in _SETTINGS:
+        _add_setting(parser, settings[name])
+
+
+def _add_setting(parser, setting):
+    """Add an option for a setting of the panel, with its description as help."""
+    kind = {"help": setting.description.replace("%", "%%"), "default": None}
+    if setting.type == "ENUM":
+        kind.update(type=str.upper, choices=setting.enum_items.keys())
+    elif setting.type == "BOOLEAN":
+        kind.update(action=argparse.BooleanOptionalAction)
+    elif setting.type == "STRING":
+        kind.update(metavar="NAME")
+    elif setting.subtype == "ANGLE":
+        kind.update(type=_number(setting, lambda text: math.radians(float(text))), metavar="DEGREES")
+    else:
+        kind.update(type=_number(setting, int if setting.type == "INT" else float), metavar=setting.type)
+    parser.add_argument(f"--{setting.identifier.replace('_', '-')}", **kind)
+
+
+def _number(setting, convert):
+    """Return what turns a text into a number for a setting, and refuses those that Blender would silently replace."""
+
+    def number(text):
+        value = convert(text)
+        if not setting.hard_min <= value <= setting.hard_max:
+            raise argparse.ArgumentTypeError(f"{text} is not from {setting.hard_min:g} to {setting.hard_max:g}")
+        return value
+
+    return number
+
+
+def _output_path(path, arguments):
+    if arguments.out_dir is not None:
+        return arguments.out_dir / f"{path.stem}.{arguments.format}"
+    return arguments.out
+
+
+def _process(path, arguments) -> dict:
+    """Work on one file, write its output, and return what to print."""
+    output = _output_path(path, arguments)
+    if output is not None and output.resolve() == path.resolve():
+        raise PointCloudError(f"The output {output} would overwrite its input. Choose another name.")
+    obj, notices = files.load(path, arguments.object)
+    reason = obstacle(obj)
+    if reason:
+        raise PointCloudError(f"{reason}")
+    for name in _SETTINGS:
+        value = getattr(arguments, name)
+        if value is not None:
+            setattr(obj.meshfree, name, value)
+    result = _analyze(obj, arguments, output) if arguments.command == "analyze" else _apply(obj, arguments, output)
+    result["notices"] = notices + result["notices"]
+    return {**result, "output": None if output is None else str(output)}
+
+
+def _analyze(obj, arguments, output):
+    check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
+    analysis = analyze_object(bpy.context, obj, arguments.modes)
+    if sharing_objects(obj):  # by choice, or it would not be writable
+        obj.data = obj.data.copy()
+    write_result(obj, analysis, arguments.write_limit)
+    if output is not None:
+        arrays = files.analysis_arrays(
+            files.place_of(obj), analysis.laplacian, analysis.mean_curvature, analysis.spectrum
+        )
+        files.save(output, obj, arrays)
+    return {
+        "points": len(analysis.laplacian.areas),
+        "total_area": analysis.total_area,
+        **analysis.counts,
+        "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
+        "seconds": {name: round(seconds, 3) for name, seconds in analysis.seconds.items()},
+        "notices": analysis.notices,
+    }
+
+
+def _apply(obj, arguments, output):
+    """Run the operator of a verb on the object."""
+    given = {item.identifier: getattr(arguments, item.identifier) for item in _choices(arguments.command)}
+    properties = {name: value for name, value in given.items() if value is not None}
+    operator = _operator(arguments.command)
+    for name, value in (("show", False), ("target", "IN_PLACE")):
+        if name in operator.get_rna_type().properties:
+            properties[name] = value
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other == obj)
+    operator(**properties)
+    if output is not None:
+        files.save(output, obj, files.attribute_arrays(obj))
+    return {
+        "points": point_count(obj.data),
+        "done": done.messages[-1],
+        "seconds": {name: round(seconds, 3) for name, seconds in done.seconds.items()},
+        "notices": done.notices,
+    }

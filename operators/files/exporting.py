@@ -1,0 +1,170 @@
+"""File > Export: points with results, the operator with its spectrum, and the eigenvalues alone."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ...core import PointCloudError
+from ...core.files import replacing, write_points
+from ..objects.options import laplacian_options
+from ..objects.reading import read_points
+from ..objects.result import EIGENVALUES
+from ..running import cache
+from ..running.job import JobOperator
+from ..running.stages import Stages
+from .objects import analysis_arrays, file_filter, place_of, point_table, save_arrays
+
+
+class ExportOperator(JobOperator, ExportHelper):
+    """An operator that writes one file about the active object; an older file stays if that fails.
+
+    A subclass has a method `plan`, which reads all that is needed and returns a function of a path and a progress
+    callback that writes the file, without touching Blender, and returns a line for the status bar.
+    """
+
+    bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
+    suffix = ""  # of the name in the file browser
+
+    @property
+    def filename_ext(self):
+        """What `ExportHelper` adds to a name."""
+        return self.suffix
+
+    def invoke(self, context, event):
+        self._attended = True
+        if not self.filepath:
+            folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
+            self.filepath = str(folder / f"{bpy.path.clean_name(context.object.name)}{self.filename_ext}")
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        attended = self.takes_window()
+        path = Path(bpy.path.abspath(self.filepath))
+        try:
+            reason = self.obstacle(context)
+            if reason:  # since the file browser opened
+                raise PointCloudError(f"{reason}.")
+            write = self.plan(context, context.object)
+            if attended:
+                return self.start(context, [], lambda progress: write(path, progress))
+            with Stages(context.window_manager, self.bl_label) as stages:
+                result = write(path, stages)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return self.finish(context, [], result, stages.seconds)
+
+    def finish(self, context, objects, results, seconds):
+        """Tell what was written."""
+        self.report({"INFO"}, results)
+        return {"FINISHED"}
+
+
+class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
+    """Export the points of the active object as they are seen, with their results, to a PLY, XYZ or CSV file"""
+
+    bl_idname = "meshfree.export_points"
+    bl_label = "Export Points"
+
+    filter_glob: file_filter(".ply", ".xyz", ".csv")
+    format: EnumProperty(
+        name="Format",
+        description="Kind of the file in the file browser; in scripts the ending of the name decides",
+        items=[
+            ("PLY", "PLY", "Binary, with the types of all values"),
+            ("XYZ", "XYZ", "Text with a point a line, and the names of the columns in a comment"),
+            ("CSV", "CSV", "Text for spreadsheets, with the names of the columns in the first line"),
+        ],
+        default="PLY",
+        options={"SKIP_SAVE"},
+    )
+    attributes: EnumProperty(
+        name="Attributes",
+        description="Which values of the points are written",
+        items=[
+            ("ALL", "All", "All attributes of the points that are numbers, vectors or truth values"),
+            ("RESULTS", "Results", "Those of this extension alone"),
+            ("NONE", "None", "Coordinates alone"),
+        ],
+        default="ALL",
+    )
+    colors: BoolProperty(name="Colors", description="Write the color attribute as red, green and blue", default=True)
+
+    @property
+    def filename_ext(self):
+        """What `ExportHelper` adds to a name."""
+        return f".{self.format.lower()}"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        for name in ("format", "attributes", "colors"):
+            layout.prop(self, name)
+
+    def plan(self, context, obj):
+        table, name = point_table(context, obj, self.attributes, self.colors), obj.name
+
+        def write(path, progress):
+            progress("Write", 0.0)
+            write_points(path, table, double=not table.single)
+            return f"{name}: {len(table.points):,} points written to {path.name}"
+
+        return write
+
+
+class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
+    """Export the Laplace-Beltrami operator of the active object, its areas and its modes as numpy arrays"""
+
+    bl_idname = "meshfree.export_operator"
+    bl_label = "Export Laplacian"
+    suffix = ".npz"
+
+    filter_glob: file_filter(".npz")
+
+    def plan(self, context, obj):
+        reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
+        name, place, count = obj.name, place_of(obj), len(obj.get(EIGENVALUES, ()))
+
+        def write(path, progress):
+            built = cache.build(reading.points, options, reading.rim, progress)
+            spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
+            progress("Write", 1.0)
+            save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))
+            return f"{name}: {built.laplacian.stiffness.nnz:,} weights and {count} modes written to {path.name}"
+
+        return write
+
+
+class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
+    """Export the eigenvalues of the active object as a CSV file"""
+
+    bl_idname = "meshfree.export_eigenvalues"
+    bl_label = "Export Eigenvalues"
+    suffix = ".csv"
+
+    filter_glob: file_filter(".csv")
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason or EIGENVALUES in context.object:
+            return reason
+        return f'"{context.object.name}" has no eigenvalues. Press Compute Modes first'
+
+    def plan(self, context, obj):
+        name, values = obj.name, np.array(obj[EIGENVALUES])
+
+        def write(path, progress):
+            rows = np.stack([np.arange(1, len(values) + 1), values], axis=1)
+            with replacing(path) as part:
+                np.savetxt(part, rows, ["%d", "%.17g"], ",", header="mode,eigenvalue", comments="")
+            return f"{name}: {len(values)} eigenvalues written to {path.name}"
+
+        return write
+
+
+CLASSES = (MESHFREE_OT_export_points, MESHFREE_OT_export_operator, MESHFREE_OT_export_eigenvalues)

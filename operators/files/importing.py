@@ -1,0 +1,182 @@
+"""File > Import: points of files as objects, coordinates of any size with all their digits."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ...core import PointCloudError
+from ...core.files import READABLE, read_points
+from ..running import cache
+from ..running.job import JobOperator
+from ..running.stages import Stages
+from .objects import OFFSET, add_object, file_filter, known_offset, offset_of
+
+LASER = (".las", ".laz")  # listed, so that the error can say what to do with them
+OWN = (".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", *LASER)  # Blender reads the others by itself, too
+
+_KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
+if bpy.app.version >= (4, 5, 0):
+    _KINDS.append(("POINTCLOUD", "Point Cloud", "A point cloud object, which shows its points by itself"))
+
+
+# Blender 5.2 crashes when it is given a path relative to the file for a property that does not say so.
+_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+
+
+class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
+    """Import the points of PLY, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as objects of loose vertices"""
+
+    bl_idname = "meshfree.import_points"
+    bl_label = "Import Points"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filepath: StringProperty(
+        name="File Path",
+        description="File to import",
+        maxlen=1024,
+        subtype="FILE_PATH",
+        options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
+    )
+    filter_glob: file_filter(*READABLE, *LASER)
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement,
+        name="Files",
+        description="Names of the files in the folder, if there are several",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+    directory: StringProperty(
+        name="Folder",
+        description="Folder of several files",
+        subtype="DIR_PATH",
+        options={"HIDDEN", "SKIP_SAVE", *_RELATIVE},
+    )
+    up: EnumProperty(
+        name="Up",
+        description="Axis of the file that points upwards",
+        items=[
+            ("Z", "Z", "Coordinates as they are in the file, as in Blender and in surveys"),
+            ("Y", "Y", "Turn the points upright that other programs store with Y upwards"),
+        ],
+        default="Z",
+    )
+    kind: EnumProperty(name="Object", description="What the points become", items=_KINDS, default="MESH")
+    attributes: BoolProperty(
+        name="Attributes",
+        description="Import the other columns too: colors, normals, intensity and so on",
+        default=True,
+    )
+    frame: BoolProperty(
+        name="Frame in View",
+        description="Let the 3D views look at the imported points, unless a script imports them",
+        default=True,
+    )
+
+    @classmethod
+    def obstacle(cls, context):
+        if context.mode == "OBJECT":
+            return ""
+        return "Points are imported in Object Mode. Switch to Object Mode first"
+
+    def invoke(self, context, event):
+        self._attended = True
+        return self.invoke_popup(context)
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        for name in ("up", "kind", "attributes", "frame"):
+            layout.prop(self, name)
+
+    def execute(self, context):
+        attended = self.takes_window()
+        self._framed = False
+        names = [item.name for item in self.files if item.name]
+        folder = Path(bpy.path.abspath(self.directory))
+        self._paths = paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
+        try:
+            if attended:
+                self._framed = self.frame
+                return self.start(context, [], lambda progress: _read_all(paths, progress))
+            with Stages(context.window_manager, self.bl_label) as stages:
+                tables = _read_all(paths, stages)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return self.finish(context, [], tables, stages.seconds)
+
+    def finish(self, context, objects, results, seconds):
+        """Add an object for each table."""
+        reason = self.obstacle(context)
+        if reason:  # while the files were read
+            self.report({"ERROR"}, reason)
+            return {"CANCELLED"}
+        for other in context.selected_objects:
+            other.select_set(False)
+        shared = known_offset(context.scene)
+        for path, table in zip(self._paths, results, strict=True):
+            turned = _turned_up(table) if self.up == "Y" else table
+            obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
+            obj.select_set(True)
+            context.view_layer.objects.active = obj
+            self._tell(obj, table, shared)
+            if shared is None and OFFSET in obj:
+                shared = offset_of(obj)
+        if self.kind == "POINTCLOUD":
+            meshes = [obj.data for obj in context.selected_objects]
+            bpy.ops.object.convert(target="POINTCLOUD")
+            bpy.data.batch_remove(meshes)
+        if self._framed:
+            _frame_selected(context)
+        return {"FINISHED"}
+
+    def _tell(self, obj, table, shared):
+        """Report what was imported, and what became of its coordinates."""
+        for notice in table.notices:
+            self.report({"WARNING"}, notice)
+        offset = offset_of(obj)
+        if offset.any():
+            shift = ", ".join(f"{-value:.10g}" for value in offset)
+            text = f"{obj.name}: {len(table.points):,} points, shifted by ({shift})"
+        else:
+            text = f"{obj.name}: {len(table.points):,} points"
+        self.report({"INFO"}, text)
+        if shared is not None and (offset != shared).any():
+            text = f"{obj.name} is too far from the points imported before to share their shift"
+            self.report({"WARNING"}, text)
+
+
+def _frame_selected(context):
+    """Let all 3D views of the window look at what is selected."""
+    for area in context.window.screen.areas:
+        if area.type == "VIEW_3D":
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            with context.temp_override(area=area, region=region):
+                bpy.ops.view3d.view_selected()
+
+
+def _read_all(paths, progress):
+    """Read some files, those that were just read from memory: Adjust Last Operation imports them again."""
+    tables = []
+    for number, path in enumerate(paths):
+        progress("Read", number / len(paths))
+        state = path.stat() if path.is_file() else None
+        key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
+        tables.append(cache.fetch(key, lambda path=path: read_points(path)))
+    return tables
+
+
+def _turned_up(table):
+    """Return a table with what points along Y turned towards Z."""
+    vectors = {name: _turned(values) for name, values in table.attributes.items() if values.ndim == 2}
+    return replace(table, points=_turned(table.points), attributes={**table.attributes, **vectors})
+
+
+def _turned(vectors):
+    return vectors[:, [0, 2, 1]] * np.array([1.0, -1.0, 1.0], vectors.dtype)
+
+
+CLASSES = (MESHFREE_OT_import_points,)

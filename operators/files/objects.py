@@ -1,0 +1,293 @@
+"""Objects of point files and point files of objects, for the menus and the command line."""
+
+import bpy
+import numpy as np
+from bpy.props import StringProperty
+
+from ...core import PointCloudError
+from ...core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, read_points, replacing, write_points
+from ...core.files.table import NORMAL as FILE_NORMAL
+from ..objects.attributes import (
+    APPLICATIONS,
+    MEAN_CURVATURE,
+    NORMAL,
+    PREFIX,
+    STORABLE,
+    own_positions,
+    read_attribute,
+    type_of,
+    write_attribute,
+)
+from ..objects.reading import TYPES, seen_positions
+
+OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
+INPUTS = (*READABLE, ".blend")
+OUTPUTS = (".blend", *WRITABLE, ".npz")
+_COLORS = ("BYTE_COLOR", "FLOAT_COLOR")
+_LONGEST_NAME = 60  # bytes; Blender's own limit is little above
+
+
+def file_filter(*suffixes):
+    """Return the property that lets file browsers list only names with these endings, to annotate an operator with."""
+    return StringProperty(
+        name="File Filter",
+        description="Names of files that are listed",
+        default=";".join(f"*{suffix}" for suffix in suffixes),
+        options={"HIDDEN"},
+    )
+
+
+def offset_of(obj):
+    """Return what is added to an object's coordinates in the world to get those of its file, (3,) float64."""
+    return np.array(obj.get(OFFSET, (0.0, 0.0, 0.0)), dtype=np.float64)
+
+
+def place_of(obj):
+    """Return what is added to points with the object's scale and rotation to get those of its file, (3,) float64."""
+    return np.array(obj.matrix_world.translation, dtype=np.float64) + offset_of(obj)
+
+
+def known_offset(scene):
+    """Return the offset of the first object of a scene that has one, which others share if they can; or None."""
+    return next((offset_of(obj) for obj in scene.objects if OFFSET in obj), None)
+
+
+def add_object(name, table, collection, known=None, with_attributes=True):
+    """Add an object of loose vertices.
+
+    Its coordinates are those of the table less an offset, which the object keeps in double precision.
+
+    Parameters
+    ----------
+    name : str
+    table : PointTable
+    collection : bpy.types.Collection
+    known : ndarray, (3,), optional
+        The offset of other objects, taken if the points are near enough.
+    with_attributes : bool
+        Whether the other columns come along, too.
+
+    Returns
+    -------
+    bpy.types.Object
+    """
+    origin = choose_origin(table.points, known)
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(table.points))
+    mesh.attributes["position"].data.foreach_set("vector", (table.points - origin).astype(np.float32).reshape(-1))
+    if with_attributes:
+        for column, values in table.attributes.items():
+            _add_attribute(mesh, column, values)
+        if table.colors is not None:
+            layer = mesh.color_attributes.new("Color", "BYTE_COLOR", "POINT")
+            layer.data.foreach_set("color_srgb", table.colors.reshape(-1))
+    mesh.update()
+    obj = bpy.data.objects.new(name, mesh)
+    if origin.any():
+        obj[OFFSET] = origin.tolist()
+    collection.objects.link(obj)
+    return obj
+
+
+def _add_attribute(mesh, name, values):
+    """Add a column of a file as an attribute; our own by the types that they have."""
+    if values.ndim == 2:
+        kind = "FLOAT_VECTOR"
+    elif name.startswith(PREFIX) and type_of(name) != "FLOAT_VECTOR":
+        kind = type_of(name)
+    else:
+        kind = "INT" if np.can_cast(values.dtype, np.int32) and values.dtype != bool else "FLOAT"
+    name = name.encode()[:_LONGEST_NAME].decode(errors="ignore")
+    layer = None if name in mesh.attributes else mesh.attributes.new(name, kind, "POINT")
+    if layer is None:  # Blender keeps a few names for itself, each for one type
+        layer = mesh.attributes.new(f"file_{name}", kind, "POINT")
+    write_attribute(mesh, layer.name, values, kind)
+
+
+def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
+    """Return an object's points as they are seen, in the world and before the shift by an import, with attributes.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    obj : bpy.types.Object
+    attributes : {"ALL", "RESULTS", "NONE"}
+        RESULTS are those of this extension alone.
+    with_colors : bool
+        Whether the color attribute comes along.
+
+    Returns
+    -------
+    PointTable
+        With normals of the world. `single` tells that single precision does for the coordinates.
+    """
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    table = PointTable(seen_positions(context, obj).astype(np.float64) @ matrix.T + place_of(obj))
+    table.single = not (OFFSET in obj or is_coarse(table.points))
+    data = obj.data
+    names = [layer.name for layer in data.attributes if _is_column(layer)] if attributes != "NONE" else []
+    if attributes == "RESULTS":
+        names = [name for name in names if name.startswith(PREFIX)]
+    for name in names:
+        table.attributes[name] = read_attribute(data, name)
+    vectors = [name for name in (NORMAL, FILE_NORMAL) if np.ndim(table.attributes.get(name)) == 2]
+    normals = [table.attributes.pop(name) for name in vectors]
+    if normals:
+        table.attributes[FILE_NORMAL] = _world_normals(normals[0], matrix)
+    if with_colors:
+        table.colors = _read_colors(data)
+    return table
+
+
+def _is_column(layer):
+    hidden = layer.name.startswith(".") or layer.name == "position"
+    return not hidden and layer.domain == "POINT" and layer.data_type in STORABLE
+
+
+def _world_normals(normals, matrix):
+    """Turn local normals into unit normals of the world, by cofactors, which objects scaled to nothing have too."""
+    cofactors = np.stack([np.cross(matrix[i - 2], matrix[i - 1]) for i in range(3)])
+    world = normals.astype(np.float64) @ cofactors.T * (-1.0 if np.linalg.det(matrix) < 0.0 else 1.0)
+    length = np.linalg.norm(world, axis=1, keepdims=True)
+    return (world / np.where(length > 0.0, length, 1.0)).astype(np.float32)
+
+
+def _read_colors(data):
+    """Read the active color attribute of a mesh, or else the first one on points, (n, 4); None without one."""
+    layers = [layer for layer in data.attributes if layer.data_type in _COLORS and layer.domain == "POINT"]
+    if not layers:
+        return None
+    active = data.color_attributes.active_color_name if isinstance(data, bpy.types.Mesh) else ""
+    layer = next((layer for layer in layers if layer.name == active), layers[0])
+    colors = np.empty(4 * len(layer.data), np.float32)
+    layer.data.foreach_get("color_srgb", colors)
+    return np.clip(colors.reshape(-1, 4), 0.0, 1.0)
+
+
+def load(path, name: str = ""):
+    """Open a file in place of everything that is loaded.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        A file of one of the kinds in `INPUTS`.
+    name : str
+        The object's name; empty for the active one, or else the only mesh.
+
+    Returns
+    -------
+    bpy.types.Object
+        The object to work on.
+    list of str
+        What of the file was left out.
+
+    Raises
+    ------
+    PointCloudError
+        There is no such file, or no such object in it, or no points.
+    """
+    notices = []
+    if path.suffix.lower() != ".blend":
+        table = read_points(path)
+        notices = table.notices
+        bpy.ops.wm.read_homefile(use_empty=True)
+        add_object(path.stem, table, bpy.context.scene.collection)
+    elif path.is_file():
+        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
+    else:
+        raise PointCloudError(f"There is no file {path}. Check its name and folder.")
+    return _choose_object(path, name), notices
+
+
+def _choose_object(path, name):
+    bpy.context.view_layer.update()
+    meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
+    active = bpy.context.view_layer.objects.active
+    if not meshes:
+        raise PointCloudError(f"{path} has no mesh object. Give a file with points.")
+    if name:
+        chosen = [obj for obj in meshes if obj.name == name]
+    elif active in meshes:
+        chosen = [active]
+    else:
+        chosen = meshes
+    if len(chosen) != 1:
+        names = ", ".join(obj.name for obj in meshes)
+        raise PointCloudError(
+            (f'{path} has no mesh object "{name}". Name one of its mesh objects with --object: {names}.')
+            if name
+            else (f"{path} has no active mesh object. Name one of its mesh objects with --object: {names}.")
+        )
+    bpy.context.view_layer.objects.active = chosen[0]
+    return chosen[0]
+
+
+def save(path, obj, arrays):
+    """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, the points, or the arrays by name."""
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        save_arrays(path, arrays)
+    elif suffix in WRITABLE:
+        table = point_table(bpy.context, obj)
+        write_points(path, table, double=not table.single)
+    else:
+        for other in bpy.context.view_layer.objects:
+            other.select_set(other == obj)
+        names = [name for name in (*APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
+        if names:
+            bpy.ops.meshfree.colormap(attribute=names[0])
+        path.parent.mkdir(parents=True, exist_ok=True)
+        bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))
+
+
+def save_arrays(path, arrays):
+    """Write arrays by name; an older file stays if that fails."""
+    with replacing(path) as part:
+        np.savez(part, **arrays)
+
+
+def analysis_arrays(place, laplacian, curvature, spectrum) -> dict:
+    """Return all arrays of an analysis, numbers in double precision, lengths and axes of the world.
+
+    Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it.
+
+    Parameters
+    ----------
+    place : ndarray, (3,)
+        Of the object, by `place_of`.
+    laplacian : LaplaceBeltrami
+    curvature : ndarray, (n,)
+        Mean curvature.
+    spectrum : Spectrum or None
+    """
+    stiffness = laplacian.stiffness
+    return {
+        "points": laplacian.points + place,
+        "areas": laplacian.areas,
+        "normals": laplacian.normals,
+        "mean_curvature": curvature,
+        "gaussian_curvature": laplacian.gaussian_curvature,
+        "boundary": laplacian.boundary,
+        "component": laplacian.component,
+        "smoothing_lengths": laplacian.smoothing_lengths,
+        "eigenvalues": np.empty(0) if spectrum is None else spectrum.eigenvalues,
+        "eigenvectors": np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,
+        "format": np.array(b"csr"),
+        "shape": np.array(stiffness.shape),
+        "data": stiffness.data,
+        "indices": stiffness.indices,
+        "indptr": stiffness.indptr,
+    }
+
+
+def attribute_arrays(obj):
+    """Return the points in the world, and what this extension wrote by its names without the lb_."""
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    arrays = {"points": own_positions(obj.data).astype(np.float64) @ matrix.T + place_of(obj)}
+    for attribute in obj.data.attributes:
+        if attribute.name.startswith(PREFIX):
+            arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)
+    for name, values in obj.items():
+        if name.startswith(PREFIX):
+            arrays[name.removeprefix(PREFIX)] = np.array(values)
+    return arrays

@@ -1,0 +1,181 @@
+"""The attributes of this extension: their names and types, and how values get in and out of a mesh."""
+
+from typing import NamedTuple
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...core import PointCloudError
+
+
+class _Storage(NamedTuple):
+    dtype: type
+    components: int
+    key: str  # what foreach_get and foreach_set call the values
+
+
+_STORAGE = {
+    "FLOAT": _Storage(np.float32, 1, "value"),
+    "FLOAT_VECTOR": _Storage(np.float32, 3, "vector"),
+    "INT": _Storage(np.int32, 1, "value"),
+    "BOOLEAN": _Storage(np.bool_, 1, "value"),
+}
+_LAYERS = {"FLOAT": "float", "FLOAT_VECTOR": "float_vector", "INT": "int", "BOOLEAN": "bool"}  # in Edit Mode
+
+SELECTION = ".selection"  # of point clouds, as Blender names it
+PREFIX = "lb_"
+AREA = "lb_area"
+NORMAL = "lb_normal"
+MEAN_CURVATURE = "lb_mean_curvature"
+GAUSSIAN_CURVATURE = "lb_gaussian_curvature"
+BOUNDARY = "lb_boundary"
+COMPONENT = "lb_component"
+SEGMENT = "lb_segment"
+FIELD = "lb_field"
+DISTANCE = "lb_distance"
+DISPLACEMENT = "lb_displacement"
+REST = "lb_rest"  # positions before the displacement
+EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
+HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
+RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT  # of every analysis, as in the panel
+APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
+_TYPES = {  # all others are FLOAT
+    **dict.fromkeys((NORMAL, DISPLACEMENT, REST), "FLOAT_VECTOR"),
+    **dict.fromkeys((COMPONENT, SEGMENT), "INT"),
+    BOUNDARY: "BOOLEAN",
+}
+STORABLE = tuple(_STORAGE)
+
+
+def type_of(name: str) -> str:
+    """Type of one of this extension's attributes."""
+    return _TYPES.get(name, "FLOAT")
+
+
+def eigenvector_name(mode: int) -> str:
+    """Name of the attribute that holds a mode; modes are counted from 1."""
+    return f"{EIGENVECTOR}{mode:03d}"
+
+
+def mode_number(name: str) -> int:
+    """Number of the mode that an attribute holds; 0 for attributes that hold none."""
+    return _number(name, EIGENVECTOR)
+
+
+def _number(name, prefix):
+    number = name.removeprefix(prefix)
+    return int(number) if name.startswith(prefix) and number.isdecimal() else 0
+
+
+def check_names(obj, names):
+    """Refuse names that a vertex group holds, since attributes and vertex groups share one namespace."""
+    taken = sorted(set(names) & {group.name for group in obj.vertex_groups})
+    if taken:
+        raise PointCloudError(
+            f'Object "{obj.name}" has vertex groups named {", ".join(taken)}, which results need as attribute'
+            " names. Rename these vertex groups."
+        )
+
+
+def point_count(data) -> int:
+    """How many points a mesh or a point cloud has."""
+    return len(data.vertices if isinstance(data, bpy.types.Mesh) else data.points)
+
+
+def own_positions(data):
+    """Read the positions of the points of a mesh or a point cloud, (n, 3) float32."""
+    positions = np.empty((point_count(data), 3), np.float32)
+    data.attributes["position"].data.foreach_get("vector", positions.reshape(-1))
+    return positions
+
+
+def write_own_positions(data, positions):
+    """Move the points of a mesh or a point cloud to these positions, (n, 3)."""
+    data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
+    tag_changed(data)
+
+
+def tag_changed(data):
+    """Tell Blender that the data of a mesh or a point cloud changed."""
+    if isinstance(data, bpy.types.Mesh):
+        data.update()
+    else:
+        data.update_tag()
+
+
+def write_attribute(data, name: str, values, data_type: str = ""):
+    """Write one value per point of a mesh or a point cloud, replacing an attribute of that name.
+
+    Parameters
+    ----------
+    data : bpy.types.Mesh or bpy.types.PointCloud
+    name : str
+    values : array_like, (n,) or (n, 3)
+    data_type : str
+        As Blender names it; empty for that of our own results.
+    """
+    data_type = data_type or type_of(name)
+    storage = _STORAGE[data_type]
+    values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
+    if len(values) != storage.components * point_count(data):
+        raise PointCloudError(
+            f"Attribute {name} got {len(values)} numbers for {point_count(data)} points with"
+            f" {storage.components} each. Analyze the object again."
+        )
+    attribute = data.attributes.get(name)
+    if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, "POINT"):
+        data.attributes.remove(attribute)
+        attribute = None
+    if attribute is None:
+        attribute = data.attributes.new(name, data_type, "POINT")
+    if attribute is None or attribute.name != name:
+        raise RuntimeError(f"Blender made no attribute named {name} on {data.name}")
+    attribute.data.foreach_set(storage.key, values)
+
+
+def read_attribute(data, name: str):
+    """Read an attribute of the points as an array of shape (n,) or (n, 3)."""
+    attribute = data.attributes.get(name)
+    if attribute is None:
+        raise PointCloudError(f'"{data.name}" has no attribute {name}. Analyze the object, or choose another name.')
+    storage = _STORAGE.get(attribute.data_type)
+    if storage is None or attribute.domain != "POINT":
+        raise PointCloudError(
+            f"Attribute {name} has the type {attribute.data_type} on the domain {attribute.domain}. Choose a"
+            " number or a vector on points."
+        )
+    if isinstance(data, bpy.types.Mesh) and data.is_editmode:
+        values = _edited_values(data, name, attribute.data_type)
+    else:
+        values = np.empty((len(attribute.data), storage.components), storage.dtype)
+        attribute.data.foreach_get(storage.key, values.reshape(-1))
+    return values[:, 0] if storage.components == 1 else values
+
+
+def _edited_values(mesh, name, data_type):
+    """Read an attribute of a mesh in Edit Mode, where only its vertices know it, one by one."""
+    edited, storage = bmesh.from_edit_mesh(mesh), _STORAGE[data_type]
+    layers = getattr(edited.verts.layers, _LAYERS[data_type], None)
+    if layers is None:  # truth values in Blender 4.2
+        return _copied_values(edited, name, storage)
+    layer = layers[name]
+    return np.array([vertex[layer] for vertex in edited.verts], storage.dtype).reshape(-1, storage.components)
+
+
+def _copied_values(edited, name, storage):
+    """Read an attribute of a mesh in Edit Mode from a copy."""
+    copy = bpy.data.meshes.new(name)
+    try:
+        edited.to_mesh(copy)
+        values = np.empty((len(copy.vertices), storage.components), storage.dtype)
+        copy.attributes[name].data.foreach_get(storage.key, values.reshape(-1))
+    finally:
+        bpy.data.meshes.remove(copy)
+    return values
+
+
+def remove_numbered(data, prefix: str, beyond: int):
+    """Remove the attributes of a kind that are numbered above `beyond`."""
+    for name in [attribute.name for attribute in data.attributes if _number(attribute.name, prefix) > beyond]:
+        data.attributes.remove(data.attributes[name])

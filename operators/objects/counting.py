@@ -1,0 +1,211 @@
+"""How many points are in groups, and a checksum of which.
+
+To read a vertex group takes Blender 0.25 s for 100,000 points, too much for a panel. So the window counts larger ones
+bit by bit, between other events, and shows what was counted last until then.
+"""
+
+import zlib
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ..running.handlers import add_handlers, remove_handlers
+from ..running.stages import redraw_panels
+from .attributes import point_count
+from .groups import group_weights, has_group
+
+_AT_ONCE = 5_000  # points of which all groups are read when a panel is drawn
+_PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
+_BIT = 0.008  # seconds that the window is kept waiting
+_PAUSE = 0.01  # seconds in between
+_CHUNK = 500  # points
+_MOST = 50  # objects that are remembered
+
+
+class Members(NamedTuple):
+    """Which points a group gives a weight above zero.
+
+    Attributes
+    ----------
+    count : int
+        How many.
+    checksum, weighted : int
+        Checksum of which ones, and one that their weights count in, too.
+    bits : bytes
+        One for each point, packed.
+    """
+
+    count: int = 0
+    checksum: int = 0
+    weighted: int = 0
+    bits: bytes = b""
+
+    @property
+    def rows(self):
+        """Indices of the points, (count,)."""
+        return np.flatnonzero(np.unpackbits(np.frombuffer(self.bits, np.uint8)))
+
+
+def summarize(weights) -> Members:
+    """Tell which points have a weight above zero, given all, (n,)."""
+    inside = weights > 0.0
+    if not inside.any():
+        return Members()
+    weighted = zlib.crc32(np.where(inside, weights, 0.0).astype(np.float32))
+    return Members(np.count_nonzero(inside), zlib.crc32(inside), weighted, np.packbits(inside).tobytes())
+
+
+@dataclass
+class _Known:
+    """What was counted of an object in some mode and with so many points."""
+
+    state: tuple
+    members: dict = field(default_factory=dict)
+    until: dict = field(default_factory=dict)
+
+
+@dataclass
+class _Pass:
+    """One pass over the vertices of an object, to count some groups; undo does not reach it."""
+
+    names: list
+    weights: np.ndarray
+    place: int = 0
+    seconds: float = 0.0
+
+
+_known = {}  # by session_uid
+_wanted = {}  # names of groups to count, by session_uid
+_passes = {}  # by session_uid
+
+
+def members(obj, name: str, glance=False, trusting=False) -> Members | None:
+    """Tell to which points a group gives a weight above zero.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name : str
+        The group; one that is missing has no points.
+    glance : bool
+        Be quick: a change may be missed for some seconds, and what was never counted is None until it is.
+    trusting : bool
+        Be quicker: for a glance take what was counted last, however long ago, unless it was undone or changed by us.
+    """
+    if not has_group(obj, name):
+        return Members()
+    if obj.type != "MESH":
+        return summarize(group_weights(obj, name))
+    known = _recall(obj)
+    until = known.until.get(name, 0.0)
+    if glance and name in known.members and until and (trusting or perf_counter() < until):
+        return known.members[name]
+    if glance and not bpy.app.background and point_count(obj.data) > _AT_ONCE:
+        _wanted.setdefault(obj.session_uid, set()).add(name)
+        if not bpy.app.timers.is_registered(_tick):
+            bpy.app.timers.register(_tick, first_interval=_PAUSE)
+        return known.members.get(name)
+    began = perf_counter()
+    known.members[name] = summarize(group_weights(obj, name))
+    known.until[name] = perf_counter() + _PATIENCE * (perf_counter() - began)
+    return known.members[name]
+
+
+def renew_counts(obj):
+    """Count the groups of an object again, since they were changed."""
+    _passes.pop(obj.session_uid, None)
+    if obj.session_uid in _known:
+        _known[obj.session_uid].until.clear()
+
+
+def _recall(obj):
+    """Return what is known of an object; of an earlier state only to be shown until it is counted again."""
+    state = point_count(obj.data), obj.mode == "EDIT"
+    known = _known.get(obj.session_uid)
+    if known is None or known.state != state:
+        if len(_known) > _MOST:
+            _known.clear()
+        kept = known.members if known is not None and known.state[0] == state[0] else {}
+        known = _known[obj.session_uid] = _Known(state, kept)
+    return known
+
+
+def _tick():
+    """Go on counting for a moment; a timer of the window."""
+    objects = {obj.session_uid: obj for obj in bpy.data.objects if obj.session_uid in _wanted}
+    for uid in [*_wanted]:
+        if uid not in objects or objects[uid].type != "MESH":
+            _wanted.pop(uid), _passes.pop(uid, None)
+    for uid, obj in objects.items():
+        if uid in _wanted and _go_on(obj):
+            redraw_panels(bpy.context.window_manager)
+    return _PAUSE if _wanted else None
+
+
+def _go_on(obj) -> bool:
+    """Count a bit more of an object; return whether all is counted."""
+    uid, count = obj.session_uid, point_count(obj.data)
+    work = _passes.get(uid)
+    if work is None or work.weights.shape[1] != count or any(not has_group(obj, name) for name in work.names):
+        names = [name for name in _wanted[uid] if has_group(obj, name)]
+        work = _passes[uid] = _Pass(names, np.zeros((len(names), count), np.float32))
+    rows = {obj.vertex_groups[name].index: row for row, name in enumerate(work.names)}
+    began = perf_counter()
+    while work.place < count and perf_counter() < began + _BIT:
+        chunk = obj.data.vertices[work.place : work.place + _CHUNK]
+        held = [
+            (rows[item.group], index, item.weight)
+            for index, vertex in enumerate(chunk, start=work.place)
+            for item in vertex.groups
+            if item.group in rows and item.weight > 0.0
+        ]
+        if held:
+            row, index, weight = zip(*held, strict=True)
+            work.weights[row, index] = weight
+        work.place += len(chunk)
+    work.seconds += perf_counter() - began
+    if work.place < count:
+        return False
+    del _passes[uid]
+    known = _recall(obj)
+    for name, weights in zip(work.names, work.weights, strict=True):
+        known.members[name] = summarize(weights)
+        known.until[name] = perf_counter() + _PATIENCE * work.seconds
+    _wanted[uid] -= set(work.names)
+    _wanted[uid] = {name for name in _wanted[uid] if has_group(obj, name)}
+    if not _wanted[uid]:
+        del _wanted[uid]
+    return True
+
+
+@persistent
+def _undone(*_):
+    _passes.clear()
+    for known in _known.values():
+        known.until.clear()
+
+
+@persistent
+def _forget(*_):
+    for kept in (_known, _wanted, _passes):
+        kept.clear()
+
+
+_HANDLERS = {"undo_post": _undone, "redo_post": _undone, "load_pre": _forget}
+
+
+def attach():
+    """Count again what undo has changed, and forget what was counted of another file."""
+    add_handlers(_HANDLERS)
+
+
+def detach():
+    """Stop counting, and leave no handler and no timer behind."""
+    remove_handlers(_HANDLERS)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    _forget()

@@ -1,0 +1,91 @@
+"""Settings of the deformation of each object: `Object.meshfree.deform`."""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..deform import live
+from ..deform.binding import forget_bound
+from .groups import ANCHOR, HANDLE
+
+
+class MESHFREE_PG_handle(bpy.types.PropertyGroup):
+    """What moves one group of handles"""
+
+    has_empty: BoolProperty(
+        name="Has Empty", description="An empty moves the points; otherwise they are moved in Edit Mode"
+    )
+    empty: PointerProperty(type=bpy.types.Object, name="Empty", description="The object that moves the points")
+    rest: FloatVectorProperty(
+        name="Rest Matrix", description="Matrix of the empty in the object's space when it was bound", size=16
+    )
+
+
+class MESHFREE_PG_deform(bpy.types.PropertyGroup):
+    """Deformation of one object by handles"""
+
+    handles: StringProperty(
+        name="Handles",
+        description="Group with the points that are moved; groups of this name with a number are handles of their own",
+        default=HANDLE,
+    )
+    anchors: StringProperty(
+        name="Anchors", description="Group with the points that stay; may be missing", default=ANCHOR
+    )
+    add_empties: BoolProperty(
+        name="Add Empties",
+        description="Add an empty to each group of handles, which moves, turns and scales it; without one they are"
+        " moved in Edit Mode",
+        default=True,
+    )
+    rotation_aware: BoolProperty(
+        name="Turn Details",
+        description="Let details turn with the surface, as bending asks for",
+        default=True,
+        update=live.settings_changed,
+    )
+    soft: BoolProperty(
+        name="Soft",
+        description="Let handles and anchors give way to a smoother surface",
+        default=False,
+        update=live.settings_changed,
+    )
+    weight: FloatProperty(
+        name="Weight",
+        description="How strongly soft handles and anchors are pulled, in units of the surface's own resistance; the"
+        " weights of their groups multiply it",
+        default=1.0,
+        min=0.0,
+        soft_max=100.0,
+        update=live.settings_changed,
+    )
+    steps: IntProperty(
+        name="Steps",
+        description="Most steps in which the turns of details are found; it stops when nothing moves any more",
+        default=30,
+        min=1,
+        soft_max=100,
+        update=live.settings_changed,
+    )
+
+    # What the object is bound with.
+    is_bound: BoolProperty(name="Bound", description="The object follows its handles", update=forget_bound)
+    handle_items: CollectionProperty(
+        type=MESHFREE_PG_handle, name="Handles", description="What moves the groups of handles"
+    )
+    binding_id: StringProperty(name="Binding", description="Name that no other binding has")
+    point_count: IntProperty(name="Points", description="How many points were bound", min=0)
+    fingerprint: StringProperty(name="Fingerprint", description="Checksum of the points that were bound")
+    groups_used: StringProperty(name="Groups Used", description="Checksum of the groups that were bound")
+    settings_used: StringProperty(name="Settings Used", description="Settings of the operator when it was bound")
+    matrix: FloatVectorProperty(name="Matrix", description="Scale and shear when it was bound", size=9)
+
+
+CLASSES = (MESHFREE_PG_handle, MESHFREE_PG_deform)

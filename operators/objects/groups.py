@@ -1,0 +1,151 @@
+"""Groups of points: vertex groups of meshes; on point clouds, which have none, attributes of truth or weight."""
+
+import numpy as np
+
+from ...core import PointCloudError
+from .attributes import point_count, read_attribute, tag_changed, write_attribute
+
+HANDLE, ANCHOR, FIXED, SOURCE, VALUE, RIM = ROLES = "Handle", "Anchor", "Fixed", "Source", "Value", "Rim"
+_WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
+
+
+def group_kind(obj) -> str:
+    """What the groups of an object are called in Blender."""
+    return ("vertex group") if obj.type == "MESH" else "attribute"
+
+
+def has_group(obj, name: str) -> bool:
+    """Whether an object has a group of that name."""
+    if obj.type == "MESH":
+        return name in obj.vertex_groups
+    attribute = obj.data.attributes.get(name)
+    return attribute is not None and attribute.data_type in _WEIGHTS and attribute.domain == "POINT"
+
+
+def search_group(layout, settings, name: str, obj):
+    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned."""
+    group = getattr(settings, name)
+    owner, groups = (obj, "vertex_groups") if obj.type == "MESH" else (obj.data, "attributes")
+    awaited = group in ROLES and not has_group(obj, group)
+    layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
+    if awaited:
+        layout.label(text=("No points assigned yet"), icon="INFO")
+
+
+def group_weights(obj, name: str, outside=0.0):
+    """Read the weight of every point in a group, (n,) float64; those outside get a number of their own.
+
+    On a point cloud the points outside are those of weight 0.
+    """
+    if obj.type != "MESH":
+        weights = read_attribute(obj.data, name).astype(np.float64)
+        return np.where(weights == 0.0, outside, weights)
+    index = obj.vertex_groups[name].index
+    held = (
+        next((item.weight for item in vertex.groups if item.group == index), outside) for vertex in obj.data.vertices
+    )
+    return np.fromiter(held, np.float64, count=point_count(obj.data))
+
+
+def is_chosen(obj, name: str, default: str) -> bool:
+    """Whether a setting names a group that must be there: any but the default, which may be missing."""
+    return bool(name) and (has_group(obj, name) or name != default)
+
+
+def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
+    """Read the weights in the group that a setting names.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name : str
+        The group.
+    setting : str
+        What the panel calls the setting, for the texts of errors.
+    least : int
+        How many points must have a weight above zero.
+    outside : float
+        What the points outside the group get.
+
+    Returns
+    -------
+    ndarray, (n,) float64
+
+    Raises
+    ------
+    PointCloudError
+        There is no such group, or too little in it.
+    """
+    kind = group_kind(obj)
+    if not has_group(obj, name):
+        if not name:
+            raise PointCloudError(
+                f'"{obj.name}" has no {setting} chosen. Choose a group; Assign to Group makes one from the'
+                " points selected in Edit Mode."
+            )
+        what = kind if obj.type == "MESH" else f"{kind} of truth values or numbers on points"
+        raise PointCloudError(f'"{obj.name}" has no {what} named "{name}". Choose another {setting}, or clear it.')
+    weights = group_weights(obj, name, outside)
+    count = np.count_nonzero(weights > 0.0)
+    if count < least:
+        raise PointCloudError(
+            f'The {kind} "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting}'
+            f" takes at least {least}. Assign points to it in Edit Mode, or clear {setting}."
+        )
+    return weights
+
+
+def chosen_members(obj, name: str, setting: str, least: int = 1):
+    """Read which points the group that a setting names gives a weight above zero, (n,) bool; see `chosen_weights`."""
+    return chosen_weights(obj, name, setting, least) > 0.0
+
+
+def check_assignable(obj, name: str, must_exist: bool):
+    """Refuse a group that points cannot be assigned to, or removed from."""
+    kind, exists = group_kind(obj), has_group(obj, name)
+    if must_exist and not exists:
+        raise PointCloudError(f'"{obj.name}" has no {kind} named "{name}" to remove points from. Choose another.')
+    if name in obj.data.attributes and not (exists and obj.type != "MESH"):
+        reason = ("vertex groups share their names") if obj.type == "MESH" else ("it holds no weights")
+        raise PointCloudError(
+            f'"{obj.name}" has an attribute named "{name}", and {reason}. Choose another name, or rename the attribute.'
+        )
+    if obj.type == "MESH" and exists and obj.vertex_groups[name].lock_weight:
+        raise PointCloudError(
+            f'The vertex group "{name}" of "{obj.name}" is locked. Unlock it, or choose another name.'
+        )
+
+
+def assign(obj, name: str, chosen, action: str, weight: float):
+    """Change a group, or make it.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name : str
+        The group; see `check_assignable`.
+    chosen : ndarray, (n,) bool
+        The points.
+    action : {"REPLACE", "ADD", "REMOVE"}
+        What becomes of them and of those that the group holds already.
+    weight : float
+        Of the points in the group.
+    """
+    if obj.type == "MESH":
+        group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)
+        indices = np.flatnonzero(chosen).tolist()
+        if action == "REPLACE":
+            group.remove(range(len(chosen)))
+        if action == "REMOVE":
+            group.remove(indices)
+        else:
+            group.add(indices, weight, "REPLACE")
+        obj.vertex_groups.active = group
+    else:
+        exists = has_group(obj, name)
+        weights = group_weights(obj, name) if exists and action != "REPLACE" else np.zeros(len(chosen))
+        weights[chosen] = 0.0 if action == "REMOVE" else weight
+        weighted = exists and obj.data.attributes[name].data_type == "FLOAT"
+        plain = np.isin(weights, (0.0, 1.0)).all() and not weighted
+        write_attribute(obj.data, name, weights, "BOOLEAN" if plain else "FLOAT")
+        tag_changed(obj.data)

@@ -1,0 +1,137 @@
+"""The extension's own modifiers: node groups that a custom property marks, and the inputs of their modifiers."""
+
+import bpy
+
+from ...core import PointCloudError
+
+DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
+DEFORM_TAG = "meshfree_deform"  # the same of our own deformation
+_INPUTS = "meshfree_inputs"  # custom property of the nodes: identifiers of the inputs by the names that we gave them
+_OF_WINDOW = {"is_active", "use_pin_to_last"}  # what of a modifier changes nothing
+
+
+def is_display(modifier) -> bool:
+    """Whether a modifier is the extension's own display."""
+    return _is_tagged(modifier, DISPLAY_TAG)
+
+
+def is_deform(modifier) -> bool:
+    """Whether a modifier is the extension's own deformation."""
+    return _is_tagged(modifier, DEFORM_TAG)
+
+
+def is_own(modifier) -> bool:
+    """Whether a modifier is the extension's own: what operators read comes before all of these."""
+    return is_display(modifier) or is_deform(modifier)
+
+
+def _is_tagged(modifier, tag):
+    group = modifier.node_group if modifier.type == "NODES" else None
+    return group is not None and tag in group and is_intact(group)
+
+
+def is_intact(group) -> bool:
+    """Whether nodes of ours still have all their inputs, whatever these are called now."""
+    return set(group.get(_INPUTS, {}).values()) <= _inputs(group).keys()
+
+
+def _inputs(group):
+    """Names of the inputs of a node group by their identifiers."""
+    items = [item for item in group.interface.items_tree if item.item_type == "SOCKET" and item.in_out == "INPUT"]
+    return {item.identifier: item.name for item in items}
+
+
+def new_group(name: str, tag: str):
+    """Add an empty node group for a modifier, marked as ours, with geometry going in and out."""
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group[tag] = True
+    group.is_modifier = True
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    return group
+
+
+def add_input(group, name: str, kind: str, description: str):
+    """Add an input to a node group of ours, which is found again should somebody rename it; return its socket."""
+    socket = group.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}", description=description)
+    known = group.get(_INPUTS, {})
+    group[_INPUTS] = {**known, name: socket.identifier}
+    return socket
+
+
+def add_node(tree, kind, column, y, **properties):
+    """Add a node at a place in the editor, with properties set."""
+    node = tree.nodes.new(kind)
+    node.location = (200 * column, y)
+    for name, value in properties.items():
+        setattr(node, name, value)
+    return node
+
+
+def get_input(modifier, name: str):
+    """Value of an input of a modifier of ours."""
+    data, path = input_property(modifier, name)
+    return getattr(data, path) if path == "value" else modifier[path[2:-2]]
+
+
+def set_input(modifier, name: str, value):
+    """Set an input of a modifier of ours."""
+    data, path = input_property(modifier, name)
+    if path == "value":
+        data.value = value
+    else:
+        data[path[2:-2]] = value
+
+
+def input_property(modifier, name: str):
+    """Return data and property path of an input of a modifier of ours, as `layout.prop` takes them.
+
+    Raises
+    ------
+    PointCloudError
+        Somebody has removed it.
+    """
+    group = modifier.node_group
+    named = _inputs(group)
+    identifier = group.get(_INPUTS, {}).get(name)
+    if identifier is None:  # of nodes that an earlier version made
+        identifier = next((key for key, label in named.items() if label == name), None)
+    if identifier not in named:
+        raise PointCloudError(
+            f'The nodes "{group.name}" have no input "{name}" any more. Undo that, or delete these nodes and'
+            " use again the button that added them."
+        )
+    return _input(modifier, identifier)
+
+
+def _input(modifier, identifier):
+    if hasattr(modifier, "properties"):  # Blender 5.2 on
+        return getattr(modifier.properties.inputs, identifier), "value"
+    return modifier, f'["{identifier}"]'
+
+
+def modifier_settings(modifier) -> dict:
+    """Read the settings of a modifier that change what it does, in a form that can be compared as text.
+
+    Of other data, such as an object, a texture or nodes, it is known which ones they are, not what is in them.
+    """
+    settings = {}
+    for item in modifier.bl_rna.properties:
+        name = item.identifier
+        hidden = name in _OF_WINDOW or (name.startswith("show_") and name != "show_viewport")
+        if not (item.is_readonly or hidden or item.type == "COLLECTION"):
+            settings[name] = _plain(getattr(modifier, name))
+    if modifier.type == "NODES" and modifier.node_group is not None:
+        for identifier in _inputs(modifier.node_group):
+            data, path = _input(modifier, identifier)
+            if path == "value":
+                settings[identifier] = _plain(getattr(data, path, None))
+            else:
+                settings[identifier] = _plain(modifier.get(identifier))
+    return settings
+
+
+def _plain(value):
+    if isinstance(value, bpy.types.ID):
+        return value.name_full
+    return tuple(map(_plain, value)) if hasattr(value, "__len__") and not isinstance(value, str | set) else value

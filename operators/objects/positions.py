@@ -1,0 +1,88 @@
+"""Move the points of an object: in place, or by a shape key."""
+
+import numpy as np
+from bpy.props import EnumProperty
+
+from ...core import PointCloudError
+from .attributes import own_positions, write_own_positions
+from .modifiers import is_own
+from .reading import key_positions, shape_keys
+
+TARGETS = (
+    ("SHAPE_KEY", "Shape Key", "Add a shape key, whose value mixes the result with the points as they were"),
+    ("IN_PLACE", "In Place", "Move the points themselves"),
+)
+
+
+def target_property():
+    """Return the property of an operator that says where moved points go."""
+    return EnumProperty(
+        name="Result",
+        description="Where the moved points go; point clouds have no shape keys and are moved in place",
+        items=TARGETS,
+        default="SHAPE_KEY",
+    )
+
+
+def check_movable(obj, target: str):
+    """Refuse an object whose points cannot be moved to given places, before anything is computed."""
+    if obj.meshfree.use_modifiers and any(not is_own(item) for item in obj.modifiers):
+        raise PointCloudError(
+            f'The points of "{obj.name}" were read after its modifiers, and cannot be written back before'
+            " them. Turn off Use Modifiers, or apply the modifiers."
+        )
+    keys = shape_keys(obj)
+    if keys is not None and target == "IN_PLACE":
+        raise PointCloudError(
+            f'"{obj.name}" has shape keys, so that moving its points in place would not be seen. Choose Shape'
+            " Key as the result, or apply the shape keys."
+        )
+    if keys is not None and not keys.use_relative:
+        raise PointCloudError(
+            f'The shape keys of "{obj.name}" are absolute. Turn on Relative, so that a key can be added to them.'
+        )
+    if keys is not None and obj.show_only_shape_key:
+        raise PointCloudError(
+            f'"{obj.name}" shows its active shape key alone, which hides a new one. Turn off Solo Active Shape'
+            " Key (pin icon)."
+        )
+
+
+def write_positions(obj, reading, points, target: str, name: str):
+    """Move the points to given places.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    reading : Reading
+        How the points were read.
+    points : ndarray, (n, 3)
+        Their new places, as `reading.points`.
+    target : str
+        One of `TARGETS`.
+    name : str
+        Of the shape key; Blender adds a number if there is one already.
+
+    Returns
+    -------
+    bpy.types.ShapeKey or None
+    """
+    moved = reading.local(points - reading.points)
+    if target == "IN_PLACE" or obj.type != "MESH":
+        write_own_positions(obj.data, own_positions(obj.data) + moved)
+        return None
+    key = add_key(obj, name, moved)
+    key.value = 1.0
+    return key
+
+
+def add_key(obj, name: str, moved):
+    """Add a shape key of value 0 that moves the points by so much, (n, 3), beside what the other keys do."""
+    if obj.data.shape_keys is None:
+        obj.shape_key_add(name="Basis", from_mix=False)
+    key = obj.shape_key_add(name=name, from_mix=False)
+    key.value = 0.0
+    positions = key_positions(obj.data.shape_keys.reference_key) + moved
+    key.points.foreach_set("co", positions.astype(np.float32).reshape(-1))
+    obj.data.update()
+    return key

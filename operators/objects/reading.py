@@ -1,0 +1,231 @@
+"""From a Blender object to its points, in lengths of the world."""
+
+import zlib
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...core import PointCloudError, check_points
+from ...core.geometry.boundary import FEWEST
+from .attributes import own_positions, point_count
+from .counting import members
+from .groups import chosen_members
+from .modifiers import is_own, modifier_settings
+
+TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
+_CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
+
+
+def shape_keys(obj):
+    """Return the shape keys of an object, or None; point clouds have none."""
+    return obj.data.shape_keys if obj.type == "MESH" else None
+
+
+def obstacle(obj, modes=("OBJECT",)) -> str:
+    """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
+    if obj is None:
+        return "No active object. Select a mesh with the points of a surface"
+    if obj.type == "EMPTY" and obj.instance_collection is not None:
+        return (
+            f'"{obj.name}" shows the collection "{obj.instance_collection.name}". Select an object of that,'
+            " or use Object > Apply > Make Instances Real"
+        )
+    if obj.type not in TYPES:
+        kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
+        article = "an" if kind[0] in "AE" else "a"
+        way = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
+        return f'"{obj.name}" is {article} {kind}, not a Mesh. {way} a mesh'
+    if not obj.is_editable or not obj.data.is_editable:
+        return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
+    edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
+    if obj.mode not in modes or edited:
+        return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
+    if not point_count(obj.data):
+        kind = "vertices" if obj.type == "MESH" else "points"
+        if obj.meshfree.point_count:  # it had some: Convert takes what modifiers show, and ours shows points
+            return (
+                f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under'
+                " Points and Groups"
+            )
+        return f'"{obj.name}" has no {kind}. Add points, or select another object'
+    return ""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Points of an object.
+
+    Attributes
+    ----------
+    points : ndarray, (n, 3) float64
+        Positions with the object's scale, rotation and shear, but not its location: float64 of small numbers.
+    matrix : ndarray, (3, 3) float64
+        The linear part of the object's matrix: points = local positions @ matrix.T.
+    rim : ndarray, (n,) bool, or None
+        Points at the rim, where the user's vertex group names them.
+    notices : list of str
+        What the user should know about how the object was read.
+    """
+
+    points: np.ndarray
+    matrix: np.ndarray
+    rim: np.ndarray | None = None
+    notices: list = field(default_factory=list)
+
+    def local(self, vectors):
+        """Turn points or shifts as they were read into local ones."""
+        return vectors @ np.linalg.inv(self.matrix).T
+
+    def placed(self, vectors):
+        """Turn local points or shifts into such as were read."""
+        return vectors @ self.matrix.T
+
+    def local_normals(self, normals):
+        """Turn normals of the points into unit normals of the local positions: covectors, so by M^T, not M^-1."""
+        local = normals @ self.matrix
+        return local / np.linalg.norm(local, axis=1, keepdims=True)
+
+
+def read_points(context, obj) -> Reading:
+    """Read an object's points as the user sees them, apart from modifiers that are not asked for.
+
+    Raises
+    ------
+    PointCloudError
+        The points cannot be read or used as they are; the text says what to do.
+    """
+    positions = seen_positions(context, obj)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    if not np.linalg.cond(matrix) < 1e6:
+        raise PointCloudError(
+            f'"{obj.name}" is scaled to nothing along an axis, so its {len(positions)} points have no area.'
+            " Give it a scale above zero along each axis."
+        )
+    notices = []
+    if obj.type == "MESH" and obj.data.polygons:
+        faces = len(obj.data.polygons)
+        notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
+    return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
+
+
+def seen_positions(context, obj):
+    """Read the local positions of an object's points as `read_points` takes them, whatever they are, (n, 3) float32."""
+    context.view_layer.update()  # a script may have moved the object a line ago
+    if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
+        return _evaluated_positions(context, obj)
+    return own_positions(obj.data)
+
+
+def rim_points(obj):
+    """Read which points the rim group of an object holds, (n,) bool; None if the settings name no group."""
+    name = obj.meshfree.rim_group
+    return chosen_members(obj, name, ("Rim Group"), FEWEST) if name else None
+
+
+def key_positions(key):
+    """Read the positions that a shape key holds, (n, 3) float32."""
+    positions = np.empty((len(key.points), 3), np.float32)
+    key.points.foreach_get("co", positions.reshape(-1))
+    return positions
+
+
+def _evaluated_positions(context, obj):
+    """Positions after shape keys, and after the modifiers if the settings ask for them; never after our own."""
+    with _left_out([item for item in obj.modifiers if is_own(item) or not obj.meshfree.use_modifiers]):
+        evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+        if not evaluated.is_evaluated:
+            raise PointCloudError(
+                f'"{obj.name}" is disabled in viewports, so its shape keys and modifiers are not computed.'
+                " Enable it in the Outliner (monitor icon)."
+            )
+        if obj.type == "MESH":
+            positions = own_positions(evaluated.to_mesh())
+            evaluated.to_mesh_clear()
+        else:
+            positions = own_positions(evaluated.data)
+    if len(positions) != point_count(obj.data):
+        raise PointCloudError(
+            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)},'
+            " instances not counted, so results have no place. Apply these modifiers, or turn off Use Modifiers."
+        )
+    return positions
+
+
+@contextmanager
+def _left_out(modifiers):
+    """Take modifiers out of the viewport's evaluation, and put them back."""
+    shown = [modifier for modifier in modifiers if modifier.show_viewport]
+    try:
+        for modifier in shown:
+            modifier.show_viewport = False
+        yield
+    finally:
+        for modifier in shown:
+            modifier.show_viewport = True
+
+
+def metric(obj):
+    """Lengths that the object's matrix gives to its local axes, M^T M: rotation and location do not change results."""
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    return matrix.T @ matrix
+
+
+def fingerprint(obj, glance=False, left_out=()) -> str:
+    """Checksum of the positions but those of some points, of shape keys and of the rim group.
+
+    A glance is quick enough for a panel, some milliseconds for 1 million points, may see a change of the rim group
+    some seconds late, and is empty while that has not been counted yet. Of modifiers, if they are used, both see which
+    ones there are and their settings, not what is in other data that these name.
+    """
+    positions = own_positions(obj.data)
+    positions[np.asarray(left_out, dtype=int)] = 0.0
+    checksum = zlib.crc32(positions)
+    keys = shape_keys(obj)
+    if keys is not None:
+        state = [keys.use_relative, keys.eval_time, obj.show_only_shape_key and obj.active_shape_key_index]
+        for block in keys.key_blocks:
+            state += [block.name, block.value, block.mute, block.vertex_group, block.relative_key.name]
+            checksum = zlib.crc32(key_positions(block), checksum)
+        checksum = zlib.crc32(repr(state).encode(), checksum)
+    if obj.meshfree.use_modifiers:
+        state = [modifier_settings(item) for item in obj.modifiers if not is_own(item)]
+        checksum = zlib.crc32(repr(state).encode(), checksum)
+    if obj.meshfree.rim_group:
+        rim = members(obj, obj.meshfree.rim_group, glance)
+        if rim is None:
+            return ""
+        checksum = zlib.crc32(repr(rim.checksum).encode(), checksum)
+    return f"{checksum:08x}"
+
+
+def sharing_objects(obj) -> list:
+    """All other objects that show the same mesh."""
+    if obj.data.users == 1:  # as most of the time, for the panel's sake
+        return []
+    return [other for other in bpy.data.objects if other.data == obj.data and other != obj]
+
+
+def find_object(uid):
+    """Find an object by its session_uid, which neither undo nor another name changes; None if it is gone."""
+    return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
+
+
+def spacing(data) -> float:
+    """Typical distance between neighbouring points of a mesh or a point cloud in local lengths; 0 if unknown."""
+    return typical_distance(own_positions(data))
+
+
+def typical_distance(positions) -> float:
+    """Typical distance between neighbouring points, (n, 3), from 10,000 of them at most; 0 if unknown.
+
+    The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8.
+    """
+    positions = positions[np.isfinite(positions).all(axis=1)]
+    if len(positions) < 9:
+        return 0.0
+    sample = positions[:: 1 + len(positions) // 10_000]
+    distance = np.median(cKDTree(positions).query(sample, k=9)[0][:, 8])
+    return float(distance * np.sqrt(np.pi / 8.0))

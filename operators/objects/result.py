@@ -1,0 +1,137 @@
+"""What an analysis leaves on an object: attributes, eigenvalues, total area, and what tells whether they still hold."""
+
+import bpy
+import numpy as np
+
+from ...core import PointCloudError
+from .attributes import (
+    AREA,
+    BOUNDARY,
+    COMPONENT,
+    EIGENVECTOR,
+    GAUSSIAN_CURVATURE,
+    MEAN_CURVATURE,
+    NORMAL,
+    RESULTS,
+    check_names,
+    eigenvector_name,
+    point_count,
+    remove_numbered,
+    tag_changed,
+    write_attribute,
+)
+from .options import settings_values
+from .reading import fingerprint, metric, sharing_objects
+
+EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
+
+
+def check_writable(obj, names, make_single_user: bool, among=()):
+    """Refuse an object that results cannot be written to, before anything is computed.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    names : iterable of str
+        The attributes that will be written.
+    make_single_user : bool
+        Whether the object gets a mesh of its own.
+    among : sequence of bpy.types.Object
+        Objects that may share the mesh, because they are worked on too: with the same scale, or a mesh of their own.
+    """
+    others = [
+        other.name
+        for other in sharing_objects(obj)
+        if other not in among or not (other.meshfree.make_single_user or same_lengths(metric(other), metric(obj)))
+    ]
+    if others and not make_single_user:
+        shown = ", ".join(f'"{name}"' for name in others[:3]) + (", ..." if len(others) > 3 else "")
+        raise PointCloudError(
+            f'"{obj.name}" shares its mesh with {shown}. Turn on Make Single User to give it a mesh of its own.'
+        )
+    check_names(obj, names)
+
+
+def analysis_names(modes: int) -> list:
+    """Names of the attributes of an analysis with so many modes."""
+    return [*RESULTS, *map(eigenvector_name, range(1, modes + 1))]
+
+
+def write_result(obj, analysis, write_limit: int):
+    """Write an analysis to its object and those that share its mesh; modes up to `write_limit` become attributes."""
+    mesh, owners = obj.data, [obj, *sharing_objects(obj)]
+    if analysis.spectrum is not None:
+        vectors = analysis.spectrum.eigenvectors[:, :write_limit]
+        remove_numbered(mesh, EIGENVECTOR, beyond=vectors.shape[1])
+        for index, vector in enumerate(vectors.T):
+            write_attribute(mesh, eigenvector_name(index + 1), vector)
+        for owner in owners:
+            # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
+            owner[EIGENVALUES] = analysis.spectrum.eigenvalues.tolist()
+    elif is_stale(obj):
+        remove_numbered(mesh, EIGENVECTOR, beyond=0)
+        for owner in owners:
+            owner.pop(EIGENVALUES, None)
+    laplacian = analysis.laplacian
+    write_attribute(mesh, AREA, laplacian.areas)
+    write_attribute(mesh, NORMAL, analysis.local_normals)
+    write_attribute(mesh, MEAN_CURVATURE, analysis.mean_curvature)
+    write_attribute(mesh, GAUSSIAN_CURVATURE, laplacian.gaussian_curvature)
+    write_attribute(mesh, BOUNDARY, laplacian.boundary)
+    write_attribute(mesh, COMPONENT, laplacian.component)
+    for owner in owners:
+        _note_analysis(owner, analysis, settings_values(obj.meshfree))
+    tag_changed(mesh)
+
+
+def _note_analysis(obj, analysis, settings):
+    """Keep on an object what tells of an analysis with some settings."""
+    kept = obj.meshfree
+    kept.total_area = analysis.total_area
+    kept.point_count = point_count(obj.data)
+    for name, count in analysis.counts.items():
+        setattr(kept, name, count)
+    kept.stages.clear()
+    for name, seconds in analysis.seconds.items():
+        stage = kept.stages.add()
+        stage.name, stage.seconds = name, seconds
+    kept.fingerprint = fingerprint(obj)
+    kept.metric = metric(obj).reshape(-1)
+    kept.settings_used = repr(settings)
+
+
+def is_analyzed(obj) -> bool:
+    """Whether the object holds results, stale or not."""
+    return obj.meshfree.fingerprint != ""
+
+
+def is_stale(obj, glance=False) -> bool:
+    """Whether points, scale or settings have changed since the analysis, or the object never had one.
+
+    A glance is quick enough for a panel; see `fingerprint`.
+    """
+    kept = obj.meshfree
+    known = fingerprint(obj, glance)
+    if (known and kept.fingerprint != known) or kept.settings_used != repr(settings_values(kept)):
+        return True
+    return not same_lengths(np.reshape(kept.metric, (3, 3)), metric(obj))
+
+
+def same_lengths(before, now) -> bool:
+    """Whether two metrics give the same lengths."""
+    return np.allclose(before, now, rtol=0.0, atol=1e-5 * np.abs(now).max())
+
+
+def area_text(area: float) -> str:
+    """Write an area in the units of the scene."""
+    return _in_units("AREA", area, 2)
+
+
+def length_text(length: float) -> str:
+    """Write a length in the units of the scene."""
+    return _in_units("LENGTH", length, 1)
+
+
+def _in_units(kind, value, power):
+    units = bpy.context.scene.unit_settings
+    return bpy.utils.units.to_string(units.system, kind, value * units.scale_length**power, precision=6).strip()

@@ -1,0 +1,292 @@
+"""Settings and results of each object: `Object.meshfree`."""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ...ui import show
+from ..running.stages import redraw_views
+from . import deform_settings
+from .color_choices import color_choice
+from .options import DEFAULTS
+
+
+def _recolor(settings, context):
+    show.recolor(settings.id_data)
+
+
+def _recolor_locked(settings, context):
+    """Follow bounds that somebody sets; in other modes they only tell what the range came to."""
+    if settings.range_mode == "LOCKED":
+        show.recolor(settings.id_data)
+
+
+def _resize(settings, context):
+    show.resize(settings.id_data)
+
+
+def _show_groups(settings, context):
+    show.show_groups(settings.id_data)
+    if settings.show_groups:
+        show.use_material_preview(context)
+
+
+def _redraw(settings, context):
+    redraw_views(context.window_manager)
+
+
+class MESHFREE_PG_stage(bpy.types.PropertyGroup):
+    """How long one stage of the last analysis took"""
+
+    seconds: FloatProperty(name="Seconds", description="Time that this stage took, in seconds", min=0.0)
+
+
+class MESHFREE_PG_settings(bpy.types.PropertyGroup):
+    """Settings and results of the Mesh-Free Laplacian for one object"""
+
+    # What results depend on. Names and defaults are those of core's options.
+    bandwidth: EnumProperty(
+        name="Bandwidth",
+        description="How far the kernel of each point reaches",
+        items=(
+            ("ADAPTIVE", "Adaptive", "As far as uneven spacing demands and bends permit, point by point"),
+            ("LOCAL", "Local", "Follows the spacing of the points alone"),
+            ("GLOBAL", "Global", "The same for all points, as in the paper: for even samples"),
+        ),
+        default=DEFAULTS.bandwidth.upper(),
+    )
+    neighbors: IntProperty(
+        name="Neighbors",
+        description="The bandwidth is measured by the distance to this neighbor; more are smoother and slower",
+        default=DEFAULTS.neighbors,
+        min=6,
+        soft_max=200,
+    )
+    bandwidth_factor: FloatProperty(
+        name="Bandwidth Factor",
+        description="Smoothing length as a multiple of the distance to the neighbor above; with Adaptive, as a"
+        " multiple of the length that is chosen",
+        default=DEFAULTS.bandwidth_factor,
+        min=0.05,
+        soft_min=0.3,
+        soft_max=2.0,
+        max=5.0,
+        step=5,
+    )
+    normals: EnumProperty(
+        name="Normals",
+        description="How the normal of a point is estimated from its neighbors",
+        items=(
+            ("QUADRIC", "Quadric", "From a curved surface fitted to the neighbors: the most exact on curved surfaces"),
+            ("WPCA", "Weighted Plane", "From a plane through the neighbors, near ones counting more, as in the paper"),
+            ("PCA", "Plain Plane", "From a plane through the neighbors, all counting alike"),
+        ),
+        default=DEFAULTS.normals.upper(),
+    )
+    areas: EnumProperty(
+        name="Areas",
+        description="How the area of each point is computed",
+        items=(
+            ("FAST", "Fast", "Regularized towards the density of the points, with a lower bound"),
+            ("REGULARIZED", "Regularized", "Least squares with regularization, equation 7 of the paper"),
+            ("CONSTRAINED", "Constrained", "The same with positive areas only, equation 8 of the paper"),
+            ("UNIFORM", "Uniform", "The mean area for every point: only for even samples"),
+        ),
+        default=DEFAULTS.areas.upper(),
+    )
+    regularization: FloatProperty(
+        name="Regularization",
+        description="Weight of the regularization of the areas, free of the object's size",
+        default=DEFAULTS.regularization,
+        min=1e-9,
+        soft_max=1.0,
+        precision=6,
+    )
+    rims: EnumProperty(
+        name="Rims",
+        description="Where the surface ends, if no Rim Group is named",
+        items=(
+            ("AUTO", "Automatic", "Find the points at a rim, and continue the surface beyond it as in a mirror"),
+            ("OFF", "Off (Closed Surface)", "Take the surface as closed, whatever it looks like"),
+        ),
+        default=DEFAULTS.rims.upper(),
+    )
+    sheets: BoolProperty(
+        name="Keep Close Sheets Apart",
+        description="Never take points of two close sheets as neighbors, such as the two sides of a thin wall",
+        default=DEFAULTS.sheets,
+    )
+    projection: EnumProperty(
+        name="Noise",
+        description="Whether noise is smoothed within the computation; your points stay where they are, but sharp"
+        " edges count as rounded",
+        items=(
+            ("AUTO", "Automatic", "Smooth if the measured noise asks for it"),
+            ("OFF", "Off", "Take every point where it is"),
+            ("QUADRIC", "Always", "Take every point onto a curved surface fitted to its neighbors"),
+            ("PLANE", "Tangent Planes (Paper)", "Take every point onto a plane through its neighbors, as in the paper"),
+        ),
+        default=DEFAULTS.projection.upper(),
+    )
+    curvature_correction: BoolProperty(
+        name="Curvature Correction",
+        description="Measure distances along the surface, correct areas and weights for its Gaussian curvature, which"
+        " is 0 everywhere without this, and balance the weights around each point",
+        default=DEFAULTS.curvature_correction,
+    )
+    symbol_correction: BoolProperty(
+        name="Symbol Correction",
+        description="Correct eigenvalues and curvature for the known effect of the kernel's width",
+        default=DEFAULTS.symbol_correction,
+    )
+    rim_group: StringProperty(
+        name="Rim Group",
+        description="Vertex group with the points of the rim, instead of finding them; weights above 0 count",
+    )
+    use_modifiers: BoolProperty(
+        name="Use Modifiers",
+        description="Take the points where the modifiers put them; the modifiers must keep their number and order",
+        default=False,
+    )
+    make_single_user: BoolProperty(
+        name="Make Single User",
+        description="Give the object a mesh of its own if it shares its mesh with other objects",
+        default=False,
+    )
+
+    # Choices of the panel.
+    modes: IntProperty(
+        name="Modes",
+        description="How many vibration modes to compute, the constant one included",
+        default=10,
+        min=1,
+        soft_max=100,
+    )
+    color_map: color_choice("color_map", update=_recolor)
+    reverse: color_choice("reverse", update=_recolor)
+    range_mode: color_choice("range_mode", update=_recolor)
+    coverage: color_choice("coverage", update=_recolor)
+    range_low: FloatProperty(
+        name="From", description="Value of the first color", default=0.0, precision=4, update=_recolor_locked
+    )
+    range_high: FloatProperty(
+        name="To", description="Value of the last color", default=1.0, precision=4, update=_recolor_locked
+    )
+    outside: EnumProperty(
+        name="Out of Range",
+        description="What becomes of points whose values lie outside the range",
+        items=(
+            ("CLAMP", "End Colors", "They have the color of the nearer end"),
+            ("GRAY", "Gray", "They are dark gray"),
+            ("HIDE", "Hidden", "They are not seen, in Material Preview and renders"),
+        ),
+        default="CLAMP",
+        update=_recolor,
+    )
+    iso_lines: IntProperty(
+        name="Iso Lines",
+        description="Dark lines at so many even steps of the color range, such as lines of equal distance; 0 for none",
+        default=0,
+        min=0,
+        soft_max=50,
+        update=_recolor,
+    )
+    component: EnumProperty(
+        name="Vector",
+        description="What of a vector is shown",
+        items=(
+            ("AUTO", "Automatic", "The length of displacements, the direction of normals"),
+            ("DIRECTION", "Direction", "Red, green and blue for the directions x, y and z"),
+            ("LENGTH", "Length", "The length as a number"),
+            ("X", "X", "The x component as a number"),
+            ("Y", "Y", "The y component as a number"),
+            ("Z", "Z", "The z component as a number"),
+        ),
+        default="AUTO",
+        update=_recolor,
+    )
+    point_size: FloatProperty(
+        name="Point Size",
+        description="Radius of the points as a multiple of their spacing, which it follows when they change",
+        default=1.1,
+        min=0.01,
+        soft_max=3.0,
+        max=100.0,
+        step=5,
+        update=_resize,
+    )
+    show_groups: BoolProperty(
+        name="Group Colors",
+        description="Color the points of the groups below, over what is on show",
+        default=False,
+        update=_show_groups,
+    )
+    legend: BoolProperty(
+        name="Legend", description="Draw the colors with their values over the 3D view", default=True, update=_redraw
+    )
+    histogram: BoolProperty(
+        name="Histogram",
+        description="Draw over the 3D view how often each value occurs, with the range of the colors",
+        default=False,
+        update=_redraw,
+    )
+    plot_eigenvalues: BoolProperty(
+        name="Plot", description="Draw the eigenvalues over the 3D view", default=False, update=_redraw
+    )
+    compare_weyl: BoolProperty(
+        name="Weyl's Law",
+        description="Draw a line for comparison at 4 pi k / area, which the eigenvalues of any surface come near to",
+        default=True,
+        update=_redraw,
+    )
+    spacing: FloatProperty(
+        name="Spacing",
+        description="Typical distance of neighboring points when the Point Size was applied, in local lengths",
+        min=0.0,
+        subtype="DISTANCE",
+    )
+    spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
+
+    deform: PointerProperty(
+        type=deform_settings.MESHFREE_PG_deform, name="Deform", description="How the object follows handles"
+    )
+
+    # Results of the last analysis, for the panel and for scripts.
+    total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
+    point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
+    part_count: IntProperty(name="Connected Parts", description="How many parts the surface falls into", min=0)
+    rim_count: IntProperty(name="Rim Points", description="How many points lie at a rim of the surface", min=0)
+    left_out_count: IntProperty(
+        name="Points Left Out", description="How many points lie too far apart from others to take part", min=0
+    )
+    stages: CollectionProperty(
+        type=MESHFREE_PG_stage, name="Stages", description="How long each stage of the last analysis took"
+    )
+    fingerprint: StringProperty(name="Fingerprint", description="Checksum of the points that were analyzed")
+    metric: FloatVectorProperty(name="Metric", description="Scale and shear that were analyzed", size=9)
+    settings_used: StringProperty(name="Settings Used", description="Settings of the last analysis")
+
+
+CLASSES = (MESHFREE_PG_stage, *deform_settings.CLASSES, MESHFREE_PG_settings)
+
+
+def attach():
+    """Give every object its settings."""
+    bpy.types.Object.meshfree = PointerProperty(
+        type=MESHFREE_PG_settings,
+        name="Mesh-Free Laplacian",
+        description="Settings and results of the Mesh-Free Laplacian for this object",
+    )
+
+
+def detach():
+    """Take the settings away again."""
+    del bpy.types.Object.meshfree

@@ -1,0 +1,1 @@
+"""Long work: jobs, stages, what is kept of it, and what all operators have in common."""

@@ -1,0 +1,177 @@
+"""What was computed last, so that a change of what is only shown, or how strongly, computes nothing again."""
+
+import hashlib
+from collections import OrderedDict
+from threading import Lock
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ...core import LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature
+
+LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
+_FACTOR = 12  # bytes of each entry of sparse factors: a number and its row
+_kept = OrderedDict()  # value and bytes, by what it was computed from; what was used last at the end
+_sources = WeakKeyDictionary()  # what each operator was built from
+_lock = Lock()  # computations run in threads
+
+
+class Built(NamedTuple):
+    """An operator and the mean curvature computed by it."""
+
+    laplacian: LaplaceBeltrami
+    mean_curvature: np.ndarray
+
+
+def build(points, options, rim, progress) -> Built:
+    """Return the operator of these points, options and rim, built only if it is not kept.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+    options : LaplacianOptions
+    rim : ndarray, (n,) bool, or None
+        The points at the rim; None leaves it to the options.
+    progress : callable
+        Called as ``progress(stage, fraction)``.
+    """
+
+    def compute():
+        laplacian = build_laplacian(points, options=options, boundary=rim, progress=progress)
+        progress("Curvature", 1.0)
+        return Built(laplacian, mean_curvature(laplacian))
+
+    key = content(points, options, rim)
+    built = fetch(key, compute)
+    with _lock:
+        _sources[built.laplacian] = key
+    return built
+
+
+def lowest_modes(laplacian, count: int, progress, fixed_rim=False, raw=False) -> Spectrum:
+    """Return the lowest modes of an operator, computed only if there are not as many from before.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        From `build`.
+    count : int
+    progress : callable
+        Called as ``progress(stage, fraction)``.
+    fixed_rim, raw : bool
+        As of `LaplaceBeltrami.eigenpairs`.
+    """
+    progress("Spectrum", 0.0)
+    key = _modes_key(laplacian, fixed_rim)
+    known = _get(key)
+    if known is None or len(known.eigenvalues) < count:
+        known = laplacian.eigenpairs(count, raw=True, fixed_rim=fixed_rim, progress=progress)
+        _put(key, known)
+    lowest = Spectrum(known.eigenvalues[:count], known.eigenvectors[:, :count])
+    return lowest if raw else laplacian.corrected(lowest)
+
+
+def known_modes(laplacian) -> int:
+    """Return how many modes of an operator are kept."""
+    known = _get(_modes_key(laplacian, False))
+    return 0 if known is None else len(known.eigenvalues)
+
+
+def result(laplacian, *settings, compute):
+    """Return what a function without arguments computes by an operator, called only if that is not kept.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        From `build`.
+    *settings : hashable or ndarray
+        A name, and all else that the result depends on.
+    compute : callable
+    """
+    return fetch(content(_sources[laplacian], *settings), compute)
+
+
+def fetch(key, compute):
+    """Return what is kept for a key; what the function computes, and keep it, if there is nothing."""
+    value = _get(key)
+    if value is None:
+        value = compute()
+        _put(key, value)
+    return value
+
+
+def content(*parts):
+    """Return a key for `fetch` of some parts, hashable or arrays, which go by their content."""
+    return tuple(
+        hashlib.blake2b(np.ascontiguousarray(part)).digest() if isinstance(part, np.ndarray) else part for part in parts
+    )
+
+
+def clear():
+    """Give the memory back."""
+    with _lock:
+        _kept.clear()
+
+
+def attach():
+    """Give the memory back when another file is opened."""
+    bpy.app.handlers.load_pre.append(_forget)
+
+
+def detach():
+    """Leave nothing behind."""
+    bpy.app.handlers.load_pre.remove(_forget)
+    clear()
+
+
+@persistent
+def _forget(*_):
+    clear()
+
+
+def _modes_key(laplacian, fixed_rim):
+    return content(_sources[laplacian], "modes", fixed_rim)
+
+
+def _get(key):
+    with _lock:
+        if key not in _kept:
+            return None
+        _kept.move_to_end(key)
+        return _kept[key][0]
+
+
+def _put(key, value):
+    """Keep a value; of the others, those that were used last as long as there is room."""
+    size = memory(value)
+    with _lock:
+        _kept.pop(key, None)
+        _kept[key] = value, size
+        total = sum(size for _, size in _kept.values())
+        while total > LIMIT and len(_kept) > 1:
+            total -= _kept.popitem(last=False)[1][1]
+
+
+def memory(value) -> int:
+    """Return the bytes of all arrays and factors that a value holds."""
+    total, found, pending = 0, set(), [value]
+    while pending:
+        item = pending.pop()
+        if id(item) in found:
+            continue
+        found.add(id(item))
+        if isinstance(item, np.ndarray):
+            total += item.nbytes
+        elif isinstance(item, dict):
+            pending += item.values()
+        elif isinstance(item, (list, tuple)):
+            pending += item
+        elif hasattr(item, "nnz") and not hasattr(item, "__dict__"):  # factors
+            total += _FACTOR * item.nnz
+        else:
+            pending += vars(item).values() if hasattr(item, "__dict__") else ()
+            pending += [item.__self__] if hasattr(item, "__self__") else ()
+    return total

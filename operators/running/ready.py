@@ -1,0 +1,35 @@
+"""What all operators have in common: they run on objects that can be read and written, and can be undone."""
+
+import bpy
+
+from ..objects.reading import obstacle
+
+
+class ReadyOperator:
+    """An operator for the active object; where that is unfit, the button is gray and its tooltip says why."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    works_in = ("OBJECT",)  # modes of the object
+    _attended = False  # somebody at the window waits for it
+
+    @classmethod
+    def subject(cls, context):
+        """Return the object to work on, or None."""
+        return context.object
+
+    @classmethod
+    def obstacle(cls, context) -> str:
+        """Return what keeps the operator from running, and what to do; empty if nothing does."""
+        return obstacle(cls.subject(context), cls.works_in)
+
+    @classmethod
+    def poll(cls, context):
+        reason = cls.obstacle(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def takes_window(self):
+        """Tell whether to work beside the window, once for each time that somebody started it there."""
+        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
+        return attended and not bpy.app.background

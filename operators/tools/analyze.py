@@ -1,0 +1,138 @@
+"""Areas, normals, curvature, rim and connected parts of the active object's points."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, IntProperty
+
+from ...core import LaplaceBeltrami, Spectrum, UnresolvedModesError
+from ..objects.attributes import point_count
+from ..objects.options import laplacian_options
+from ..objects.reading import read_points
+from ..objects.result import analysis_names, area_text, write_result
+from ..running import cache
+from ..running.application import ShownOperator
+from ..running.stages import Stages, StageTimes
+
+WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each takes 4 bytes per point in the file
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """All that is computed for an object, in lengths of the world; normals in local space too."""
+
+    laplacian: LaplaceBeltrami
+    local_normals: np.ndarray
+    mean_curvature: np.ndarray
+    spectrum: Spectrum | None
+    seconds: dict
+    notices: list
+
+    @property
+    def total_area(self) -> float:
+        """Area of the whole surface."""
+        return float(self.laplacian.areas.sum())
+
+    @property
+    def counts(self) -> dict:
+        """Connected parts, points at a rim and points left out, by the names of the settings that keep them."""
+        component = self.laplacian.component
+        return {
+            "part_count": int(component.max()) + 1,
+            "rim_count": int(np.count_nonzero(self.laplacian.boundary)),
+            "left_out_count": int(np.count_nonzero(component < 0)),
+        }
+
+
+def plan_analysis(context, obj, modes: int = 0):
+    """Read an object; return a function of a progress callback that analyzes it, with the lowest modes if any."""
+    reading = read_points(context, obj)
+    options = laplacian_options(obj.meshfree)
+
+    def compute(progress):
+        with StageTimes(progress) as times:
+            laplacian, curvature = cache.build(reading.points, options, reading.rim, times)
+            spectrum, unresolved = resolved_modes(laplacian, modes, times) if modes else (None, [])
+        notices = reading.notices + laplacian.notices + unresolved
+        return Analysis(
+            laplacian, reading.local_normals(laplacian.normals), curvature, spectrum, times.seconds, notices
+        )
+
+    return compute
+
+
+def analyze_object(context, obj, modes: int = 0) -> Analysis:
+    """Compute all that an analysis gives, with the lowest modes if any are asked for; write nothing."""
+    with Stages(context.window_manager, "Analyze Points") as stages:
+        return plan_analysis(context, obj, modes)(stages)
+
+
+def resolved_modes(laplacian, modes, progress):
+    """Compute the modes asked for, or as many of them as the points resolve and a notice of that."""
+    try:
+        return cache.lowest_modes(laplacian, modes, progress), []
+    except UnresolvedModesError as error:
+        if error.resolved == 0:
+            raise
+        notice = f"Only {error.resolved} of {modes} modes were computed: the others are finer than the points resolve."
+        return cache.lowest_modes(laplacian, error.resolved, progress), [notice]
+
+
+class AnalysisOperator(ShownOperator):
+    """What the operators that analyze objects have in common; `wanted` is how many modes one computes."""
+
+    asks = False
+    adjustable = ("write_limit", "show")
+
+    write_limit: IntProperty(
+        name="Modes to Write",
+        description="Write at most this many modes as attributes; the eigenvalues of all of them are kept",
+        default=WRITE_LIMIT,
+        min=1,
+        max=999,
+    )
+    make_single_user: BoolProperty(
+        name="Make Single User",
+        description="Give the object a mesh of its own if it shares its mesh with other objects",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    @property
+    def writes(self):
+        """Names of the attributes."""
+        return analysis_names(min(self.wanted, self.write_limit))
+
+    def becomes_single(self, obj):
+        return self.make_single_user or super().becomes_single(obj)
+
+    def plan(self, context, obj):
+        return plan_analysis(context, obj, self.wanted)
+
+    def write(self, context, obj, result):
+        write_result(obj, result, self.write_limit)
+        self.warn(result.notices)
+        modes = "" if result.spectrum is None else f", {len(result.spectrum.eigenvalues)} modes"
+        points, seconds = point_count(obj.data), sum(result.seconds.values())
+        return f"{obj.name}: {area_text(result.total_area)} from {points:,} points{modes}, {seconds:.1f} s"
+
+
+class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
+    """Compute area, normal and curvatures of each point, the rim, the connected parts and the total area"""
+
+    bl_idname = "meshfree.analyze"
+    bl_label = "Analyze Points"
+    shown = ""  # what is on show already
+
+    modes: IntProperty(
+        name="Modes", description="Compute this many vibration modes in the same run", default=0, min=0, soft_max=100
+    )
+
+    @property
+    def wanted(self):
+        """How many modes to compute."""
+        return self.modes
+
+
+CLASSES = (MESHFREE_OT_analyze,)

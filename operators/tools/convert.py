@@ -1,0 +1,138 @@
+"""Turn meshes into point clouds and back, with all that this extension keeps on them."""
+
+import re
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+
+from ...core import PointCloudError
+from ..deform.binding import handle_names, is_bound
+from ..objects.attributes import SELECTION, point_count, write_attribute
+from ..objects.counting import renew_counts
+from ..objects.groups import ROLES, group_weights, has_group
+from ..objects.modifiers import get_input, is_display, set_input
+from ..objects.result import check_writable
+from ..running.application import chosen_objects
+from ..running.ready import ReadyOperator
+from .select import selection
+
+_SEGMENT = re.compile(r"Segment \d+")
+
+
+class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
+    """Turn a mesh into a point cloud or back, and keep groups, results and colors; modifiers are applied"""
+
+    bl_idname = "meshfree.convert"
+    bl_label = "Convert Points"
+    since = (4, 5)  # version of Blender
+
+    target: EnumProperty(
+        name="To",
+        description="What the objects become",
+        items=[
+            ("POINTCLOUD", "Point Cloud", "An object of points alone, whose groups are attributes"),
+            ("MESH", "Mesh", "A mesh of vertices alone, whose groups are vertex groups"),
+        ],
+        default="POINTCLOUD",
+    )
+
+    @classmethod
+    def obstacle(cls, context):
+        old = bpy.app.version < cls.since
+        return super().obstacle(context) or (("Meshes become point clouds from Blender 4.5 on") if old else "")
+
+    def execute(self, context):
+        objects = chosen_objects(context, lambda obj: obj.meshfree.make_single_user)[0]
+        objects = [obj for obj in objects if obj.type != self.target]
+        try:
+            if not objects:
+                raise PointCloudError(
+                    (f'"{context.object.name}" is a point cloud already.')
+                    if self.target == "POINTCLOUD"
+                    else (f'"{context.object.name}" is a mesh already.')
+                )
+            for obj in objects:
+                _check(obj)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        active, chosen = context.view_layer.objects.active, context.selected_objects
+        for obj in objects:
+            if obj.meshfree.make_single_user and obj.data.users > 1:
+                obj.data = obj.data.copy()
+            _convert(context, obj, self.target)
+            self.report({"INFO"}, f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now")
+        for obj in chosen:
+            obj.select_set(True)
+        context.view_layer.objects.active = active
+        return {"FINISHED"}
+
+
+def _check(obj):
+    """Refuse an object that would lose something."""
+    check_writable(obj, (), obj.meshfree.make_single_user)
+    if is_bound(obj):
+        raise PointCloudError(f'"{obj.name}" is bound to handles, which would be lost. Apply or unbind it first.')
+    if not obj.visible_get():
+        raise PointCloudError(f'"{obj.name}" is hidden, and Blender converts what is seen. Show it first.')
+
+
+def _convert(context, obj, target):
+    """Convert an object by Blender's own operator, which takes selected ones, and keep what that loses."""
+    groups = {name: group_weights(obj, name) for name in _group_names(obj)}
+    chosen, count = selection(obj), point_count(obj.data)
+    display = _take_display(obj)  # whose points Blender would not take for those of the object
+    for other in context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
+    bpy.ops.object.convert(target=target)
+    data, same = obj.data, point_count(obj.data) == count
+    if same and target == "POINTCLOUD":
+        write_attribute(data, SELECTION, chosen, "BOOLEAN")
+    elif same:
+        data.vertices.foreach_set("select", chosen)
+        if SELECTION in data.attributes:
+            data.attributes.remove(data.attributes[SELECTION])
+        for name, weights in groups.items():
+            data.attributes.remove(data.attributes[name])
+            group = obj.vertex_groups.new(name=name)
+            for weight in np.unique(weights[weights > 0.0]):
+                group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
+    _put_display(obj, display)
+    renew_counts(obj)
+
+
+def _group_names(obj):
+    """Names of the groups that tools take, and of the parts."""
+    settings = obj.meshfree
+    names = {*ROLES, *handle_names(obj), settings.deform.anchors, settings.rim_group}
+    kept = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
+    names |= {group.name for group in kept if _SEGMENT.fullmatch(group.name)}
+    return [name for name in names if name and has_group(obj, name)]
+
+
+def _take_display(obj):
+    """Remove the display modifier of an object, and return what it takes to put it back."""
+    modifier = next((item for item in obj.modifiers if is_display(item)), None)
+    if modifier is None:
+        return None
+    kept = modifier.name, modifier.node_group, {name: get_input(modifier, name) for name in ("Radius", "Material")}
+    set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
+    obj.modifiers.remove(modifier)
+    return kept
+
+
+def _put_display(obj, display):
+    if display is None:
+        return
+    name, group, inputs = display
+    modifier = obj.modifiers.new(name, "NODES")
+    modifier.node_group = group
+    modifier.use_pin_to_last = True
+    for key, value in inputs.items():
+        set_input(modifier, key, value)
+
+
+CLASSES = (MESHFREE_OT_convert,)

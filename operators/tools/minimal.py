@@ -1,0 +1,102 @@
+"""Minimal surfaces: what a soap film on the rim of an object would be."""
+
+import bpy
+from bpy.props import FloatProperty, IntProperty, StringProperty
+
+from ...core import Cancelled, PointCloudError
+from ...core.applications import minimal_surface
+from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen, search_group
+from ..objects.options import laplacian_options
+from ..objects.positions import check_movable, target_property, write_positions
+from ..objects.reading import read_points
+from ..objects.result import area_text
+from ..running import cache
+from ..running.application import ApplicationOperator
+
+HISTORY = "lb_area_history"  # custom property of the object: area after each step
+
+
+class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
+    """Let the points shrink to the least area that their rim can span, as a soap film does"""
+
+    bl_idname = "meshfree.minimal_surface"
+    bl_label = "Minimal Surface"
+    adjustable = ("target",)
+
+    group: StringProperty(
+        name="Fixed",
+        description="Vertex group with the points that stay, every rim at least; where there is none of that name, the"
+        " rims that are found",
+        default=FIXED,
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="It ends when a step changes the area by a smaller share than this",
+        default=1e-4,
+        min=0.0,
+        soft_max=0.01,
+        precision=6,
+    )
+    steps: IntProperty(name="Steps", description="Most steps to take", default=100, min=1, soft_max=500)
+    target: target_property()
+
+    def plan(self, context, obj):
+        check_movable(obj, self.target)
+        reading = read_points(context, obj)
+        options = laplacian_options(obj.meshfree)
+        fixed = reading.rim
+        if is_chosen(obj, self.group, FIXED):
+            fixed = chosen_members(obj, self.group, "Fixed")
+        tolerance, steps, name = self.tolerance, self.steps, obj.name
+        kind = group_kind(obj)
+
+        def compute(progress):
+            rim = fixed
+            if rim is None:
+                rim = cache.build(reading.points, options, None, progress).laplacian.boundary
+                if not rim.any():
+                    raise PointCloudError(
+                        f'"{name}" has no rim, so that its surface would shrink to nothing. Assign the points'
+                        f' that stay to the {kind} "{FIXED}".'
+                    )
+            settings = (reading.points, rim, tolerance, steps, options)
+            return reading, cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
+
+        return compute
+
+    def write(self, context, obj, result):
+        reading, film = result
+        self.warn(film.notices)
+        if film.steps:
+            write_positions(obj, reading, film.points, self.target, "Minimal Surface")
+        obj[HISTORY] = film.area_history.tolist()
+        area = film.area_history[-1] if film.steps else film.initial_area
+        return (
+            f"{obj.name}: area from {area_text(film.initial_area)} to {area_text(float(area))} in {film.steps}"
+            f" steps ({film.reason})"
+        )
+
+    def draw_settings(self, context, layout):
+        search_group(layout, self, "group", context.object)
+        for name in ("tolerance", "steps", "target"):
+            layout.prop(self, name)
+
+
+def _shrink(points, rim, tolerance, steps, options, progress):
+    """Compute the film that a rim spans, with the share of the steps as progress."""
+    count = 0
+
+    def stepped(step, points, area):
+        nonlocal count
+        count = step
+
+    def report(stage, fraction):
+        progress("Steps", min(1.0, (count + fraction) / steps))
+
+    film = minimal_surface(points, rim, tolerance, steps, options, callback=stepped, progress=report)
+    if film.reason == "cancelled":  # nobody waits for it, and it must not be kept
+        raise Cancelled
+    return film
+
+
+CLASSES = (MESHFREE_OT_minimal_surface,)

@@ -1,0 +1,334 @@
+"""Select points and put them into the vertex groups that the tools take, where Blender's own ways need faces."""
+
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
+
+from ...core import PointCloudError, grow
+from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
+from ..objects.counting import renew_counts
+from ..objects.groups import HANDLE, assign, check_assignable, chosen_members
+from ..objects.reading import obstacle
+from ..running.application import compute_all, naming, operator_reader
+from ..running.job import JobOperator
+from ..running.stages import Stages
+
+
+class SelectionOperator(JobOperator):
+    """An operator on the selected points of the active object, and of all others in Edit Mode along with it.
+
+    What takes long, the operator on the points, is computed beside the window, where somebody waits there; the rest is
+    done when it is kept. A subclass says what to do by `prepare`, which computes for an object and returns a function
+    that changes it and returns a line for the status bar.
+    """
+
+    works_in = ("OBJECT", "EDIT")
+    surface = True  # whether it needs the operator on the points
+    needs_selection = True
+
+    def invoke(self, context, event):
+        if bpy.app.background or not self.surface:
+            return self.execute(context)
+        objects = edited_objects(context)
+        try:
+            with object_mode(context, context.object):
+                objects = self.with_points(objects)
+                plans = [(obj.name, operator_reader(context, obj)[1]) for obj in objects]
+                return self.start(context, objects, lambda progress: compute_all(plans, progress))
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    def complete(self, context, job):
+        obj = job.snapshots[0].find()
+        if job.reason or obj is None:
+            return super().complete(context, job)
+        with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):
+            return super().complete(context, job)
+
+    def finish(self, context, objects, results, seconds):
+        """Do it with the selection of now: the operators are kept."""
+        return self.change(context, objects)
+
+    def execute(self, context):
+        return self.change(context, edited_objects(context))
+
+    def change(self, context, objects):
+        """Compute for all objects, then change all."""
+        with object_mode(context, context.object):
+            try:
+                objects, changes = self.with_points(objects), []
+                for obj in objects:
+                    with naming(obj.name):
+                        changes.append(self.prepare(context, obj))
+            except PointCloudError as error:
+                self.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+            messages = [change() for change in changes]
+        for obj, message in zip(objects, messages, strict=True):
+            self.report({"INFO"}, f"{obj.name}: {message}")
+        return {"FINISHED"}
+
+    def with_points(self, objects):
+        """Leave out objects without selected points, if it needs them, where there are others."""
+        if not self.needs_selection:
+            return objects
+        return [obj for obj in objects if selection(obj).any()] or objects[:1]
+
+
+def edited_objects(context):
+    """Return the active object, and the others that are in Edit Mode with it."""
+    active = context.object
+    found = {active.data: active}
+    if active.mode == "EDIT":
+        for obj in context.view_layer.objects:
+            if obj.mode == "EDIT" and not obstacle(obj, ("EDIT",)):
+                found.setdefault(obj.data, obj)
+    return list(found.values())
+
+
+@contextmanager
+def object_mode(context, obj):
+    """Leave Edit Mode, where vertices cannot be read as arrays, and come back to it with the same objects."""
+    if obj.mode != "EDIT":
+        yield
+        return
+    others = [other for other in context.view_layer.objects if other != obj]
+    edited = [other for other in others if other.mode == "EDIT"]
+    chosen = [other for other in others if other.select_get()]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    try:
+        yield
+    finally:
+        for other in others:  # selected ones come along into Edit Mode
+            other.select_set(other in edited)
+        bpy.ops.object.mode_set(mode="EDIT")
+        for other in others:
+            other.select_set(other in chosen)
+
+
+def selection(obj):
+    """Read which points are selected, (n,) bool."""
+    chosen = np.ones(point_count(obj.data), dtype=bool)
+    if obj.type == "MESH":
+        obj.data.vertices.foreach_get("select", chosen)
+    elif SELECTION in obj.data.attributes:  # without it Blender takes all points of a point cloud as selected
+        chosen = read_attribute(obj.data, SELECTION).astype(bool)
+    return chosen
+
+
+def selected(obj):
+    """Read which points are selected, (n,) bool; at least one is."""
+    chosen = selection(obj)
+    if not chosen.any():
+        raise PointCloudError(f'No points of "{obj.name}" are selected. Select some in Edit Mode.')
+    return chosen
+
+
+def select(context, obj, chosen) -> str:
+    """Select these points, (n,) bool, and no others, in the mode that selects vertices; hidden ones never."""
+    shown = chosen
+    if obj.type == "MESH":
+        hidden = np.empty(len(chosen), dtype=bool)
+        obj.data.vertices.foreach_get("hide", hidden)
+        shown = chosen & ~hidden
+        context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
+        obj.data.vertices.foreach_set("select", shown)
+        for parts in (obj.data.edges, obj.data.polygons):  # Edit Mode takes the vertices of selected ones, too
+            parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
+    else:
+        write_attribute(obj.data, SELECTION, shown, "BOOLEAN")
+    tag_changed(obj.data)
+    return f"{np.count_nonzero(shown):,} of {len(shown):,} points are selected"
+
+
+def groups_changed(obj):
+    """Let the panel count the groups of an object again, and the display color them, if it does."""
+    renew_counts(obj)
+    obj.meshfree.show_groups = obj.meshfree.show_groups
+
+
+def analyzed(context, obj):
+    """Read the points and return them with their operator, which is kept from the last analysis if nothing changed."""
+    reading, operator = operator_reader(context, obj)
+    with Stages(context.window_manager, "Points") as stages:
+        return reading, operator(stages)
+
+
+class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
+    """Select all points within a distance along the surface from the selected ones"""
+
+    bl_idname = "meshfree.select_grow"
+    bl_label = "Grow Selection"
+
+    distance: FloatProperty(
+        name="Distance",
+        description="How far the selection grows along the surface; 0 for four times the spacing of the points",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+
+    def prepare(self, context, obj):
+        chosen = selected(obj)
+        _, laplacian = analyzed(context, obj)
+        distance = self.distance or 4.0 * np.sqrt(np.median(laplacian.areas))
+        grown = grow(laplacian, chosen, distance)
+        return lambda: select(context, obj, grown)
+
+
+class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
+    """Select all points of the connected parts that hold selected points"""
+
+    bl_idname = "meshfree.select_component"
+    bl_label = "Select Connected Part"
+
+    def prepare(self, context, obj):
+        chosen = selected(obj)
+        component = analyzed(context, obj)[1].component
+        parts = np.unique(component[chosen & (component >= 0)])  # points left out belong to none
+        return lambda: select(context, obj, chosen | np.isin(component, parts))
+
+
+class FrontOnly:
+    """The property of selecting operators that leaves out points on the far side."""
+
+    direction: FloatVectorProperty(
+        name="Viewing Direction",
+        description="Direction in which one looks at the object; zero for that of the viewport",
+        default=(0.0, 0.0, 0.0),
+        subtype="XYZ",
+    )
+
+    def facing(self, context, obj):
+        """Tell which points face the viewer by their normals, (n,) bool."""
+        reading, laplacian = analyzed(context, obj)
+        view = np.array(self.direction, dtype=np.float64)
+        space = context.space_data.region_3d if context.area is not None and context.area.type == "VIEW_3D" else None
+        if view.any():
+            rays = view
+        elif space is None:
+            raise PointCloudError("There is no 3D viewport to look from. Give a viewing direction.")
+        elif space.is_perspective:
+            eye = np.array(space.view_matrix.inverted().translation) - np.array(obj.matrix_world.translation)
+            rays = reading.points - eye
+        else:
+            rays = -np.array(space.view_matrix.inverted().col[2][:3])
+        return np.einsum("ij,ij->i", laplacian.normals, np.broadcast_to(rays, reading.points.shape)) < 0.0
+
+
+class MESHFREE_OT_select_front(SelectionOperator, FrontOnly, bpy.types.Operator):
+    """Deselect the points whose normals point away from the viewer, which Box Select takes too"""
+
+    bl_idname = "meshfree.select_front"
+    bl_label = "Front Only"
+
+    def prepare(self, context, obj):
+        front = selected(obj) & self.facing(context, obj)
+        return lambda: select(context, obj, front)
+
+
+class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.Operator):
+    """Put the selected points into a vertex group that the tools take, such as Handle or Anchor"""
+
+    bl_idname = "meshfree.group_from_selection"
+    bl_label = "Assign to Group"
+
+    role: EnumProperty(
+        name="Group",
+        description="What the points are for",
+        items=[
+            ("HANDLE", "Handle", "Points that are moved to deform the rest"),
+            ("ANCHOR", "Anchor", "Points that stay where they are"),
+            ("FIXED", "Fixed", "The rim that a minimal surface keeps"),
+            ("SOURCE", "Source", "Points from which distances are measured"),
+            ("VALUE", "Value", "Points with given values of a field, as weights"),
+            ("RIM", "Rim", "Points at which the surface ends; it becomes the Rim Group of the settings"),
+        ],
+        default="HANDLE",
+    )
+    name: StringProperty(name="Name", description="Name of the group; empty for that of its role", maxlen=63)
+    action: EnumProperty(
+        name="Action",
+        description="What happens to points that the group holds already",
+        items=[
+            ("REPLACE", "Replace", "The group holds the selected points only"),
+            ("ADD", "Add", "The selected points come to those that the group holds"),
+            ("REMOVE", "Remove", "The selected points leave the group"),
+        ],
+        default="REPLACE",
+    )
+    weight: FloatProperty(
+        name="Weight", description="Weight of the points in the group", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
+    )
+    front_only: BoolProperty(
+        name="Front Only", description="Leave out points whose normals point away from the viewer", default=False
+    )
+
+    @property
+    def surface(self):
+        """Whether it needs the operator on the points, for their normals."""
+        return self.front_only
+
+    def prepare(self, context, obj):
+        chosen = selected(obj)
+        if self.front_only:
+            chosen &= self.facing(context, obj)
+            if not chosen.any():
+                raise PointCloudError(
+                    f'All selected points of "{obj.name}" face away from the viewer. Turn off Front Only, or'
+                    " look from the other side."
+                )
+        name = self.name or self.role.title()
+        check_assignable(obj, name, must_exist=self.action == "REMOVE")
+
+        def change():
+            assign(obj, name, chosen, self.action, self.weight)
+            groups_changed(obj)
+            if self.role == "RIM" and self.action != "REMOVE":
+                obj.meshfree.rim_group = name
+            done = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
+            return f'{np.count_nonzero(chosen):,} points {done} the group "{name}"'
+
+        return change
+
+
+class MESHFREE_OT_select_rim(SelectionOperator, bpy.types.Operator):
+    """Select the points at the rims of the surface, as they are found or named by the Rim Group"""
+
+    bl_idname = "meshfree.select_rim"
+    bl_label = "Select Rim"
+    needs_selection = False
+
+    def prepare(self, context, obj):
+        rim = analyzed(context, obj)[1].boundary
+        if not rim.any():
+            raise PointCloudError(f'"{obj.name}" has no rim: its surface is closed, or Rims is off in the settings.')
+        return lambda: select(context, obj, rim)
+
+
+class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
+    """Select the points of a group that the tools take"""
+
+    bl_idname = "meshfree.select_group"
+    bl_label = "Select Group"
+    needs_selection = False
+    surface = False
+
+    name: StringProperty(name="Name", description="Name of the group", default=HANDLE, maxlen=63)
+
+    def prepare(self, context, obj):
+        chosen = chosen_members(obj, self.name, "Name")
+        return lambda: select(context, obj, chosen)
+
+
+CLASSES = (
+    MESHFREE_OT_select_grow,
+    MESHFREE_OT_select_component,
+    MESHFREE_OT_select_front,
+    MESHFREE_OT_select_rim,
+    MESHFREE_OT_select_group,
+    MESHFREE_OT_group_from_selection,
+)

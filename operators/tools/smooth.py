@@ -1,0 +1,243 @@
+"""Smooth or sharpen the shape of objects by frequency, and move them by a vibration mode."""
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ...core import (
+    PointBlend,
+    PointCloudError,
+    boost,
+    displace_by_mode,
+    exponential,
+    fair_points,
+    smooth_points,
+    smoothing_base,
+)
+from ..objects.groups import chosen_weights, search_group
+from ..objects.positions import check_movable, target_property, write_positions
+from ..objects.result import length_text
+from ..running import cache
+from ..running.application import ApplicationOperator, operator_reader
+
+_HEAT, _DETAIL = 6.0, 12.0  # smoothing lengths of a wavelength that suits a scan: finer ones the kernel does not see
+_READY = 20  # modes computed together at least, so that Adjust Last Operation can go through them
+_FINEST = 8.0  # details finer than this share of the wavelength count as noise, which is not boosted
+
+
+class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
+    """Smooth the shape of the points: remove noise, soften details, keep a few modes, or strengthen details"""
+
+    bl_idname = "meshfree.smooth"
+    bl_label = "Smooth Points"
+
+    method: EnumProperty(
+        name="Method",
+        description="What is smoothed, and how",
+        items=[
+            ("NOISE", "Remove Noise", "Remove the noise of single points and keep the shape"),
+            ("HEAT", "Soften", "Fade details out as heat spreads, the finer the more"),
+            ("MODES", "Keep Modes", "Keep what the lowest vibration modes can show, a coarse shape"),
+            ("DETAIL", "Scale Details", "Make details stronger or weaker and keep the coarse shape"),
+        ],
+        default="NOISE",
+    )
+    wavelength: FloatProperty(
+        name="Wavelength",
+        description="Size of the details that are halved, or from which on details count as such; 0 for what suits the"
+        " points",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+    modes: IntProperty(
+        name="Modes", description="How many modes are kept, the constant one included", default=100, min=4, soft_max=500
+    )
+    gain: FloatProperty(name="Gain", description="How much stronger details become", default=1.5, min=0.0, soft_max=3.0)
+    strength: FloatProperty(
+        name="Strength",
+        description="Share of the way from the points to their smooth places",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    group: StringProperty(
+        name="Vertex Group", description="Smooth the points of this group only, by their weights; empty for all points"
+    )
+    keep: EnumProperty(
+        name="Keep",
+        description="Scale the result so that it keeps its size",
+        items=[
+            ("NONE", "Nothing", "Let the shape shrink as it will"),
+            ("AREA", "Area", "Keep the area of each connected part"),
+            ("VOLUME", "Volume", "Keep the volume of each connected part; for closed surfaces"),
+        ],
+        default="NONE",
+    )
+    keep_rim: BoolProperty(name="Keep Rim", description="Leave the rim where it is", default=True)
+    target: target_property()
+
+    @property
+    def adjustable(self):
+        """Names of the settings that need no new solution: to keep a size, one looks for a scale."""
+        return ("strength", "target") if self.keep == "NONE" else ("target",)
+
+    def plan(self, context, obj):
+        check_movable(obj, self.target)
+        reading, operator = operator_reader(context, obj)
+        mask = chosen_weights(obj, self.group, ("Vertex Group")) if self.group else None
+        method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
+        shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
+        keep_rim, name = self.keep_rim, obj.name
+
+        def compute(progress):
+            laplacian = operator(progress)
+            fixed_rim = keep_rim and bool(laplacian.boundary.any())
+            if fixed_rim and shared["keep"]:
+                raise PointCloudError(
+                    f'"{name}" has a rim, which stays and fixes the size already. Set Keep to Nothing, or turn'
+                    " off Keep Rim."
+                )
+            size = np.linalg.norm(np.ptp(reading.points, axis=0))
+            if wavelength > size:
+                raise PointCloudError(
+                    f'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.'
+                )
+            blend = PointBlend(laplacian, fixed_rim=fixed_rim, **shared)
+            settings = (
+                method,
+                fixed_rim,
+                modes if method == "MODES" else wavelength,
+                gain if method == "DETAIL" else 0,
+            )
+
+            def filtered():
+                return cache.result(
+                    laplacian,
+                    "smooth",
+                    *settings,
+                    compute=lambda: _smooth(laplacian, method, fixed_rim, modes, wavelength, gain, progress),
+                )
+
+            if not shared["keep"]:
+                return reading, blend(filtered())
+
+            def scaled():
+                places = filtered()
+                progress("Size", 0.9)
+                return blend(places)
+
+            return reading, cache.result(laplacian, "scaled", *settings, *shared.values(), compute=scaled)
+
+        return compute
+
+    def write(self, context, obj, result):
+        reading, points = result
+        write_positions(obj, reading, points, self.target, "Smooth")
+        moved = np.sqrt(np.mean(np.sum((points - reading.points) ** 2, axis=1)))
+        return f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"
+
+    def draw_settings(self, context, layout):
+        layout.prop(self, "method")
+        names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
+        for name in [*names, "strength"]:
+            layout.prop(self, name)
+        search_group(layout, self, "group", context.object)
+        for name in ("keep", "keep_rim", "target"):
+            layout.prop(self, name)
+
+
+def _smooth(laplacian, method, fixed_rim, modes, wavelength, gain, progress):
+    """Return the places of the points, (n, 3), that a method gives at full strength."""
+    base = cache.result(laplacian, "base", fixed_rim, compute=lambda: smoothing_base(laplacian, fixed_rim, progress))
+    settings = {"fixed_rim": fixed_rim, "progress": progress, "base": base}
+    length = np.median(laplacian.smoothing_lengths)
+    if method == "NOISE":
+        return fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None, **settings)
+    if method == "MODES":
+        spectrum = cache.lowest_modes(laplacian, modes, progress, fixed_rim, raw=True)
+        return smooth_points(laplacian, modes, spectrum, **settings)
+    if method == "HEAT":
+        squared = ((wavelength or _HEAT * length) / (2.0 * np.pi)) ** 2
+        return smooth_points(laplacian, exponential(np.log(2.0) * squared), **settings)
+    low = (2.0 * np.pi / (wavelength or _DETAIL * length)) ** 2
+    return smooth_points(laplacian, boost(gain, low, _FINEST**2 * low), **settings)
+
+
+class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
+    """Move the points along their normals by a vibration mode, on demand as an animated shape key"""
+
+    bl_idname = "meshfree.mode_shape"
+    bl_label = "Deform by Mode"
+    adjustable = ("mode", "amplitude", "phase", "animate", "period", "target")
+
+    mode: IntProperty(
+        name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
+    )
+    amplitude: FloatProperty(
+        name="Amplitude",
+        description="Largest displacement; 0 for a tenth of the object's radius",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+    phase: FloatProperty(
+        name="Phase",
+        description="Angle of the vibration: 0 is full displacement, 180 degrees the opposite one",
+        default=0.0,
+        subtype="ANGLE",
+    )
+    animate: BoolProperty(
+        name="Animate", description="Keyframe the shape key as a vibration over the frames of the scene", default=False
+    )
+    period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4, soft_max=250)
+    target: target_property()
+
+    def plan(self, context, obj):
+        target = "SHAPE_KEY" if self.animate else self.target
+        if self.animate and obj.type != "MESH":
+            raise PointCloudError(
+                f'"{obj.name}" is a Point Cloud, which has no shape keys to animate. Turn off Animate, or'
+                " convert it with Object > Convert > Mesh."
+            )
+        check_movable(obj, target)
+        reading, operator = operator_reader(context, obj)
+        mode, amplitude, phase = self.mode, self.amplitude or None, self.phase
+        repeated = self.is_repeated(context)
+
+        def compute(progress):
+            laplacian = operator(progress)
+            number = mode
+            if repeated and cache.known_modes(laplacian):
+                number = min(mode, cache.known_modes(laplacian))
+            else:
+                several = max(mode, min(_READY, len(reading.points) // 3))
+                cache.lowest_modes(laplacian, several, progress, raw=True)
+            vector = cache.lowest_modes(laplacian, number, progress).eigenvectors[:, number - 1]
+            return reading, displace_by_mode(laplacian, vector, amplitude, phase), number
+
+        return compute
+
+    def write(self, context, obj, result):
+        reading, points, mode = result
+        if mode < self.mode:
+            again = f"Only {mode} modes are computed: this is the last. Start Deform by Mode again for more."
+            self.warn([again])
+        key = write_positions(obj, reading, points, "SHAPE_KEY" if self.animate else self.target, f"Mode {mode}")
+        if self.animate:
+            key.slider_min = -1.0
+            scene, quarter = context.scene, 0.25 * self.period
+            for index in range(int((scene.frame_end - scene.frame_start) / quarter) + 2):
+                key.value = (1.0, 0.0, -1.0, 0.0)[index % 4]
+                key.keyframe_insert("value", frame=scene.frame_start + index * quarter)
+        largest = np.linalg.norm(points - reading.points, axis=1).max()
+        return f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"
+
+    def draw_settings(self, context, layout):
+        for name in ("mode", "amplitude", "phase", "animate"):
+            layout.prop(self, name)
+        layout.prop(self, "period" if self.animate else "target")
+
+
+CLASSES = (MESHFREE_OT_smooth, MESHFREE_OT_mode_shape)
