@@ -100,7 +100,7 @@ def geodesic():
     for name, points, exact in (
         ("sphere, 8,000 Fibonacci", fibonacci_sphere(8000), great_circles),
         ("sphere, 8,000 random", random_sphere(8000), great_circles),
-        ("square, 90 x 90 with rim", square_grid(90), straight),
+        ("square, 90 x 90 with boundary", square_grid(90), straight),
     ):
         laplacian = core.build_laplacian(points)
         for label, sources in (("one source", [0]), ("five", np.random.default_rng(0).integers(0, 8000, 5))):

@@ -12,7 +12,7 @@ from .targets import Goal, judge, percent
 
 
 def tube(around, up, radius=2.0, height=2.0):
-    """Return a regular grid on an open cylinder with both rims, and which points are on a rim.
+    """Return a regular grid on an open cylinder with both boundaries, and which points are on a boundary.
 
     Returns
     -------
@@ -50,14 +50,14 @@ def cap(points, around):
 
 
 def helicoid(side=60):
-    """Return a quarter turn of a helicoid, pushed off it inside, which points are at its rim, and its area."""
+    """Return a quarter turn of a helicoid, pushed off it inside, which points are at its boundary, and its area."""
     v, turn = (part.ravel() for part in np.meshgrid(np.linspace(-1, 1, side + 1), np.linspace(0, 1, side * 4 // 5 + 1)))
     angle = 0.5 * np.pi * turn
     normals = np.column_stack([np.sin(angle), -np.cos(angle), v]) / np.sqrt(1.0 + v**2)[:, None]
     points = np.column_stack([v * np.cos(angle), v * np.sin(angle), angle])
     points += (0.15 * np.cos(0.5 * np.pi * v) * np.sin(np.pi * turn))[:, None] * normals
-    rim = (np.abs(v) == 1.0) | (turn == 0.0) | (turn == 1.0)
-    return points, rim, 0.5 * np.pi * (np.sqrt(2.0) + np.arcsinh(1.0))
+    boundary = (np.abs(v) == 1.0) | (turn == 0.0) | (turn == 1.0)
+    return points, boundary, 0.5 * np.pi * (np.sqrt(2.0) + np.arcsinh(1.0))
 
 
 def figure_14():
@@ -103,9 +103,9 @@ def caps():
 
 
 def corners():
-    """A rim with four corners."""
-    points, rim, area = helicoid()
-    film = core.minimal_surface(points, rim)
+    """A boundary with four corners."""
+    points, boundary, area = helicoid()
+    film = core.minimal_surface(points, boundary)
     off = np.abs(film.points[:, 0] * np.sin(film.points[:, 2]) - film.points[:, 1] * np.cos(film.points[:, 2])).max()
     values = iter([film.areas.sum() / area - 1.0, off])
     yield from judge("helicoid, 61 x 49", [percent("area"), Goal("distance, max")], values)

@@ -79,12 +79,12 @@ def difference(before, after):
     """Largest difference of two arrays as a share of the largest entry; infinite where shapes or kinds differ."""
     if before.shape != after.shape:
         return np.inf
-    if before.dtype.kind not in "f":
-        return 0.0 if np.array_equal(before, after) else np.inf
-    finite = np.isfinite(before)
-    if not np.array_equal(finite, np.isfinite(after)) or not finite.any():
+    if np.array_equal(before, after):
+        return 0.0
+    finite = np.isfinite(before) if before.dtype.kind == "f" else np.zeros(0)
+    if not finite.any() or not np.array_equal(finite, np.isfinite(after)):
         return np.inf
-    return np.abs(before - after)[finite].max() / max(np.abs(before[finite]).max(), 1e-300)
+    return np.abs(before[finite] - after[finite]).max() / max(np.abs(before[finite]).max(), 1e-300)
 
 
 def compare(first, second):

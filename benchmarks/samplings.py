@@ -27,16 +27,16 @@ def fibonacci_sphere(count):
 
 
 def rough_sphere(points, wavelength, slope, seed=0, waves=60):
-    """Return points of the unit sphere with relief, (count, 3), and the area of the surface that they are on.
+    """Return points of the unit sphere with roughness, (count, 3), and the area of the surface that they are on.
 
     Parameters
     ----------
     points : ndarray, (count, 3)
         On the unit sphere.
     wavelength : float
-        Shortest wavelength of the relief, in mean spacings of the points.
+        Shortest wavelength of the roughness, in mean spacings of the points.
     slope : float
-        Root mean square slope of the relief, about.
+        Root mean square slope of the roughness, about.
     seed, waves : int
         Of the plane waves of random directions and phases that make it.
     """
@@ -232,7 +232,7 @@ def hemisphere_random(count, seed=0):
 
 
 def square_grid(side=60):
-    """Return a square grid on the unit square in the plane z = 0, its rim included, (side^2, 3)."""
+    """Return a square grid on the unit square in the plane z = 0, its boundary included, (side^2, 3)."""
     return grid_points(np.linspace(0.0, 1.0, side), np.linspace(0.0, 1.0, side), [0.0])
 
 
@@ -248,7 +248,8 @@ def square_eigenvalues(count):
 
 
 def disc_random(count, seed=0):
-    """Return points distributed evenly at random in the unit disc in the plane z = 0, and their distances to its rim.
+    """Return points distributed evenly at random in the unit disc in the plane z = 0, and their distances to its
+    boundary.
 
     Returns
     -------
@@ -268,7 +269,7 @@ def disc_eigenvalues(count):
 
 
 def open_cylinder():
-    """Return a regular grid, 196 around and 40 up, on a cylinder of radius and height 2 with both rims, (7840, 3)."""
+    """Return a regular grid, 196 around and 40 up, on an open cylinder of radius and height 2, (7840, 3)."""
     around = 2.0 * np.pi * np.arange(196) / 196
     around, height = (part.ravel() for part in np.meshgrid(around, np.linspace(-1.0, 1.0, 40), indexing="ij"))
     return np.column_stack([2.0 * np.cos(around), 2.0 * np.sin(around), height])
@@ -301,7 +302,7 @@ def closed_plate(side=40, thickness=2):
     -------
     points : ndarray, (n, 3)
     face : ndarray, (n,)
-        0 or 1 on the two large faces, their rims included, -1 on the narrow ones.
+        0 or 1 on the two large faces, their boundaries included, -1 on the narrow ones.
     inset : ndarray, (n,)
         Distance to the nearest narrow face: the way around from face to face is at least both insets and the thickness.
     area : float
@@ -363,10 +364,10 @@ def trimmed_star(count=5000, arms=6, seed=None):
     edge = kind % len(length)
     t = 1.0 - (ends[kind] - place) * weights.sum() / weights[kind]
     s = k * GOLDEN % 1.0 if seed is None else np.random.default_rng(seed + 1).random(count)
-    rim = (outline[edge].T * (1.0 - s) + after[edge].T * s).T
+    boundary = (outline[edge].T * (1.0 - s) + after[edge].T * s).T
     flat = kind < 2 * len(length)
     height = np.where(flat, np.where(kind < len(length), 0.5, -0.5), t - 0.5) * thickness
-    return np.column_stack([np.where(flat, np.sqrt(t), 1.0)[:, None] * rim, height])
+    return np.column_stack([np.where(flat, np.sqrt(t), 1.0)[:, None] * boundary, height])
 
 
 def sausage_bend(count, radius=0.25, length=6.0):

@@ -110,8 +110,8 @@ def shape(bumpy):
         yield from judge(f"{'bumpy ' if bumpy else ''}sphere, {COUNT:,}, 3 % noise: {name}", goals, measure(method))
 
 
-def rim():
-    """Noise on a cylinder with two rims that stay, away from them and near them."""
+def boundary():
+    """Noise on a cylinder with two boundaries that stay, away from them and near them."""
     points = open_cylinder()
     noise = LEVEL * 2.0 * np.random.default_rng(0).standard_normal(len(points))
     noise[np.abs(points[:, 2]) > 0.999] = 0.0
@@ -119,20 +119,20 @@ def rim():
 
     def measure():
         laplacian = core.build_laplacian(points + noise[:, None] * outward)
-        found = core.fair_points(laplacian, fixed_rim=True)
+        found = core.fair_points(laplacian, dirichlet=True)
         error = np.linalg.norm(found[:, :2], axis=1) - 2.0
-        for rows in (~laplacian.near_rim, laplacian.near_rim & ~laplacian.boundary):
+        for rows in (~laplacian.near_boundary, laplacian.near_boundary & ~laplacian.boundary):
             yield np.sqrt(np.mean(noise[rows] ** 2) / np.mean(error[rows] ** 2))
         yield np.abs(found - laplacian.points)[laplacian.boundary].max()
         yield np.count_nonzero(laplacian.boundary)
 
     goals = [
-        Goal("fall of the RMS distance far from the rims, times", form="{:.2f}"),
+        Goal("fall of the RMS distance far from the boundaries, times", form="{:.2f}"),
         Goal("near them", form="{:.2f}"),
-        Goal("largest move of a rim point", 0.0),
-        Goal("points on the rims, of 392", form="{:d}"),
+        Goal("largest move of a boundary point", 0.0),
+        Goal("points on the boundaries, of 392", form="{:d}"),
     ]
-    yield from judge("open cylinder, 196 x 40, 3 % noise: fairing, rims stay", goals, measure())
+    yield from judge("open cylinder, 196 x 40, 3 % noise: fairing, boundaries stay", goals, measure())
 
 
 def signatures():
@@ -194,7 +194,7 @@ GROUPS = {
     "harmonics": harmonics,
     "sphere": lambda: shape(False),
     "bumpy": lambda: shape(True),
-    "rim": rim,
+    "boundary": boundary,
     "signatures": signatures,
     "scaling": scaling,
     "armadillo": armadillo,

@@ -109,14 +109,14 @@ def areas_against_algorithm_1():
     points = uneven_sphere(12_000)
     default = core.build_laplacian(points, options=options)
     cloud = read_cloud(points, options)
-    scaled, neighborhoods = cloud.scaled, cloud.neighborhoods
+    scaled, pairs = cloud.scaled, cloud.pairs
     target = np.ones(len(points))
     x = points[:, 0]
     rows = []
 
     def judge(name, areas, seconds, steps):
         # On a sphere the mean-normal plane holds the chord, so the distance in space is the projected one.
-        stiffness = assemble_stiffness(cloud, neighborhoods.distance, areas)[0]
+        stiffness = assemble_stiffness(cloud, pairs.distance, areas)[0]
         total = scaled.share(areas, 0.0) * scaled.scale**2
         laplacian = replace(default, areas=total, stiffness=stiffness)
         values = laplacian.eigenpairs(36).eigenvalues[1:] / sphere_eigenvalues(36)[1:] - 1.0
@@ -130,7 +130,7 @@ def areas_against_algorithm_1():
         )
 
     began = time.perf_counter()
-    matrix = KernelMatrix(neighborhoods, neighborhoods.distance, cloud.rim)
+    matrix = KernelMatrix(pairs, pairs.distance, cloud.boundary)
     assembly = time.perf_counter() - began
     density = 1.0 / (matrix @ target)
     judge("density, 1 / (A 1)", density, assembly, "1 product")

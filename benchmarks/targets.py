@@ -107,13 +107,13 @@ def square():
         yield worst if resolved == 7 else f"{worst:.2%}, but only the first {resolved} are resolved"
 
     goals = [percent("area", 0.3), percent("7 eigenvalues, max", 1.0)]
-    yield from judge("square, 60 x 60 with rim", goals, measure([square_grid(60)]))
+    yield from judge("square, 60 x 60 with boundary", goals, measure([square_grid(60)]))
     goals = [percent("area", 1.0), percent("7 eigenvalues, max", 3.0)]
     yield from judge("square, 3,600 random", goals, measure([square_random(3600, seed) for seed in SEEDS]))
 
 
 def disc():
-    """Unit disc: area and the first 12 nonzero Neumann eigenvalues, distances to the rim given or not."""
+    """Unit disc: area and the first 12 nonzero Neumann eigenvalues, distances to the boundary given or not."""
     exact = disc_eigenvalues(13)
 
     def measure(count, given):
@@ -128,32 +128,32 @@ def disc():
 
     for given, bounds, area in ((True, (1.0, 0.2, 0.05), None), (False, (1.0, 0.3, 0.1), 0.3)):
         for count, bound in zip((2000, 8000, 32_000), bounds, strict=True):
-            case = f"disc, {count:,} random, rim {'given' if given else 'found'}"
+            case = f"disc, {count:,} random, boundary {'given' if given else 'found'}"
             goals = [percent("12 eigenvalues, mean", bound), percent("area", area)]
             yield from judge(case, goals, measure(count, given))
 
 
 def fixed():
-    """Square and disc: the first eigenvalues with the value zero fixed at the rim."""
+    """Square and disc: the first eigenvalues with the value zero fixed at the boundary."""
     k = np.arange(1, 12)
     square_modes = np.sort(((k[:, None] ** 2 + k**2) * np.pi**2).ravel())[:12]
     disc_modes = np.sort(np.concatenate([np.tile(jn_zeros(m, 12), 1 if m == 0 else 2) for m in range(16)]))[:12] ** 2
     for case, points, given, exact in (
-        ("square, 60 x 60 with rim", square_grid(60), None, square_modes),
+        ("square, 60 x 60 with boundary", square_grid(60), None, square_modes),
         ("square, 3,600 random", square_random(3600, 0), None, square_modes),
-        ("disc, 8,000 random, rim given", *disc_random(8000, 0), disc_modes),
-        ("disc, 8,000 random, rim found", disc_random(8000, 0)[0], None, disc_modes),
+        ("disc, 8,000 random, boundary given", *disc_random(8000, 0), disc_modes),
+        ("disc, 8,000 random, boundary found", disc_random(8000, 0)[0], None, disc_modes),
     ):
 
         def measure(points=points, given=given, exact=exact):
-            values = core.build_laplacian(points, boundary_distance=given).eigenpairs(12, fixed_rim=True).eigenvalues
+            values = core.build_laplacian(points, boundary_distance=given).eigenpairs(12, dirichlet=True).eigenvalues
             yield np.abs(values / exact - 1.0).mean()
 
         yield from judge(f"{case}, fixed at zero", [percent("12 eigenvalues, mean")], measure())
 
 
-def rims():
-    """Areas of curved surfaces with a rim."""
+def boundaries():
+    """Areas of curved surfaces with a boundary."""
 
     def measure(clouds, exact):
         yield np.mean([abs(area_error(core.build_laplacian(points), exact)) for points in clouds])
@@ -221,8 +221,8 @@ def sphere():
         yield from judge(case, goals, measure(clouds))
 
 
-def relief():
-    """Spheres with relief of a few spacings: their area, which is up to 9 % above that without relief."""
+def roughness():
+    """Spheres with roughness of a few spacings: their area, which is up to 9 % above that without roughness."""
     for name, points in (("even", fibonacci_sphere(8000)), ("marching cubes", marching_cubes_sphere(39))):
         for wavelength, slope in ((4, 0.2), (6, 0.2), (6, 0.4), (8, 0.4), (12, 0.4)):
             rough, area = rough_sphere(points, wavelength, slope)
@@ -230,19 +230,19 @@ def relief():
             def measure(rough=rough, area=area):
                 yield area_error(core.build_laplacian(rough), area)
 
-            case = f"sphere, {name}, relief of {wavelength} spacings, slope {slope}"
+            case = f"sphere, {name}, roughness of {wavelength} spacings, slope {slope}"
             yield from judge(case, [percent("area", 1.0)], measure())
 
 
 def scans():
-    """Scans: the area against that of their triangles, and whether a rim is found where there is one."""
+    """Scans: the area against that of their triangles, and whether a boundary is found where there is one."""
     reference = Path(SCANS) / "reference.json"
     if not SCANS or not reference.exists():
         yield ["scans", "area", "left out: MESHFREE_SCANS names no folder with reference.json", "", ""]
         return
-    rim = {
-        "spot": Goal("points on a rim", 0, "{:d}"),
-        "camelhead": Goal("points on a rim", 1, "{:d}", least=True),
+    boundary = {
+        "spot": Goal("points on a boundary", 0, "{:d}"),
+        "camelhead": Goal("points on a boundary", 1, "{:d}", least=True),
     }
 
     def measure(path, area):
@@ -253,7 +253,7 @@ def scans():
     for name, facts in json.loads(reference.read_text(encoding="utf-8")).items():
         path = reference.with_name(f"{name}.ply")
         if path.exists():
-            goals = [percent("area", 1.0), rim.get(name, Goal("points on a rim", form="{:d}"))]
+            goals = [percent("area", 1.0), boundary.get(name, Goal("points on a boundary", form="{:d}"))]
             yield from judge(f"scan, {name}", goals, measure(path, facts["triangle_area"]))
         else:
             yield [f"scan, {name}", "area", f"left out: no {path.name}", "", ""]
@@ -308,7 +308,7 @@ def sheets():
         yield crossing_pairs(laplacian, face)
 
     yield from judge("two sheets, 1.5 spacings apart", goals, parallel())
-    goals.append(Goal("pairs between them, also around the rim", form="{:d}"))
+    goals.append(Goal("pairs between them, also around the boundary", form="{:d}"))
     yield from judge("closed plate, 2 spacings thick", goals, closed())
 
 
@@ -366,10 +366,10 @@ GROUPS = {
     "square": square,
     "disc": disc,
     "fixed": fixed,
-    "rims": rims,
+    "boundary": boundaries,
     "torus": torus,
     "sphere": sphere,
-    "relief": relief,
+    "roughness": roughness,
     "scans": scans,
     "noise": noise,
     "density": density,

@@ -30,8 +30,8 @@ from .applications import (
 from .errors import (
     AreaError,
     Cancelled,
+    ComponentError,
     InvalidPointsError,
-    IslandError,
     NotASurfaceError,
     PointCloudError,
     SolverError,
@@ -46,9 +46,9 @@ from .paper import Stability, check_stability
 __all__ = [
     "AreaError",
     "Cancelled",
+    "ComponentError",
     "Deformer",
     "InvalidPointsError",
-    "IslandError",
     "LaplaceBeltrami",
     "LaplacianOptions",
     "MinimalSurface",

@@ -17,7 +17,7 @@ class NotASurfaceError(PointCloudError):
     """Points along a line or a curve, so that no tangent plane exists."""
 
 
-class IslandError(PointCloudError):
+class ComponentError(PointCloudError):
     """A few points far from all others, too few for an operator of their own."""
 
 

@@ -8,7 +8,7 @@ _CHOICES = {
     "bandwidth": ("adaptive", "local", "global"),
     "normals": ("quadric", "wpca", "pca"),
     "areas": ("fast", "regularized", "constrained", "uniform"),
-    "rims": ("auto", "off"),
+    "boundary": ("auto", "off"),
     "projection": ("auto", "off", "quadric", "plane"),
 }
 
@@ -42,8 +42,8 @@ class LaplacianOptions:
         Measure distances along the surface, correct areas and weights for its Gaussian curvature and for h that varies,
         and give the weights around every point the moments of the kernel. Without it, eqs. (6) and (10) as they stand:
         distances in space for the areas, in the mean-normal plane for the weights.
-    rims : {"auto", "off"}
-        "auto": find where the surface ends, unless the rim is given, and mirror the points there. "off": take the
+    boundaries : {"auto", "off"}
+        "auto": find where the surface ends, unless the boundary is given, and mirror the points there. "off": take the
         surface as closed.
     sheets : bool
         Keep points of close sheets, such as the two sides of a thin wall, from being neighbours.
@@ -61,7 +61,7 @@ class LaplacianOptions:
     orient: bool = False
     areas: str = "fast"
     regularization: float = 1e-3
-    rims: str = "auto"
+    boundary: str = "auto"
     sheets: bool = True
     projection: str = "auto"
     curvature_correction: bool = True
@@ -93,7 +93,7 @@ class LaplacianOptions:
             bandwidth_factor=1.0,
             normals="wpca",
             areas="constrained",
-            rims="off",
+            boundary="off",
             sheets=False,
             projection="off",
             curvature_correction=False,

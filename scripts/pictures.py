@@ -18,7 +18,7 @@ import studio
 from studio import row, single
 
 OUTPUT = package.ROOT / "docs" / "pictures"
-CUT = 0.45  # height at which the shape is cut open for the picture of a rim
+CUT = 0.45  # height at which the shape is cut open for the picture of a boundary
 SPACING = 0.038  # of the points of the demonstration's shape
 LINES = 15
 
@@ -48,8 +48,8 @@ def mode(path):
     single(obj, "lb_eigenvector_020", path)
 
 
-def rim(path):
-    """The rim of the shape cut open."""
+def boundary(path):
+    """The boundary of the shape cut open."""
     points = demo.Coral().sample(demo.POINTS)
     obj = studio.make_object(points[points[:, 2] < CUT], "Coral")
     bpy.ops.meshfree.analyze(show=False)
@@ -116,7 +116,7 @@ def deform(path):
 
 
 def minimal(path):
-    """A cylinder that becomes a catenoid, the least area between its rims."""
+    """A cylinder that becomes a catenoid, the least area between its boundaries."""
     around, height = np.meshgrid(2.0 * np.pi * np.arange(196) / 196, np.linspace(-1.0, 1.0, 40))
     points = np.column_stack([2.0 * np.cos(around.ravel()), 2.0 * np.sin(around.ravel()), height.ravel()])
     objects = []
@@ -142,7 +142,7 @@ PICTURES = {
     "curvature": result("lb_mean_curvature"),
     "gaussian": result("lb_gaussian_curvature"),
     "mode": mode,
-    "rim": rim,
+    "boundary": boundary,
     "smooth": smooth,
     "mode_shape": mode_shape,
     "segment": segment,

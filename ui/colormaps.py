@@ -29,7 +29,7 @@ _GROUPS = {
     "Fixed": "009e73",
     "Source": "f0e442",
     "Value": "cc79a7",
-    "Rim": "56b4e9",
+    "Boundary": "56b4e9",
 }
 
 

@@ -8,7 +8,7 @@ from .nodes import ATTRIBUTE, COLORS, RANGE
 from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"
-_TITLES = {BOUNDARY: "Rim", COMPONENT: "Connected Part"}
+_TITLES = {BOUNDARY: "Boundary", COMPONENT: "Connected Part"}
 
 
 def find_display(obj):

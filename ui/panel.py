@@ -16,7 +16,7 @@ _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
 _SETTINGS = (  # what belongs together
-    ("rims", "rim_group", "sheets", "projection"),
+    ("boundary", "boundary_group", "sheets", "projection"),
     ("bandwidth", "neighbors", "bandwidth_factor"),
     ("normals", "areas", "regularization"),
     ("curvature_correction", "symbol_correction"),
@@ -82,12 +82,12 @@ def _draw_job(layout, job):
 
 
 def _draw_result(layout, result):
-    """Draw the total area, and of parts, rims and points left out what is worth telling."""
+    """Draw the total area, and of parts, boundaries and points left out what is worth telling."""
     lines = [("Total Area", area_text(result.total_area))]
-    if result.part_count > 1:
-        lines.append(("Connected Parts", f"{result.part_count:,}"))
-    if result.rim_count:
-        lines.append(("Rim Points", f"{result.rim_count:,}"))
+    if result.component_count > 1:
+        lines.append(("Components", f"{result.component_count:,}"))
+    if result.boundary_count:
+        lines.append(("Boundary Points", f"{result.boundary_count:,}"))
     if result.left_out_count:
         lines.append(("Points Left Out", f"{result.left_out_count:,}"))
     column = layout.column(align=True)
@@ -137,10 +137,12 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
             column = layout.column(align=True)
             for name in group:
                 row = column.row(align=True)
-                if name == "rim_group":
+                if name == "boundary_group":
                     search_group(row, obj.meshfree, name, obj)
                 else:
-                    row.active = name != "rims" or not obj.meshfree.rim_group  # a named rim is not looked for
+                    row.active = (
+                        name != "boundary" or not obj.meshfree.boundary_group
+                    )  # a named boundary is not looked for
                     row.prop(obj.meshfree, name)
 
 

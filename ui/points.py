@@ -3,13 +3,20 @@
 import bpy
 
 from ..operators.objects.counting import members
-from ..operators.objects.groups import ANCHOR, FIXED, HANDLE, RIM, SOURCE, VALUE, has_group
+from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, FIXED, HANDLE, SOURCE, VALUE, has_group
 from ..operators.objects.reading import TYPES
 from ..operators.tools.convert import MESHFREE_OT_convert
 from .panel import SidebarPanel
 from .swatches import swatch
 
-_TITLES = {HANDLE: "Handles", ANCHOR: "Anchors", FIXED: "Fixed", SOURCE: "Sources", VALUE: "Values", RIM: "Rim"}
+_TITLES = {
+    HANDLE: "Handles",
+    ANCHOR: "Anchors",
+    FIXED: "Fixed",
+    SOURCE: "Sources",
+    VALUE: "Values",
+    BOUNDARY_GROUP: "Boundary",
+}
 
 
 class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
@@ -26,7 +33,7 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, obj = self.layout, context.object
         column = layout.column(align=True)
-        for name in ("grow", "component", "front", "rim"):
+        for name in ("grow", "component", "front", "boundary"):
             column.operator(f"meshfree.select_{name}")
         layout.prop(obj.meshfree, "show_groups")
         column = layout.column(align=True)

@@ -34,7 +34,7 @@ def figure_1():
     }.items():
         options = core.LaplacianOptions.paper()
         cloud = read_cloud(points, options)
-        matrix = KernelMatrix(cloud.neighborhoods, cloud.neighborhoods.distance, cloud.rim)
+        matrix = KernelMatrix(cloud.pairs, cloud.pairs.distance, cloud.boundary)
         unit = cloud.scaled.scale**2
         target = np.ones(len(points))
         solve = {

@@ -86,7 +86,7 @@ def pcl(points, time_factor=1.0):
 
     Notes
     -----
-    At a rim, where nothing bounds them, cells reach out some 1.5 spacings: the areas are too large there.
+    At a boundary, where nothing bounds them, cells reach out some 1.5 spacings: the areas are too large there.
     """
     tree = cKDTree(points)
     distance, neighbors = tree.query(points, _VORONOI + 1)

@@ -1,21 +1,21 @@
-"""The curve through the points of a rim that is known, and how far other points are from it."""
+"""The curve through the points of a boundary that is known, and how far other points are from it."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-_AROUND = 9  # nearest points of the rim among which those before and after a point are sought
+_AROUND = 9  # nearest points of the boundary among which those before and after a point are sought
 _OPPOSITE = -0.3  # cosine between the ways to both, at most
 _ROUGH = 0.07  # height of typical points over the line between their neighbours, in units of its length
 _ROUNDS = 3  # of Newton's iteration for the foot
 
 
-class RimCurve:
-    """Parabolas through each point of a rim, the one before and the one after.
+class BoundaryCurve:
+    """Parabolas through each point of a boundary, the one before and the one after.
 
     Parameters
     ----------
     points : ndarray, (k, 3)
-        Points of the rim in any order, at least two different ones [L].
+        Points of the boundary in any order, at least two different ones [L].
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class RimCurve:
     first : ndarray, (m,) int
         Where each was first given.
     rough : bool
-        The points are scattered about a curve, as those found at the rim of a random cloud, instead of along it.
+        The points are scattered about a curve, as those found at the boundary of a random cloud, instead of along it.
     """
 
     def __init__(self, points):
@@ -60,7 +60,7 @@ class RimCurve:
         foot : ndarray, (n, 3)
             The nearest places.
         index : ndarray, (n,) int
-            The nearest points of the rim.
+            The nearest points of the boundary.
         """
         index = self._tree.query(points)[1]
         slope, bend = self._slope[index], self._bend[index]
@@ -75,7 +75,7 @@ class RimCurve:
             t = np.clip(t, self._range[0][index], self._range[1][index])
         return self.points[index] + t[:, None] * slope + t[:, None] ** 2 * bend, index
 
-    def distance(self, points, normals, foot, index, rim_normals):
+    def distance(self, points, normals, foot, index, boundary_normals):
         """Return the distances of points from their feet along a surface, to fourth order.
 
         Parameters
@@ -84,15 +84,15 @@ class RimCurve:
             Points of the surface and its unit normals, of any sign.
         foot, index : ndarray
             From `nearest`.
-        rim_normals : ndarray, (m, 3)
-            Unit normals of the surface at the rim's points.
+        boundary_normals : ndarray, (m, 3)
+            Unit normals of the surface at the boundary's points.
 
         Returns
         -------
         ndarray, (n,)
         """
         way = points - foot
-        other = rim_normals[index]
+        other = boundary_normals[index]
         side = np.where(np.einsum("ic,ic->i", normals, other) < 0.0, -1.0, 1.0)
         turn = np.einsum("ic,ic->i", way, normals - side[:, None] * other)
         return np.sqrt(np.einsum("ic,ic->i", way, way) + turn**2 / 12.0)

@@ -72,7 +72,7 @@ class Deformer:
     to be L x_o, as in the work it cites, in the least-squares sense, so that x_o is a fixed point.
 
     The normal equations, ``K M^-1 K (x - x_o) = 0`` with the stiffness K and the areas M at the points that are free,
-    are factorised. Before the rotation-aware steps each connected part is turned and moved as a whole to where its
+    are factorised. Before the rotation-aware steps each component is turned and moved as a whole to where its
     constrained points fit best, so that parts which are moved rigidly come out rigid to round-off.
 
     References
@@ -253,7 +253,7 @@ class Deformer:
             )
 
     def _choose_moving(self, component, held, weights):
-        """Find the points of connected parts that some constraint holds; all others stay where they are."""
+        """Find the points of components that some constraint holds; all others stay where they are."""
         known = np.unique(component[held[weights > 0.0]])
         known = known[known >= 0]
         self._moving = np.flatnonzero(np.isin(component, known))
@@ -268,8 +268,7 @@ class Deformer:
         if parts:
             free = len(component) - lone - len(self._moving)
             self.notices.append(
-                f"{parts} connected parts with {free} points have neither handles nor anchors. They stay where"
-                " they are."
+                f"{parts} components with {free} points have neither handles nor anchors. They stay where they are."
             )
 
 

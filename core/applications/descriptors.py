@@ -1,4 +1,4 @@
-"""Signatures of points that depend on the inner shape alone: bending the surface does not change them."""
+"""Signatures of points that depend on the inner shape alone: shape_operator the surface does not change them."""
 
 import numpy as np
 

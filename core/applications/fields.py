@@ -8,7 +8,7 @@ from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from ..kernel import SECOND_MOMENT
 from ..operator import narrow_laplacian, solve_symmetric
-from .graph import coupled_parts, mean_spacing
+from .graph import coupled_components, mean_spacing
 
 _MEAN = 1e-2  # of the source's mean size: a larger mean is meant, a smaller one is left by the quadrature
 _DEEP = 0.6  # share of a point's weights that lead to fixed points, where it lies deep inside a set of them
@@ -25,11 +25,11 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Of n points; at rims without fixed points nothing flows across.
+        Of n points; at boundaries without fixed points nothing flows across.
     source : array_like, (n,)
         A function on the points [unit of u / L^2]; one number stands for a constant one.
     fixed : array_like, (k,) int or (n,) bool, optional
-        Points with known values. Fixing the points of a whole rim gives the values there.
+        Points with known values. Fixing the points of a whole boundary gives the values there.
     fixed_values : array_like, (k,), optional
         Their values, in the order of the indices; one number serves all.
     progress : callable, optional
@@ -38,7 +38,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
     Returns
     -------
     ndarray, (n,)
-        u. On connected parts without fixed points the source's mean must vanish, and u has the mean of all fixed
+        u. On components without fixed points the source's mean must vanish, and u has the mean of all fixed
         values there, zero if there are none. Points that were left out have that value too, unless they are fixed.
 
     Raises
@@ -69,7 +69,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
     source = _read_source(source, count)
     index, values = read_values(fixed, fixed_values, count)
     report("Equations", 0.0)
-    part = coupled_parts(laplacian)
+    part = coupled_components(laplacian)
     known = part >= 0
     is_fixed = np.zeros(count, dtype=bool)
     is_fixed[index] = True
@@ -117,7 +117,7 @@ def harmonic_field(laplacian, fixed, fixed_values, progress=None):
     Returns
     -------
     ndarray, (n,)
-        f, nowhere outside the range of the fixed values. Connected parts without fixed points, and points that were
+        f, nowhere outside the range of the fixed values. Components without fixed points, and points that were
         left out, have the mean of the fixed values.
 
     Raises
@@ -196,7 +196,7 @@ def _without_mean(areas, source, part, rows):
     wrong = np.flatnonzero(np.abs(mean) > _MEAN * size)
     if len(wrong):
         raise PointCloudError(
-            f"The source has the mean {mean[wrong[0]]:.3g} over a connected part of"
+            f"The source has the mean {mean[wrong[0]]:.3g} over a component of"
             f" {np.count_nonzero(part == part[rows[wrong[0]]])} points where nothing is fixed: only sources of"
             " mean zero have a solution there. Subtract the area-weighted mean of each part, or fix a point."
         )
@@ -241,26 +241,26 @@ def _blend(weights, share):
 
 
 def _weights(laplacian, fixed, values):
-    """Return pair weights (n, n), and what rims with fixed points add to diagonal and load, (n,).
+    """Return pair weights (n, n), and what boundaries with fixed points add to diagonal and load, (n,).
 
-    Images in such a rim carry ``2 c - f`` instead of f, with c the value at the nearest rim point.
+    Images in such a boundary carry ``2 c - f`` instead of f, with c the value at the nearest boundary point.
     """
     count = len(fixed)
     weights = sparse.diags_array(laplacian.stiffness.diagonal()) - laplacian.stiffness
-    rim = np.flatnonzero(laplacian.boundary)
-    near = np.flatnonzero(laplacian.near_rim)
+    boundary = np.flatnonzero(laplacian.boundary)
+    near = np.flatnonzero(laplacian.near_boundary)
     nothing = np.zeros(count)
-    if not fixed[rim].any() or not laplacian.fixed_images.nnz:
+    if not fixed[boundary].any() or not laplacian.dirichlet_images.nnz:
         return weights.tocsr(), nothing, nothing
-    nearest = rim[cKDTree(laplacian.points[rim]).query(laplacian.points[near], workers=-1)[1]]
+    nearest = boundary[cKDTree(laplacian.points[boundary]).query(laplacian.points[near], workers=-1)[1]]
     chosen, c = np.zeros(count), np.zeros(count)
     chosen[near] = fixed[nearest]
     c[near] = values[nearest]
     only = sparse.diags_array(chosen)
-    plain = (weights - only @ laplacian.natural_images @ only).tocsr()
+    plain = (weights - only @ laplacian.neumann_images @ only).tocsr()
     plain.setdiag(0.0)
-    # An image is no nearer than its point, but for the curvature of the rim.
-    image = (only @ laplacian.fixed_images @ only).tocsr()
+    # An image is no nearer than its point, but for the curvature of the boundary.
+    image = (only @ laplacian.dirichlet_images @ only).tocsr()
     image = image.minimum(plain + sparse.diags_array(image.diagonal()))
     total = image.sum(axis=1)
     return (plain - (image - sparse.diags_array(image.diagonal()))).tocsr(), 2.0 * total, total * c + image @ c

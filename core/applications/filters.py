@@ -144,7 +144,7 @@ def spectral_filter(values, spectrum, areas, response, rest=0.0):
     return result.reshape(values.shape)
 
 
-def chebyshev_filter(laplacian, values, response, fixed_rim=False, raw=False, tolerance=1e-4, progress=None):
+def chebyshev_filter(laplacian, values, response, dirichlet=False, raw=False, tolerance=1e-4, progress=None):
     """Filter a function by a polynomial of the operator, without any eigenvectors.
 
     The result is that of `spectral_filter` with all modes: the polynomial is that of the operator with the symbol
@@ -158,8 +158,8 @@ def chebyshev_filter(laplacian, values, response, fixed_rim=False, raw=False, to
     response : callable
         Maps an array of eigenvalues [1 / L^2] to factors. It should be smooth: the more abrupt, the more products with
         the operator.
-    fixed_rim : bool
-        Take the functions to vanish at the rim, instead of meeting it level.
+    dirichlet : bool
+        Take the functions to vanish at the boundary, instead of meeting it level.
     raw : bool
         Leave out the symbol correction.
     tolerance : float
@@ -184,7 +184,7 @@ def chebyshev_filter(laplacian, values, response, fixed_rim=False, raw=False, to
     report = progress or (lambda stage, fraction: None)
     values = check_values(values, len(laplacian.areas))
     report("Filter", 0.0)
-    order, root, multiply = corrected_operator(laplacian, fixed_rim, raw)
+    order, root, multiply = corrected_operator(laplacian, dirichlet, raw)
     report("Filter", 0.0)
     top = highest_eigenvalue(multiply, len(order))
     coefficients = _polynomial(response, top, tolerance)
@@ -205,7 +205,7 @@ def chebyshev_filter(laplacian, values, response, fixed_rim=False, raw=False, to
     return filtered.reshape(values.shape)
 
 
-def corrected_operator(laplacian, fixed_rim=False, raw=False):
+def corrected_operator(laplacian, dirichlet=False, raw=False):
     """Return the negated operator with the symbol correction as a product with a symmetric matrix.
 
     Returns
@@ -215,7 +215,7 @@ def corrected_operator(laplacian, fixed_rim=False, raw=False):
     multiply : callable
         Of (m, k) arrays: ``S y + mu2 / 8 S (h^2 S y)``, or S y without the correction. Positive semi-definite.
     """
-    order, root, matrix = symmetric_form(laplacian, laplacian.fixed_rim[0] if fixed_rim else laplacian.stiffness)
+    order, root, matrix = symmetric_form(laplacian, laplacian.dirichlet[0] if dirichlet else laplacian.stiffness)
     if raw or not laplacian.options.symbol_correction:
         return order, root, lambda y: matrix @ y
     squared = (SECOND_MOMENT / 8.0) * laplacian.smoothing_lengths[order, None] ** 2

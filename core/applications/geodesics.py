@@ -11,7 +11,7 @@ from .graph import mean_spacing
 
 _BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
 _BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
-_GAP = 0.9  # spacings between the middle of a pair next to a rim and the nearest point: the surface is there
+_GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point: the surface is there
 
 
 def geodesic_distance(laplacian, sources, progress=None):
@@ -29,7 +29,7 @@ def geodesic_distance(laplacian, sources, progress=None):
     Returns
     -------
     ndarray, (n,)
-        Distances [L], zero at the sources; infinity on connected parts without a source and at points left out.
+        Distances [L], zero at the sources; infinity on components without a source and at points left out.
 
     Raises
     ------
@@ -87,8 +87,8 @@ def _lengths_of_pairs(laplacian):
         arcs[block] = length * np.where(bend > 1e-4, np.arcsin(bend) / np.maximum(bend, 1e-4), 1.0)
         short = length < 0.5 * (laplacian.smoothing_lengths[i] + laplacian.smoothing_lengths[j])
         kept[block] = short | (bend < _BEND)
-        # The straight way between two points near a rim may lead through a hole or past a bay.
-        doubtful = np.flatnonzero(kept[block] & laplacian.near_rim[i] & laplacian.near_rim[j] & ~short)
+        # The straight way between two points near a boundary may lead through a hole or past a bay.
+        doubtful = np.flatnonzero(kept[block] & laplacian.near_boundary[i] & laplacian.near_boundary[j] & ~short)
         middle = 0.5 * (points[i[doubtful]] + points[j[doubtful]])
         height = 0.25 * length[doubtful] * bend[doubtful]
         reach = _GAP * 0.5 * (spacing[i[doubtful]] + spacing[j[doubtful]]) + height

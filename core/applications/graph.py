@@ -19,7 +19,7 @@ class NearGraph:
     Attributes
     ----------
     lengths : csr_array, (m, m)
-        Symmetric; distances of joined places [L], all positive. All places of a connected part hang together.
+        Symmetric; distances of joined places [L], all positive. All places of a component hang together.
     place : ndarray, (n,) int
         Row of each of the caller's points, the same for points at the same place; -1 for points left out.
     first : ndarray, (m,) int
@@ -30,7 +30,7 @@ class NearGraph:
     place: np.ndarray
     first: np.ndarray
 
-    def hand_out(self, quantity, neutral):
+    def scatter(self, quantity, neutral):
         """Return a quantity of the places, (m,), for the caller's points; those left out get the neutral value."""
         result = quantity[self.place]
         result[self.place < 0] = neutral
@@ -83,7 +83,7 @@ def _coupled(stiffness, first, index):
 
 
 def _bridge(lengths, points, label):
-    """Join pieces of one connected part at their nearest points, so that it hangs together.
+    """Join pieces of one component at their nearest points, so that it hangs together.
 
     The stiffness leaves a point without pairs where no other one seems to lie on its sheet.
     """
@@ -107,10 +107,10 @@ def _bridge(lengths, points, label):
     return (lengths + bridges + bridges.T).tocsr()
 
 
-def coupled_parts(laplacian):
+def coupled_components(laplacian):
     """Number the parts of the cloud between which the operator couples no points, (n,) int.
 
-    Parts of fewer than 50 points are -1: points left out, and single ones within a connected part that are so far off
+    Parts of fewer than 50 points are -1: points left out, and single ones within a component that are so far off
     its surface that they lost all neighbours.
     """
     count, label = connected_components(laplacian.stiffness, directed=False)

@@ -1,4 +1,4 @@
-"""Minimal surfaces through fixed rims: the problem of Plateau, Figure 14 of the paper."""
+"""Minimal surfaces through fixed boundaries: the problem of Plateau, Figure 14 of the paper."""
 
 from dataclasses import dataclass, replace
 
@@ -10,23 +10,26 @@ from ..errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloud
 from ..geometry import FEWEST, as_mask, check_points, find_nearest
 from ..operator import Iterate, LaplaceBeltrami, build_laplacian, conjugate_gradients
 from ..options import LaplacianOptions
-from .boundary_curve import RimCurve
+from .boundary_curve import BoundaryCurve
 
-_REACH = 8.0  # smoothing lengths from the rim at which no kernel sees it, also after a step
+_REACH = 8.0  # smoothing lengths from the boundary at which no kernel sees it, also after a step
 _TURN = 0.3  # most that Newton's step may move a point, in units of the radius to which the surface bends there
 _RISE = 3e-3  # share of the area by which the measured one may rise by chance
 _HALVINGS = 3  # of a step that went too far
 _NECK = 0.7  # smoothing length over the radius to which the surface bends, where it is no longer resolved
 _FEW = 16  # points that may be less well resolved, or lie at a free edge by mistake
 _SURPLUS = 0.01  # of the tolerance: the area that may still be saved when the iteration ends
-_FREE_EDGE, _ON_CURVE = 4.0, 0.5  # spacings from fixed points to points of a free edge; from the rim's curve to its own
-_LOPSIDED = 0.2  # mean offset of the neighbours over their mean distance at a rim, at least
+_FREE_EDGE, _ON_CURVE = (
+    4.0,
+    0.5,
+)  # spacings from fixed points to points of a free edge; from the boundary's curve to its own
+_LOPSIDED = 0.2  # mean offset of the neighbours over their mean distance at a boundary, at least
 _RTOL, _PRODUCTS = 1e-6, 500  # of the linear solves
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MinimalSurface:
-    """Points moved towards the least area that their fixed rim can span.
+    """Points moved towards the least area that their fixed boundary can span.
 
     Attributes
     ----------
@@ -69,7 +72,7 @@ def minimal_surface(
     points : array_like, (n, 3)
         Coordinates of a surface that ends at the fixed points [L].
     fixed : array_like, (n,) bool or (k,) int
-        Points that stay: every rim of the surface, and others at will.
+        Points that stay: every boundary of the surface, and others at will.
     epsilon : float
         The iteration ends when a step changes the area by a smaller share than this, and the next one could save no
         more than a hundredth of it. Zero: go on to the last step.
@@ -100,17 +103,17 @@ def minimal_surface(
 
     Notes
     -----
-    The paper, after Pinkall and Polthier, solves L x = 0 for the coordinates with the rim points fixed, and repeats
-    this with the operator of the new points. Taken literally that fails in two ways. Next to a rim the kernel is cut
-    off, so that areas come out too large there and the operator pulls points away from the rim: within about five steps
-    the surface slides off and collapses. And points drift within the surface, which costs no area, so that the
-    iteration never settles.
+    The paper, after Pinkall and Polthier, solves L x = 0 for the coordinates with the boundary points fixed, and
+    repeats this with the operator of the new points. Taken literally that fails in two ways. Next to a boundary the
+    kernel is cut off, so that areas come out too large there and the operator pulls points away from the boundary:
+    within about five steps the surface slides off and collapses. And points drift within the surface, which costs no
+    area, so that the iteration never settles.
 
-    Here the mirror image of a point in the rim carries ``2 c - x``, c being the place on the rim next to it. A motion
-    along the normals, x + u n, changes the area by ``-r . u`` with ``r = n . (pull c - K x)``, and to second order by
-    the Jacobi operator ``K - areas |A|^2``, with |A|^2 the sum of the squared principal curvatures. Newton's step
-    ``(K - areas |A|^2) u = r`` settles within a few repetitions where the paper's iteration, moved along the normals
-    only, would settle: at r = 0.
+    Here the mirror image of a point in the boundary carries ``2 c - x``, c being the place on the boundary next to it.
+    A motion along the normals, x + u n, changes the area by ``-r . u`` with ``r = n . (pull c - K x)``, and to second
+    order by the Jacobi operator ``K - areas |A|^2``, with |A|^2 the sum of the squared principal curvatures. Newton's
+    step ``(K - areas |A|^2) u = r`` settles within a few repetitions where the paper's iteration, moved along the
+    normals only, would settle: at r = 0.
 
     Newton's step is taken where that matrix is definite and no point moves further than a share of the radius to which
     the surface bends there. Otherwise, far from the end or on the way to a pinching neck, the step is that of the
@@ -118,9 +121,9 @@ def minimal_surface(
     long steps along the normals would draw the top of a hemisphere to a spike. A step that still raises the measured
     area is halved.
 
-    Rims too far apart span no surface in one piece: then the neck shrinks until the points no longer resolve it. That
-    is reported as pinching, with the last surface that they did resolve. On the way the area may hardly change for many
-    steps; that the Jacobi operator is definite tells a surface that has settled from one that has not.
+    Boundaries too far apart span no surface in one piece: then the neck shrinks until the points no longer resolve it.
+    That is reported as pinching, with the last surface that they did resolve. On the way the area may hardly change for
+    many steps; that the Jacobi operator is definite tells a surface that has settled from one that has not.
 
     References
     ----------
@@ -175,7 +178,7 @@ def _notices(reason, steps):
         "step limit": (f"The surface had not settled after {steps} steps. Allow more steps, or a larger tolerance."),
         "stopped": (f"The iteration was stopped after {steps} steps, before the surface had settled."),
         "pinching": (
-            f"The surface pinches: after {steps} steps the points no longer resolve its neck. These rims"
+            f"The surface pinches: after {steps} steps the points no longer resolve its neck. These boundaries"
             " span no surface in one piece; move them closer together. The last sound step was kept."
         ),
         "unresolved": (
@@ -219,26 +222,26 @@ class _State:
 
 
 class _Film:
-    """What stays the same while the surface moves: its rim, the free points, and the settings."""
+    """What stays the same while the surface moves: its boundary, the free points, and the settings."""
 
     def __init__(self, first, fixed, options, progress):
         self.options, self.progress = options, progress
-        self.rim = _rim_points(first, fixed)
-        self.curve = RimCurve(first.points[self.rim]) if len(self.rim) else None
+        self.boundary = _boundary_points(first, fixed)
+        self.curve = BoundaryCurve(first.points[self.boundary]) if len(self.boundary) else None
         self.free = np.flatnonzero(~fixed & (first.component >= 0))
         self.parts = first.component.max()
 
     def state(self, points, before):
-        """Build the operator of moved points, with the rim's distances by the normals before, and the next step."""
+        """Build the operator of moved points, the boundary's distances by the normals before, and the next step."""
         distance, foot = None, points
-        if len(self.rim):
+        if len(self.boundary):
             foot, index = self.curve.nearest(points)
-            if not self.curve.rough:  # otherwise the operator fits a rim's course to them
-                normals = before.normals[self.rim[self.curve.first]]
+            if not self.curve.rough:  # otherwise the operator fits a boundary's course to them
+                normals = before.normals[self.boundary[self.curve.first]]
                 distance = self.curve.distance(points, before.normals, foot, index, normals)
                 distance[distance > _REACH * before.smoothing_lengths] = np.inf
         laplacian = build_laplacian(
-            points, options=self.options, boundary=self.rim, boundary_distance=distance, progress=self.progress
+            points, options=self.options, boundary=self.boundary, boundary_distance=distance, progress=self.progress
         )
         torn = np.count_nonzero(laplacian.component[self.free] < 0)
         if torn or laplacian.component.max() > self.parts:
@@ -246,11 +249,11 @@ class _Film:
         return self._with_step(points, laplacian, foot)
 
     def _with_step(self, points, laplacian, foot):
-        stiffness, pull = laplacian.fixed_rim
+        stiffness, pull = laplacian.dirichlet
         free = self.free[stiffness.diagonal()[self.free] > 0.0]  # in noise a point may lie on a sheet of its own
         pulled = (pull @ foot - stiffness @ points)[free]
         normals, areas = laplacian.normals[free], laplacian.areas[free]
-        bend = 4.0 * laplacian.mean_bend[free] ** 2 - 2.0 * laplacian.gaussian_curvature[free]
+        bend = 4.0 * laplacian.mean_curvature[free] ** 2 - 2.0 * laplacian.gaussian_curvature[free]
         bend = np.sqrt(np.maximum(bend, 0.0))  # |A|
         stiffness = stiffness[free][:, free]
         force = np.einsum("ic,ic->i", normals, pulled)
@@ -298,20 +301,20 @@ class _Film:
         return before, failure
 
 
-def _rim_points(laplacian, fixed):
-    """Return those of the fixed points that lie at a rim, (k,) int, after checks."""
+def _boundary_points(laplacian, fixed):
+    """Return those of the fixed points that lie at a boundary, (k,) int, after checks."""
     points, found, component = laplacian.points, laplacian.boundary, laplacian.component
     rows = np.flatnonzero(fixed)
     if len(np.unique(points[rows], axis=0)) < FEWEST or len(rows) == len(points):
         raise InvalidPointsError(
-            f"{len(rows)} of {len(points)} points are fixed. Fix the points of the rim, at least {FEWEST}"
+            f"{len(rows)} of {len(points)} points are fixed. Fix the points of the boundary, at least {FEWEST}"
             " different ones, and leave the others free."
         )
     loose = np.setdiff1d(component[component >= 0], component[rows])
     if len(loose):
         raise InvalidPointsError(
             f"{np.count_nonzero(np.isin(component, loose))} of {len(points)} points are in parts of the surface"
-            " without fixed points, which would shrink to nothing. Fix their rims, or delete them."
+            " without fixed points, which would shrink to nothing. Fix their boundaries, or delete them."
         )
     nearest = find_nearest(points)
     tree = cKDTree(points[rows])
@@ -323,10 +326,10 @@ def _rim_points(laplacian, fixed):
         )
     sure = np.flatnonzero(fixed & found)
     if len(np.unique(points[sure], axis=0)) >= FEWEST:
-        foot, _ = RimCurve(points[sure]).nearest(points[rows])
+        foot, _ = BoundaryCurve(points[sure]).nearest(points[rows])
         away = np.linalg.norm(points[rows] - foot, axis=1)
         return rows[away < _ON_CURVE * nearest.spacing[rows]]
-    # No rim was found there: the fixed points are one if they have neighbours on one side only.
+    # No boundary was found there: the fixed points are one if they have neighbours on one side only.
     offset = points[nearest.index[rows]] - points[rows, None]
     mean = np.linalg.norm(np.einsum("ik,ikc->ic", nearest.weight[rows], offset), axis=1)
     lopsided = mean > _LOPSIDED * np.einsum("ik,ik->i", nearest.weight[rows], nearest.distance[rows])

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from ..errors import InvalidPointsError, IslandError, PointCloudError, TooFewPointsError, UnresolvedModesError
+from ..errors import ComponentError, InvalidPointsError, PointCloudError, TooFewPointsError, UnresolvedModesError
 from ..geometry import check_values
 from ..kernel import RESOLVED
 from .graph import near_graph
@@ -46,7 +46,7 @@ def nodal_domains(values, laplacian, threshold=0.02, bridge=0.1, smallest=5):
     ndarray, (n,) int
         Domain of each point: 0 for the one of most points, and so on; -1 for points left out of the operator. Of
         equally large domains the one with the larger mean value comes first. Where the function is near zero on a
-        whole connected part, that is one domain.
+        whole component, that is one domain.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def nodal_domains(values, laplacian, threshold=0.02, bridge=0.1, smallest=5):
     positive = (value > 0.0).astype(int)
     domain = _hills(graph.lengths, positive, np.abs(value), threshold, bridge)
     domain[np.bincount(domain + 1)[domain + 1] < smallest] = -1
-    # A connected part where no domain is left is one.
+    # A component where no domain is left is one.
     empty = np.bincount(part, domain >= 0) == 0
     domain = np.where(empty[part], domain.max() + 1 + part, domain)
     domain = _join_nearest(_keep_edges(graph.lengths, positive), domain)
@@ -80,7 +80,7 @@ def nodal_domains(values, laplacian, threshold=0.02, bridge=0.1, smallest=5):
 
 
 def segment(laplacian, parts, spectrum=None, progress=None):
-    """Divide the surface into a number of connected parts, such as the limbs of a figure.
+    """Divide the surface into a number of components, such as the limbs of a figure.
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
     factor that fades to zero at the last mode used, so that their distances depend neither on the signs of modes nor on
@@ -92,7 +92,7 @@ def segment(laplacian, parts, spectrum=None, progress=None):
     laplacian : LaplaceBeltrami
         Of n points.
     parts : int
-        How many parts; at least one for each connected part of the cloud. The others are dealt out by area.
+        How many parts; at least one for each component of the cloud. The others are dealt out by area.
     spectrum : Spectrum, optional
         Its natural modes, to save time; used if there are enough of them, which is ``modes_needed``.
     progress : callable, optional
@@ -109,8 +109,8 @@ def segment(laplacian, parts, spectrum=None, progress=None):
     ------
     TooFewPointsError
         A number of parts below 1, or more than the points can be divided into.
-    IslandError
-        Fewer parts than connected parts.
+    ComponentError
+        Fewer parts than components.
     InvalidPointsError
         A spectrum of other points.
 
@@ -121,11 +121,11 @@ def segment(laplacian, parts, spectrum=None, progress=None):
     n = len(laplacian.points)
     if isinstance(parts, bool) or not isinstance(parts, (int, np.integer)) or parts < 1:
         raise TooFewPointsError(f"{parts!r} parts were asked for. Ask for a whole number of at least 1.")
-    islands = int(laplacian.component.max()) + 1
-    if parts < islands:
-        raise IslandError(
-            f"{parts} parts were asked for, but the {n} points lie in {islands} connected parts that cannot be"
-            f" joined. Ask for at least {islands}, or delete the small ones."
+    components = int(laplacian.component.max()) + 1
+    if parts < components:
+        raise ComponentError(
+            f"{parts} parts were asked for, but the {n} points lie in {components} components that cannot be"
+            f" joined. Ask for at least {components}, or delete the small ones."
         )
     if spectrum is not None and len(spectrum.eigenvectors) != n:
         raise InvalidPointsError(
@@ -134,18 +134,18 @@ def segment(laplacian, parts, spectrum=None, progress=None):
     report = progress or (lambda stage, fraction: None)
     report("Parts", 0.0)
     graph = near_graph(laplacian, _NEIGHBORS)
-    island, areas = laplacian.component[graph.first], _areas_of_places(laplacian, graph)
-    share = _deal(parts, np.bincount(island, areas))
-    part = island.copy()
-    if parts > islands:
+    component, areas = laplacian.component[graph.first], _areas_of_places(laplacian, graph)
+    share = _deal(parts, np.bincount(component, areas))
+    part = component.copy()
+    if parts > components:
         signature = _signature(laplacian, parts, spectrum, report)[graph.first]
         report("Parts", 0.0)
         label = np.concatenate([[0], np.cumsum(share)])
         for number in np.flatnonzero(share > 1):
-            own = np.flatnonzero(island == number)
+            own = np.flatnonzero(component == number)
             part[own] = label[number] + _cluster(signature[own], areas[own], share[number])
         for number in np.flatnonzero(share == 1):
-            part[island == number] = label[number]
+            part[component == number] = label[number]
     part = _join_nearest(graph.lengths, _main_pieces(graph.lengths, part, areas))
     center = laplacian.areas @ laplacian.points / laplacian.areas.sum()
     return _by_size(graph, part, np.linalg.norm(laplacian.points - center, axis=1))
@@ -195,7 +195,7 @@ def _signature(laplacian, parts, spectrum, progress):
 
 
 def _deal(parts, areas):
-    """Deal parts out to islands: one to each, each other one where the area per part is largest then."""
+    """Deal parts out to components: one to each, each other one where the area per part is largest then."""
     share = np.ones(len(areas), dtype=int)
     for _ in range(parts - len(areas)):
         share[np.argmax(areas / share)] += 1
@@ -366,7 +366,7 @@ def _join_nearest(lengths, label):
 
 def _by_size(graph, label, values):
     """Return labels for the caller's points, numbered by how many points have them, and by mean values among equals."""
-    label = graph.hand_out(label, -1)
+    label = graph.scatter(label, -1)
     known = label >= 0
     _, inverse, size = np.unique(label[known], return_inverse=True, return_counts=True)
     mean = np.bincount(inverse, values[known]) / size

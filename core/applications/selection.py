@@ -23,7 +23,7 @@ def grow(laplacian, chosen, distance):
     chosen : array_like, (k,) int or (n,) bool
         The set, which may be empty.
     distance : float
-        How far to grow [L], not negative; infinity selects whole connected parts.
+        How far to grow [L], not negative; infinity selects whole components.
 
     Returns
     -------
@@ -49,4 +49,4 @@ def grow(laplacian, chosen, distance):
     if not len(start):
         return mask.copy()
     way = dijkstra(graph.lengths, directed=False, indices=start, min_only=True, limit=reach)
-    return mask | graph.hand_out(np.isfinite(way), False)
+    return mask | graph.scatter(np.isfinite(way), False)

@@ -10,7 +10,7 @@ _AGREE = 0.25  # volumes by the three axes differ by less, unless signs of the n
 
 
 class SurfaceSize:
-    """Area or volume of each connected part after its points move, measured by the operator of the points before.
+    """Area or volume of each component after its points move, measured by the operator of the points before.
 
     The operator gives the metric of the moved surface, ``P = sum_j w_ij (x'_j - x'_i) (x'_j - x'_i)^T / (2 areas_i)``:
     its two large eigenvalues multiply to the square of the growth of the area, and the vector to the small one is the
@@ -37,7 +37,7 @@ class SurfaceSize:
             lost = np.abs(along - self.before[:, None]).max(axis=1) > _AGREE * self.before
             if lost.any():
                 raise PointCloudError(
-                    f"{np.count_nonzero(lost)} of {len(lost)} connected parts enclose no volume by their"
+                    f"{np.count_nonzero(lost)} of {len(lost)} components enclose no volume by their"
                     " normals. Let the normals point outwards everywhere, or keep the area."
                 )
 
@@ -95,6 +95,6 @@ def match_size(size, wanted, touched):
         step = np.where(np.isfinite(step), np.clip(step, -0.5 * scale, 0.5 * scale), 0.0)
         last, scale = scale, np.clip(scale - step, 1.0 / _SCALE, _SCALE)
     raise SolverError(
-        f"{np.count_nonzero(np.abs(error) >= 1e-9)} of {len(wanted)} connected parts lose too much of their size"
+        f"{np.count_nonzero(np.abs(error) >= 1e-9)} of {len(wanted)} components lose too much of their size"
         " for a scale to bring it back. Smooth less, or do not keep the size."
     )

@@ -12,7 +12,7 @@ from .sizes import SurfaceSize, match_size
 
 _KEPT = (None, "area", "volume")
 _TOLERANCE = 1e-5  # of the factors: the coordinates are large next to the spacing
-_AROUND = 4  # neighbours along the rim that a rim point is joined to
+_AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 
 def smooth_points(
@@ -22,13 +22,13 @@ def smooth_points(
     strength=1.0,
     mask=None,
     keep=None,
-    fixed_rim=False,
+    dirichlet=False,
     progress=None,
     base=None,
 ):
     """Filter the shape of the surface by frequency.
 
-    The coordinates are three functions on the points. Each connected part keeps its centre, so that the result moves
+    The coordinates are three functions on the points. Each component keeps its centre, so that the result moves
     and turns with the points, and parts do not collapse into each other.
 
     Parameters
@@ -39,7 +39,7 @@ def smooth_points(
         eigenvalues [1 / L^2] to factors, such as `exponential`, `band` and `boost` return; without a spectrum it needs
         no eigenvectors and should be smooth.
     spectrum : Spectrum, optional
-        Of this operator, with its fixed_rim. What it does not hold takes the response at its highest eigenvalue, or is
+        Of this operator, with its dirichlet. What it does not hold takes the response at its highest eigenvalue, or is
         dropped where the response is a number. Eigenvalues matter for callables alone: for many modes, beyond those
         that are resolved, ``eigenpairs(count, raw=True)`` will do.
     strength : float
@@ -47,15 +47,15 @@ def smooth_points(
     mask : array_like, (n,), optional
         Weight of each point from 0, which stays where it is, to 1, such as those of a vertex group.
     keep : {None, "area", "volume"}
-        Scale the filtered shape about the centre of each connected part (of the masked region) so that the result has
+        Scale the filtered shape about the centre of each component (of the masked region) so that the result has
         its area, or enclosed volume, before. The volume needs a closed surface and normals that point outwards.
-    fixed_rim : bool
-        Rim points stay where they are: what is filtered is the distance from the surface that spans the rim like a soap
-        film. Otherwise a rim shrinks like all else, as the modes meet it level.
+    dirichlet : bool
+        Boundary points stay where they are: what is filtered is the distance from the surface that spans the boundary
+        like a soap film. Otherwise a boundary shrinks like all else, as the modes meet it level.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
     base : ndarray, (n, 3), optional
-        From `smoothing_base` with the same fixed_rim, to save its time.
+        From `smoothing_base` with the same dirichlet, to save its time.
 
     Returns
     -------
@@ -75,21 +75,21 @@ def smooth_points(
     """
     if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
-    blend = PointBlend(laplacian, strength, mask, keep, fixed_rim)
-    base = smoothing_base(laplacian, fixed_rim, progress) if base is None else base
+    blend = PointBlend(laplacian, strength, mask, keep, dirichlet)
+    base = smoothing_base(laplacian, dirichlet, progress) if base is None else base
     rest = laplacian.points - base
     if spectrum is None and callable(response):
-        filtered = chebyshev_filter(laplacian, rest, response, fixed_rim, tolerance=_TOLERANCE, progress=progress)
+        filtered = chebyshev_filter(laplacian, rest, response, dirichlet, tolerance=_TOLERANCE, progress=progress)
     elif callable(response):
         end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
         filtered = spectral_filter(rest, spectrum, laplacian.areas, response, end)
     else:
         if spectrum is None:
-            spectrum = laplacian.eigenpairs(response, raw=True, fixed_rim=fixed_rim, progress=progress)
+            spectrum = laplacian.eigenpairs(response, raw=True, dirichlet=dirichlet, progress=progress)
         parts = laplacian.component.max() + 1
-        if not fixed_rim and response <= parts:
+        if not dirichlet and response <= parts:
             raise PointCloudError(
-                f"The first {response} modes move {parts} connected part(s) as a whole and have no shape. Keep"
+                f"The first {response} modes move {parts} component(s) as a whole and have no shape. Keep"
                 f" at least {parts + 3} modes."
             )
         filtered = spectral_filter(rest, spectrum, laplacian.areas, response)
@@ -103,7 +103,7 @@ def fair_points(
     strength=1.0,
     mask=None,
     keep=None,
-    fixed_rim=False,
+    dirichlet=False,
     progress=None,
     base=None,
 ):
@@ -121,7 +121,7 @@ def fair_points(
         square of the smoothing lengths, which removes the noise of single points.
     order : int
         1, 2 or 3: the higher, the sharper the line between what stays and what goes.
-    strength, mask, keep, fixed_rim, progress, base
+    strength, mask, keep, dirichlet, progress, base
         As in `smooth_points`.
 
     Returns
@@ -148,7 +148,7 @@ def fair_points(
     if time is None:
         known = laplacian.component >= 0
         time = 0.5 * np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known])
-    return smooth_points(laplacian, fairing(time, order), None, strength, mask, keep, fixed_rim, progress, base)
+    return smooth_points(laplacian, fairing(time, order), None, strength, mask, keep, dirichlet, progress, base)
 
 
 def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
@@ -189,13 +189,13 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
     return points + (amplitude * np.cos(phase) / largest) * mode[:, None] * laplacian.normals
 
 
-def smoothing_base(laplacian, fixed_rim=False, progress=None):
+def smoothing_base(laplacian, dirichlet=False, progress=None):
     """Return the part of the points' places that filters leave alone.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-    fixed_rim : bool
+    dirichlet : bool
         As in `smooth_points`.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
@@ -203,18 +203,18 @@ def smoothing_base(laplacian, fixed_rim=False, progress=None):
     Returns
     -------
     ndarray, (n, 3)
-        The centre of each connected part or, with a fixed rim, the harmonic surface that spans it [L].
+        The centre of each component or, with a fixed boundary, the harmonic surface that spans it [L].
     """
     points, part = laplacian.points, laplacian.component
     base = points.copy()
     known = part >= 0
     base[known] = _centers(laplacian, laplacian.areas)[part[known]]
-    if fixed_rim:
-        rim = rim_places(laplacian)
-        pull = laplacian.fixed_rim[1]
-        order, root, multiply = corrected_operator(laplacian, fixed_rim=True, raw=True)
-        # In terms of the distance from the centre: parts without a rim, whose equations are singular, stay there.
-        force = (pull @ np.where(laplacian.near_rim[:, None], rim - base, 0.0))[order] * root[:, None]
+    if dirichlet:
+        boundary = boundary_places(laplacian)
+        pull = laplacian.dirichlet[1]
+        order, root, multiply = corrected_operator(laplacian, dirichlet=True, raw=True)
+        # In terms of the distance from the centre: parts without a boundary, whose equations are singular, stay there.
+        force = (pull @ np.where(laplacian.near_boundary[:, None], boundary - base, 0.0))[order] * root[:, None]
         operator = LinearOperator((len(order),) * 2, matvec=multiply, dtype=np.float64)
         base[order] += root[:, None] * np.column_stack(
             [solve_symmetric(operator, column, progress=progress) for column in force.T]
@@ -223,7 +223,7 @@ def smoothing_base(laplacian, fixed_rim=False, progress=None):
 
 
 def _centers(laplacian, weights):
-    """Return the weighted mean of the points of each connected part, (parts, 3); that of weight zero is not used."""
+    """Return the weighted mean of the points of each component, (parts, 3); that of weight zero is not used."""
     known = laplacian.component >= 0
     part, weights = laplacian.component[known], weights[known]
     total = np.bincount(part, weights)
@@ -232,40 +232,42 @@ def _centers(laplacian, weights):
     return np.column_stack(sums) / total[:, None]
 
 
-def rim_places(laplacian):
-    """Return the place on the rim nearest to every point next to one, (n, 3) [L]; other rows are the points themselves.
+def boundary_places(laplacian):
+    """Return the place on the boundary nearest to every point next to one, (n, 3) [L]; other rows are the points
+    themselves.
 
-    The rim runs straight from each rim point to its neighbours on the rim, moved outwards to where the operator takes
-    it to be: of random points, those at the rim lie a little inside.
+    The boundary runs straight from each boundary point to its neighbours on the boundary, moved outwards to where the
+    operator takes it to be: of random points, those at the boundary lie a little inside.
     """
     places = laplacian.points.copy()
-    near = laplacian.near_rim & (laplacian.component >= 0)
-    rim = np.flatnonzero(laplacian.boundary & near)
+    near = laplacian.near_boundary & (laplacian.component >= 0)
+    boundary = np.flatnonzero(laplacian.boundary & near)
     rows = np.flatnonzero(near)
     if not len(rows):
         return places
-    if not len(rim):
+    if not len(boundary):
         raise PointCloudError(
-            f"{len(rows)} points are next to a rim that has no points, so that nothing holds it. Name the rim's points."
+            f"{len(rows)} points are next to a boundary that has no points, so that nothing holds it. Name the"
+            " boundary's points."
         )
     # Parts are searched apart from each other, by a fourth coordinate that divides them.
     far = 4.0 * np.ptp(laplacian.points, axis=0).max()
     located = np.column_stack([laplacian.points, far * laplacian.component])
-    tree = cKDTree(located[rim])
+    tree = cKDTree(located[boundary])
     _, nearest = tree.query(located[rows])
-    count = min(_AROUND + 1, len(rim))
-    length, index = tree.query(located[rim], k=np.arange(1, count + 1))
-    start = laplacian.points[rim[nearest]]
-    along = laplacian.points[rim[index[nearest]]] - start[:, None]
-    along[length[nearest] > laplacian.smoothing_lengths[rim[nearest], None]] = 0.0  # not across to another course
+    count = min(_AROUND + 1, len(boundary))
+    length, index = tree.query(located[boundary], k=np.arange(1, count + 1))
+    start = laplacian.points[boundary[nearest]]
+    along = laplacian.points[boundary[index[nearest]]] - start[:, None]
+    along[length[nearest] > laplacian.smoothing_lengths[boundary[nearest], None]] = 0.0  # not across to another course
     squared = np.einsum("ikc,ikc->ik", along, along)
     offset = laplacian.points[rows] - start
     share = np.einsum("ikc,ic->ik", along, offset) / np.where(squared > 0.0, squared, 1.0)
     foot = np.clip(share, 0.0, 1.0)[:, :, None] * along
     distance = np.linalg.norm(offset[:, None] - foot, axis=2)
     every, best = np.arange(len(rows)), np.argmin(distance, axis=1)
-    beyond = np.maximum(laplacian.rim_distance[rows] - distance[every, best], 0.0)
-    places[rows] = start + foot[every, best] + beyond[:, None] * laplacian.rim_direction[rows]
+    beyond = np.maximum(laplacian.boundary_distance[rows] - distance[every, best], 0.0)
+    places[rows] = start + foot[every, best] + beyond[:, None] * laplacian.boundary_direction[rows]
     return places
 
 
@@ -274,7 +276,7 @@ class PointBlend:
 
     Parameters
     ----------
-    laplacian, strength, mask, keep, fixed_rim
+    laplacian, strength, mask, keep, dirichlet
         As in `smooth_points`, whose results without these are filtered places.
 
     Raises
@@ -283,7 +285,7 @@ class PointBlend:
         A mask, strength or choice that makes no sense.
     """
 
-    def __init__(self, laplacian, strength=1.0, mask=None, keep=None, fixed_rim=False):
+    def __init__(self, laplacian, strength=1.0, mask=None, keep=None, dirichlet=False):
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         if not np.isfinite(strength):
@@ -296,19 +298,19 @@ class PointBlend:
             )
         weights = np.clip(weights, 0.0, 1.0)
         weights[laplacian.component < 0] = 0.0
-        if fixed_rim:
+        if dirichlet:
             weights[laplacian.boundary] = 0.0  # also in corners, where the images are not exact
         if not weights.any():
             raise PointCloudError(f"The mask is zero at all {n} points, so that none would move. Choose some points.")
         self.mask, self.weights = weights, strength * weights
         if keep not in _KEPT:
             raise PointCloudError(f"What to keep is {keep!r}. Choose one of None, 'area', 'volume'.")
-        if keep is not None and fixed_rim:
-            raise PointCloudError("A rim that stays fixes the size already: keep neither area nor volume with it.")
+        if keep is not None and dirichlet:
+            raise PointCloudError("A boundary that stays fixes the size already: keep neither area nor volume with it.")
         if keep == "volume" and laplacian.boundary.any():
             parts = len(np.unique(laplacian.component[laplacian.boundary]))
             raise PointCloudError(
-                f"Connected parts that have a rim and enclose no volume: {parts}. Keep the area instead."
+                f"Components that have a boundary and enclose no volume: {parts}. Keep the area instead."
             )
 
     def __call__(self, filtered):

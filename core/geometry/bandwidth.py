@@ -11,7 +11,7 @@ _NARROWEST = (0.30, 0.30, 0.30, 0.38)
 _ROOM = 0.76  # h / d100 up to which it is widened before a place where it is larger
 _BEND = 0.33  # h times the principal curvature: how far the kernel may reach around a bend
 _AROUND = np.pi / SUPPORT  # the same, at most: beyond half a turn the kernel would reach what is on the other side
-_ACROSS = 0.4  # h over the depth of the surface, at most: images know of two rims, not of those on the other side
+_ACROSS = 0.4  # h over the depth of the surface, at most: images know of two boundaries, not of those on the other side
 _TIGHTEST = 1.2  # spacings that h keeps even there
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
 _SLOPE = 0.02  # most that h grows along the surface, by its length, where there is room for a wider kernel
@@ -20,7 +20,7 @@ _NOISE = 0.10  # changes of log d100 that may be chance
 _SLOW, _FAST, _SMOOTH, _LAST = 160, 10, 12, 2  # rounds of averaging over the 40 nearest neighbours
 
 
-def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, deepest=None):
+def smoothing_lengths(nearest, options, label=None, max_abs_curvature=None, inside=None, deepest=None):
     """Choose h for every point.
 
     Parameters
@@ -31,10 +31,10 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
         Its bandwidth, neighbors and bandwidth_factor.
     label : ndarray, (m,) int, optional
         Parts of the cloud; neighbours are counted within a part.
-    steepest : ndarray, (m,), optional
+    max_abs_curvature : ndarray, (m,), optional
         The larger principal curvature of every point; for "adaptive".
     inside : ndarray, (m, 2), optional
-        Distances to rims; a neighbourhood that it cuts counts as whole.
+        Distances to boundaries; a neighbourhood that it cuts counts as whole.
     deepest : ndarray, (m,), optional
         The `depth` of the surface; h stays small where it is narrow.
 
@@ -46,7 +46,7 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
         without what may be chance, and without changes over the part that one h serves as well, times a factor between
         0.3 and 0.58 that is as large as the irregularity of the spacing demands and the curvature permits. Where the
         surface bends most, as on a bead of few points, the kernel reaches no further than half a turn; where it is
-        narrow h stays below 0.4 of the depth, the distance of its middle from the rim; but not below 1.2 spacings.
+        narrow h stays below 0.4 of the depth, the distance of its middle from the boundary; but not below 1.2 spacings.
         Where there is room, up to 0.76 of the distance, it is widened so that it grows by no more than 0.02 of the way
         along the surface, and smoothed.
     """
@@ -66,7 +66,7 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
     reach = typical + _all_beyond(slow - typical, _EVEN) + _beyond(fast - slow, _NOISE)
     irregular = irregularity(nearest, averaging)
     least, most = (np.log(np.interp(irregular, _IRREGULARITY, factors)) for factors in (_NARROWEST, _WIDEST))
-    bend = np.log(_BEND / np.maximum(steepest, 1e-30))
+    bend = np.log(_BEND / np.maximum(max_abs_curvature, 1e-30))
     floor = least + np.maximum(reach, own)
     length = np.maximum(np.clip(bend, least + reach, most + reach), floor)
     tight = np.exp(_repeat(averaging, bend, _LAST)) * (_AROUND / _BEND)
@@ -77,12 +77,12 @@ def smoothing_lengths(nearest, options, label=None, steepest=None, inside=None, 
     length = np.maximum(_repeat(averaging, length, _LAST), floor)
     widest = np.minimum(np.minimum(bend, tight), np.log(_ROOM) + reach)
     widest = np.maximum(widest, length)
-    length = np.log(_gently(nearest, np.exp(length), np.exp(widest)))
+    length = np.log(_lipschitz_limit(nearest, np.exp(length), np.exp(widest)))
     length = np.clip(_repeat(averaging, length, _SMOOTH), floor, widest)
     return options.bandwidth_factor * np.exp(_repeat(averaging, length, _LAST))
 
 
-def _gently(nearest, length, widest):
+def _lipschitz_limit(nearest, length, widest):
     """Widen h before a place where it is larger, so that it grows gently along the surface, up to the widest, (m,).
 
     Where h changes within a support neither the areas nor the weights are those of one kernel: the errors of both grow
@@ -117,7 +117,7 @@ def _all_beyond(values, least):
 
 
 def depth(nearest, inside):
-    """Return how far from a rim the surface around every point gets, (m,): about half the width of a narrow one."""
+    """Return how far from a boundary the surface around every point gets, (m,): half the width of a narrow one."""
     deepest = inside[:, 0]
     if np.isfinite(deepest).any():
         counted = _counted(nearest)
@@ -160,6 +160,6 @@ def _repeat(matrix, values, rounds):
 
 
 def _share_inside(ratio):
-    """Share of a disc's area on this side of a straight rim, at ``ratio`` radii from its centre."""
+    """Share of a disc's area on this side of a straight boundary, at ``ratio`` radii from its centre."""
     ratio = np.clip(ratio, 0.0, 1.0)
     return 1.0 - (np.arccos(ratio) - ratio * np.sqrt(1.0 - ratio**2)) / np.pi

@@ -1,4 +1,4 @@
-"""Rims of open surfaces: which points lie at one, and how far every point is from it."""
+"""Boundaries of open surfaces: which points lie at one, and how far every point is from it."""
 
 from dataclasses import dataclass, replace
 
@@ -12,60 +12,62 @@ from .quadrics import frames
 from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
-_LOPSIDED = 0.15  # mean offset of the neighbours over their mean distance; less than half of it at a straight rim
+_LOPSIDED = 0.15  # mean offset of the neighbours over their mean distance; less than half of it at a straight boundary
 _NEIGHBORS = 30  # looked at around a candidate
 _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 6.0, 0.6  # no point within 0.6 of 6 spacings of the place 6 spacings further out
-_FOLDED = 2  # neighbours on another sheet that a rim point may have
-_LINK = 4.0  # spacings between candidates of the same rim
-_SHORTEST = 16  # candidates of a rim that is found
-FEWEST = 5  # points of a rim that is given
-_CURVE = (12, 34)  # candidates that the rim's course is fitted to: at least, at most
-_PART = 3  # of a short rim no more than a third: a longer part of a square's has two corners
-_LEVEL = 1.45  # a rim runs that many standard deviations outside the mean of its candidates
+_FOLDED = 2  # neighbours on another sheet that a boundary point may have
+_LINK = 4.0  # spacings between candidates of the same boundary
+_SHORTEST = 16  # candidates of a boundary that is found
+FEWEST = 5  # points of a boundary that is given
+_CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at least, at most
+_PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
+_LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _LEANING = 0.3  # what normals may be off by, as a share of the distance
-_OPPOSITE = -0.3  # cosine of the directions across two courses of the rim that do not belong together
-_HALF = (4, 6)  # a fit to one side of a corner needs more candidates than that: of a short rim, of a long one
+_OPPOSITE = -0.3  # cosine of the directions across two courses of the boundary that do not belong together
+_HALF = (4, 6)  # a fit to one side of a corner needs more candidates than that: of a short boundary, of a long one
 _KINK = (2.0, 0.1)  # a fit to one side of a corner must scatter so much less, and by so much of the spacing
 _KINKED = 1.3  # scatter over that of the neighbours at which a corner is near
 _CHANCE = 3.0  # variances of a curvature that may be chance
 _VIEWS = 48  # nearest candidates that a point looks at
-_FEW = 5  # candidates that make a second rim
+_FEW = 5  # candidates that make a second boundary
 _AVERAGED = 8  # the nearest of them on one side of a corner, whose measures of the distance are averaged
-_STRAIGHT, _CORNER = 0.8, 0.75  # cosine of the directions across the rim: of one course, at least; of two, at most
+_STRAIGHT, _CORNER = 0.8, 0.75  # cosine of the directions across the boundary: of one course, at least; of two, at most
 
 
 @dataclass(frozen=True)
-class Rim:
-    """Where the surface ends: for every point the nearest rim and, next to a corner, the second one.
+class Boundary:
+    """Where the surface ends: for every point the nearest boundary and, next to a corner, the second one.
 
     Attributes
     ----------
-    at_rim : ndarray, (m,) bool
+    at_boundary : ndarray, (m,) bool
     distance : ndarray, (m, 2)
-        Distance to the rim along the surface; infinite where there is none near.
+        Distance to the boundary along the surface; infinite where there is none near.
     curvature : ndarray, (m, 2)
-        Geodesic curvature of the rim there: 1 / R for a disc of radius R, negative around a hole.
+        Geodesic curvature of the boundary there: 1 / R for a disc of radius R, negative around a hole.
     outward : ndarray, (m, 2, 3)
-        Unit vector across the rim; zero where it is not known.
+        Unit vector across the boundary; zero where it is not known.
     """
 
-    at_rim: np.ndarray
+    at_boundary: np.ndarray
     distance: np.ndarray
     curvature: np.ndarray
     outward: np.ndarray
 
     def reached(self, lengths):
-        """Tell from which points a kernel of these smoothing lengths reaches beyond the rim, (m,) bool."""
+        """Tell from which points a kernel of these smoothing lengths reaches beyond the boundary, (m,) bool."""
         return self.distance[:, 0] < SUPPORT * lengths
 
 
-def no_rim(count):
-    """Return the rim of a closed surface."""
-    return Rim(np.zeros(count, dtype=bool), np.full((count, 2), np.inf), np.zeros((count, 2)), np.zeros((count, 2, 3)))
+def no_boundary(count):
+    """Return the boundary of a closed surface."""
+    return Boundary(
+        np.zeros(count, dtype=bool), np.full((count, 2), np.inf), np.zeros((count, 2)), np.zeros((count, 2, 3))
+    )
 
 
-def find_rim_points(nearest, oriented):
+def find_boundary(nearest, oriented):
     """Find the points at which the surface ends.
 
     Candidates are points around which the directions of the neighbours leave a wide gap, and far into which there is
@@ -135,12 +137,12 @@ def _tangents(directions, normals):
     return flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
 
 
-def measure_rim(nearest, normals, at_rim, reach):
-    """Measure how far the points are from the rim.
+def measure_boundary(nearest, normals, at_boundary, reach):
+    """Measure how far the points are from the boundary.
 
-    Around every rim point the rim's course is a parabola through the rim points next to it, on one side of a corner,
-    moved outwards by their scatter: at random, points lie up to a spacing inside the rim; of points exactly on it the
-    scatter is zero.
+    Around every boundary point the boundary's course is a parabola through the boundary points next to it, on one side
+    of a corner, moved outwards by their scatter: at random, points lie up to a spacing inside the boundary; of points
+    exactly on it the scatter is zero.
 
     Parameters
     ----------
@@ -148,19 +150,19 @@ def measure_rim(nearest, normals, at_rim, reach):
         Of m points.
     normals : ndarray, (m, 3)
         Unit normals.
-    at_rim : ndarray, (m,) bool
-        Points at the rim.
+    at_boundary : ndarray, (m,) bool
+        Points at the boundary.
     reach : ndarray, (m,)
-        Distance at which a rim matters no more.
+        Distance at which a boundary matters no more.
 
     Returns
     -------
-    Rim
+    Boundary
     """
-    rim = no_rim(len(normals))
-    rows = np.flatnonzero(at_rim)
+    boundary = no_boundary(len(normals))
+    rows = np.flatnonzero(at_boundary)
     if len(rows) < FEWEST:
-        return rim
+        return boundary
     course = _fit_course(nearest, normals, rows)
     tree = cKDTree(nearest.points[rows])
     span, view = tree.query(nearest.points, k=min(_VIEWS, len(rows)), workers=-1)
@@ -182,22 +184,24 @@ def measure_rim(nearest, normals, at_rim, reach):
             total = trust.sum(axis=1)
             known = np.count_nonzero(same, axis=1) >= (_FEW if side else 1)
             total[~known] = 1.0
-            rim.distance[block, side] = np.where(known, np.maximum((trust * distance).sum(axis=1) / total, 0), np.inf)
-            rim.curvature[block, side] = (trust * bend).sum(axis=1) / total
-            rim.outward[block, side] = np.where(known[:, None], ahead, 0.0)
+            boundary.distance[block, side] = np.where(
+                known, np.maximum((trust * distance).sum(axis=1) / total, 0), np.inf
+            )
+            boundary.curvature[block, side] = (trust * bend).sum(axis=1) / total
+            boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
             if side == 0:
-                # Around a corner that the surface fills, the second rim turns away and lies inside the first.
+                # Around a corner that the surface fills, the second boundary turns away and lies inside the first.
                 chosen = seen[every, best][:, None]
                 apart, expected = course.ahead(nearest.points, chosen, seen)
                 turned = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _CORNER
                 eligible = turned & (apart < 0.25 * spacing) & (near < reach[block, None])
                 eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > 0.5
-    return replace(rim, at_rim=at_rim)
+    return replace(boundary, at_boundary=at_boundary)
 
 
 @dataclass(frozen=True)
 class _Course:
-    """Parabolas that the rim follows around each rim point: e = a + b t + c t^2 along two tangents."""
+    """Parabolas that the boundary follows around each boundary point: e = a + b t + c t^2 along two tangents."""
 
     rows: np.ndarray
     along: np.ndarray
@@ -207,7 +211,7 @@ class _Course:
     kinked: np.ndarray
 
     def ahead(self, points, chosen, seen):
-        """Return how far other rim points lie outside a parabola's tangent, and its direction across next to them."""
+        """Return how far other boundary points lie outside a parabola's tangent, and its direction across there."""
         chord = points[self.rows[seen]] - points[self.rows[chosen]]
         t = np.einsum("ikc,ikc->ik", chord, self.along[chosen])
         _, b, c = np.moveaxis(self.coefficients[chosen], 2, 0)
@@ -235,7 +239,7 @@ class _Course:
 def _fit_course(nearest, normals, rows):
     points = nearest.points
     distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
-    # A rim that is given may be sparse, so that its rows are found without a reach.
+    # A boundary that is given may be sparse, so that its rows are found without a reach.
     fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, *_CURVE)[:, None]
     across = outward_directions(nearest, normals, rows)
     near = other[:, :9]
@@ -246,7 +250,7 @@ def _fit_course(nearest, normals, rows):
     unit = np.take_along_axis(distance, np.minimum(fitted, distance.shape[1] - 1), axis=1)
     offset = (points[rows[other]] - points[rows, None]) / unit[:, :, None]
     t, e = np.einsum("ikc,ic->ik", offset, along), np.einsum("ikc,ic->ik", offset, across)
-    # The rim on the other side of a ribbon or a slit faces the other way.
+    # The boundary on the other side of a ribbon or a slit faces the other way.
     facing = np.einsum("ikc,ic->ik", across[other], across) > _OPPOSITE
     facing &= _on_sheet(nearest, normals, rows, rows[other], distance)
     weight = np.where(facing, fading_weights(np.minimum(distance, unit)), 0.0)
@@ -289,8 +293,8 @@ def _parabola(t, e, weight):
     return fit, scatter
 
 
-def given_rim(nearest, normals, distance):
-    """Take distances to the rim as they are, and find the rim's curvature from them.
+def given_boundary(nearest, normals, distance):
+    """Take distances to the boundary as they are, and find the boundary's curvature from them.
 
     Parameters
     ----------
@@ -299,11 +303,11 @@ def given_rim(nearest, normals, distance):
     normals : ndarray, (m, 3)
         Unit normals.
     distance : ndarray, (m,)
-        Distance to the rim along the surface; infinite where there is none near.
+        Distance to the boundary along the surface; infinite where there is none near.
 
     Returns
     -------
-    Rim
+    Boundary
     """
     curvature = np.zeros(len(distance))
     known = np.isfinite(distance)
@@ -317,8 +321,10 @@ def given_rim(nearest, normals, distance):
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
         weighted = np.swapaxes(basis * nearest.weight[block][:, :, None], 1, 2)
         fit = np.linalg.solve(weighted @ basis + 1e-9 * np.eye(6), weighted @ distance[index][:, :, None])[:, :, 0]
-        bend = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2  # of the line at this distance; the rim's own is this below
+        bend = (
+            -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
+        )  # of the line at this distance; the boundary's own is this below
         curvature[block] = bend / np.maximum(1.0 + bend * distance[block], 0.5)
-    rim = no_rim(len(distance))
-    rim.distance[:, 0], rim.curvature[:, 0] = distance, curvature
-    return replace(rim, at_rim=distance < 0.5 * nearest.spacing)
+    boundary = no_boundary(len(distance))
+    boundary.distance[:, 0], boundary.curvature[:, 0] = distance, curvature
+    return replace(boundary, at_boundary=distance < 0.5 * nearest.spacing)

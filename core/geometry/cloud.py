@@ -4,22 +4,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InvalidPointsError, IslandError
+from ..errors import ComponentError, InvalidPointsError
 from ..options import LaplacianOptions
 from .bandwidth import depth, smoothing_lengths
-from .boundary import FEWEST, Rim, find_rim_points, given_rim, measure_rim, no_rim
-from .components import label_islands, move_apart
-from .distances import relief
+from .boundary import FEWEST, Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
+from .components import label_components, move_apart
+from .distances import roughness
 from .nearest import find_nearest
 from .noise import LEAST, STRONG, noise_level, project_points
 from .normals import covariance_normals, orient_normals, unit_normals
-from .pairs import Neighborhoods, find_pairs
+from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_distances, check_points, scale_points
-from .quadrics import fit_surface
+from .quadrics import fit_quadrics
 from .sheets import fit_sheets, label_sheets, last_pairs, pairs_on_one_sheet, unsure_orientation
 
-_SAME_RIM = 0.5  # spacings between the measured and the given distance to a rim, near a corner
-_RIM_REACH = 20.0  # spacings from a rim at which no kernel sees it
+_SAME_BOUNDARY = 0.5  # spacings between the measured and the given distance to a boundary, near a corner
+_BOUNDARY_REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
 
 
@@ -32,23 +32,23 @@ class Cloud:
     scaled : ScaledPoints
         The m distinct points that take part, and the way back to the caller's.
     label : ndarray, (m,) int
-        Connected part of each point.
+        Component of each point.
     normals : ndarray, (m, 3)
         Unit normals.
     moved : ndarray, (m, 3)
         How far the points were moved to smooth noise.
-    mean_bend, gaussian : ndarray, (m,)
+    mean_curvature, gaussian : ndarray, (m,)
         Mean and Gaussian curvature of local quadrics; the latter is zero where the options do not ask for it.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
-    relief : ndarray, (m,)
+    roughness : ndarray, (m,)
         Mean squared slope of what is finer than the normals; zero where it is noise.
-    rim : Rim
-    neighborhoods : Neighborhoods
+    boundary : Boundary
+    pairs : Pairs
         Where the operator takes the points to be, smoothing lengths and pairs.
     definite : bool
         The kernel matrix is that of a smooth surface: no noise is in its distances, no pairs within reach were left out
-        because they lie on different sheets, and there are no images in a rim.
+        because they lie on different sheets, and there are no images in a boundary.
     notices : list of str
         What a user should know.
     """
@@ -57,12 +57,12 @@ class Cloud:
     label: np.ndarray
     normals: np.ndarray
     moved: np.ndarray
-    mean_bend: np.ndarray
+    mean_curvature: np.ndarray
     gaussian: np.ndarray
     spacing: np.ndarray
-    relief: np.ndarray
-    rim: Rim
-    neighborhoods: Neighborhoods
+    roughness: np.ndarray
+    boundary: Boundary
+    pairs: Pairs
     definite: bool
     notices: list
 
@@ -96,7 +96,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     if scaled.duplicates:
         notices.append(f"Points that lie exactly on another one: {scaled.duplicates}. They share one area.")
     nearest = find_nearest(scaled.points)
-    label = label_islands(nearest)
+    label = label_components(nearest)
     lone = np.count_nonzero(label < 0)
     if lone:
         scaled, label = _leave_out(scaled, label, options)
@@ -125,31 +125,31 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
     own = surface.normals if normals is None else unit_normals(normals, len(points))[scaled.first]
     oriented = orient_normals(nearest, own)
-    rim = _rim(nearest, oriented, options, scaled, boundary, boundary_distance)
+    boundary = _boundary(nearest, oriented, options, scaled, boundary, boundary_distance)
 
     report("Neighbors", 0.2)
-    deepest = depth(nearest, rim.distance)
-    lengths = smoothing_lengths(nearest, options, label, surface.steepest, rim.distance, deepest)
+    deepest = depth(nearest, boundary.distance)
+    lengths = smoothing_lengths(nearest, options, label, surface.max_abs_curvature, boundary.distance, deepest)
     if np.mean(lengths > _NARROW * deepest) > _MANY:
         notices.append(
             "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be"
             " off by 10 % and more. Add points."
         )
     found = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3))
-    pairs = Neighborhoods(nearest.points, lengths, *found)
+    pairs = Pairs(nearest.points, lengths, *found)
     if normals is None and options.normals != "quadric":
         own = covariance_normals(pairs, weighted=options.normals == "wpca")
         own = orient_normals(nearest, own) if options.orient else own
     elif normals is None:
         own = oriented
     flipped = np.sign(np.einsum("ij,ij->i", own, surface.normals))
-    definite = noise == 0.0 and not np.isfinite(rim.distance).any()
+    definite = noise == 0.0 and not np.isfinite(boundary.distance).any()
     report("Neighbors", 0.4)
     if options.sheets:
         same_side = np.sign(np.einsum("ij,ij->i", oriented, surface.normals))
-        bending = same_side[:, None, None] * surface.bending
+        shape_operator = same_side[:, None, None] * surface.shape_operator
         unsure = unsure_orientation(nearest, oriented)
-        same = pairs_on_one_sheet(pairs, oriented, unsure, bending, nearest.spacing)
+        same = pairs_on_one_sheet(pairs, oriented, unsure, shape_operator, nearest.spacing)
         if not same.all():
             definite, pairs = False, pairs.keep(same | last_pairs(pairs, same))
     return Cloud(
@@ -157,12 +157,14 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         label=label,
         normals=own,
         moved=moved,
-        mean_bend=0.5 * flipped * np.trace(surface.bending, axis1=1, axis2=2),
+        mean_curvature=0.5 * flipped * np.trace(surface.shape_operator, axis1=1, axis2=2),
         gaussian=surface.gaussian if options.curvature_correction else np.zeros(len(own)),
         spacing=nearest.spacing,
-        relief=np.zeros(len(own)) if noise > 0.0 and options.projection == "auto" else relief(nearest, surface.normals),
-        rim=rim,
-        neighborhoods=pairs,
+        roughness=np.zeros(len(own))
+        if noise > 0.0 and options.projection == "auto"
+        else roughness(nearest, surface.normals),
+        boundary=boundary,
+        pairs=pairs,
         definite=definite,
         notices=notices,
     )
@@ -171,34 +173,35 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 def _fit(nearest, options):
     if options.sheets:
         return fit_sheets(nearest)
-    return fit_surface(nearest.points, nearest.index, nearest.weight), nearest
+    return fit_quadrics(nearest.points, nearest.index, nearest.weight), nearest
 
 
-def _rim(nearest, normals, options, scaled, boundary, boundary_distance):
+def _boundary(nearest, normals, options, scaled, boundary, boundary_distance):
     distance = None
     if boundary_distance is not None:
         distance = check_distances(boundary_distance, len(scaled.inverse))[scaled.first] / scaled.scale
         if boundary is None:
-            return given_rim(nearest, normals, distance)
+            return given_boundary(nearest, normals, distance)
     if boundary is not None:
-        at_rim = as_mask(boundary, len(scaled.inverse))[scaled.first]
-        if 0 < np.count_nonzero(at_rim) < FEWEST:
+        at_boundary = as_mask(boundary, len(scaled.inverse))[scaled.first]
+        if 0 < np.count_nonzero(at_boundary) < FEWEST:
             raise InvalidPointsError(
-                f"The rim is given by {np.count_nonzero(at_rim)} different points. Give at least {FEWEST}, or none."
+                f"The boundary is given by {np.count_nonzero(at_boundary)} different points. Give at least {FEWEST}, or"
+                " none."
             )
-    elif options.rims == "auto":
-        at_rim = find_rim_points(nearest, normals)
+    elif options.boundary == "auto":
+        at_boundary = find_boundary(nearest, normals)
     else:
-        return no_rim(len(normals))
-    rim = measure_rim(nearest, normals, at_rim, _RIM_REACH * nearest.spacing)
+        return no_boundary(len(normals))
+    boundary = measure_boundary(nearest, normals, at_boundary, _BOUNDARY_REACH * nearest.spacing)
     if distance is not None:
-        nearer = np.argmin(rim.distance, axis=1)[:, None]
-        measured = np.take_along_axis(rim.distance, nearer, axis=1)[:, 0]
+        nearer = np.argmin(boundary.distance, axis=1)[:, None]
+        measured = np.take_along_axis(boundary.distance, nearer, axis=1)[:, 0]
         # Around a corner that the surface fills, the nearest place is the corner, which mirrors nothing.
-        low, high = (measured + side * _SAME_RIM * nearest.spacing for side in (-1.0, 1.0))
-        same = np.isinf(rim.distance[:, 1]) | ((low < distance) & (distance < high))
-        np.put_along_axis(rim.distance, nearer, np.where(same, distance, measured)[:, None], axis=1)
-    return rim
+        low, high = (measured + side * _SAME_BOUNDARY * nearest.spacing for side in (-1.0, 1.0))
+        same = np.isinf(boundary.distance[:, 1]) | ((low < distance) & (distance < high))
+        np.put_along_axis(boundary.distance, nearer, np.where(same, distance, measured)[:, None], axis=1)
+    return boundary
 
 
 def _leave_out(scaled, label, options):
@@ -206,8 +209,8 @@ def _leave_out(scaled, label, options):
     out = label < 0
     count, left = np.count_nonzero(out), np.count_nonzero(~out)
     if left < max(options.neighbors + 1, count):
-        raise IslandError(
-            f"{count} of {len(label)} points lie apart from each other, in islands of too few points. Use points"
+        raise ComponentError(
+            f"{count} of {len(label)} points lie apart from each other, in components of too few points. Use points"
             " of a surface, or delete the lone ones."
         )
     return scaled.leave_out(out), label[~out]
@@ -234,4 +237,4 @@ def estimate_normals(points, options=LaplacianOptions()):
         The points have no tangent planes; see `build_laplacian`.
     """
     cloud = read_cloud(points, options)
-    return cloud.scaled.hand_out(cloud.normals, (0.0, 0.0, 1.0))
+    return cloud.scaled.scatter(cloud.normals, (0.0, 0.0, 1.0))

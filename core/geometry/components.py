@@ -1,15 +1,15 @@
-"""Connected parts of a cloud: gaps, lone points, and sheets that nowhere meet."""
+"""Components of a cloud: gaps, lone points, and sheets that nowhere meet."""
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-SMALLEST = 50  # points of an island that gets an operator of its own
+SMALLEST = 50  # points of a component that gets an operator of its own
 _GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap
 _REACH = 8
 
 
-def label_islands(nearest):
+def label_components(nearest):
     """Number the parts of the cloud that lie apart from each other.
 
     Points are joined to their nearest neighbours, except over gaps far wider than the spacing at the nearer end; parts
@@ -32,7 +32,7 @@ def label_islands(nearest):
 
 
 def label_connected(index, joined):
-    """Number the connected parts of points whose neighbours, (m, k) int, are joined to them, (m, k) bool."""
+    """Number the components of points whose neighbours, (m, k) int, are joined to them, (m, k) bool."""
     row = np.repeat(np.arange(len(index), dtype=np.int32), index.shape[1])[joined.ravel()]
     graph = sparse.csr_array((np.ones(len(row), dtype=bool), (row, index[joined])), shape=(len(index),) * 2)
     return connected_components(graph, directed=False)[1]

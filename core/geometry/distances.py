@@ -5,16 +5,16 @@ import numpy as np
 _BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
 
 _ARC = 0.15  # most that the turn of two normals counts for an arc's sixth order, as 1 - cosine: more is a sharp edge
-_STEPS = 8  # nearest neighbours whose chords tell of relief
+_STEPS = 8  # nearest neighbours whose chords tell of roughness
 _EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
 
 
-def projected_distance(neighborhoods, normals):
+def projected_distance(pairs, normals):
     """Return the length of each pair's difference in the plane orthogonal to its mean normal, eq. (10).
 
     Parameters
     ----------
-    neighborhoods : Neighborhoods
+    pairs : Pairs
         With p pairs.
     normals : ndarray, (m, 3)
         Unit normals. The second is flipped to the first one's side, pair by pair: signs do not matter.
@@ -23,12 +23,12 @@ def projected_distance(neighborhoods, normals):
     -------
     ndarray, (p,)
     """
-    result = np.empty(len(neighborhoods.first))
-    for block, left, right, cosine in pair_heights(neighborhoods, normals):
+    result = np.empty(len(pairs.first))
+    for block, left, right, cosine in pair_heights(pairs, normals):
         side = np.where(cosine < 0.0, -1.0, 1.0)
         # The mean of two unit normals has the squared length (1 + cos) / 2.
         height = (left + side * right) ** 2 / (2.0 + 2.0 * np.abs(cosine))
-        result[block] = np.sqrt(np.maximum(neighborhoods.distance[block] ** 2 - height, 0.0))
+        result[block] = np.sqrt(np.maximum(pairs.distance[block] ** 2 - height, 0.0))
     return result
 
 
@@ -37,8 +37,8 @@ def arc_length(cloud):
 
     ``s^2 = r^2 + (d . (n_j - n_i))^2 (1 / 12 + |n_j - n_i|^2 / 90) + g max(r^2 - a^2, 0)``. The second term is exact to
     sixth order on spheres and cylinders, to fourth order elsewhere and where normals turn by more than 32 degrees. The
-    third one is the way up and down over relief of mean squared slope g, the mean of both ends' `relief`: finer than
-    the normals tell, but shape. Between points one spacing a apart the chord is that way.
+    third one is the way up and down over roughness of mean squared slope g, the mean of both ends' `roughness`: finer
+    than the normals tell, but shape. Between points one spacing a apart the chord is that way.
 
     Parameters
     ----------
@@ -50,19 +50,19 @@ def arc_length(cloud):
     -------
     ndarray, (p,)
     """
-    neighborhoods = cloud.neighborhoods
-    result = np.empty(len(neighborhoods.first))
-    for block, left, right, cosine in pair_heights(neighborhoods, cloud.normals):
+    pairs = cloud.pairs
+    result = np.empty(len(pairs.first))
+    for block, left, right, cosine in pair_heights(pairs, cloud.normals):
         turn = np.where(cosine < 0.0, -right, right) - left
         further = np.minimum(1.0 - np.abs(cosine), _ARC) / 45.0
-        result[block] = neighborhoods.distance[block] ** 2 + turn**2 * (1.0 / 12.0 + further)
-    if cloud.relief.any():
-        least = neighborhoods.mean(cloud.spacing) ** 2
-        result += neighborhoods.mean(cloud.relief) * np.maximum(neighborhoods.distance**2 - least, 0.0)
+        result[block] = pairs.distance[block] ** 2 + turn**2 * (1.0 / 12.0 + further)
+    if cloud.roughness.any():
+        least = pairs.mean(cloud.spacing) ** 2
+        result += pairs.mean(cloud.roughness) * np.maximum(pairs.distance**2 - least, 0.0)
     return np.sqrt(result)
 
 
-def relief(nearest, normals):
+def roughness(nearest, normals):
     """Measure what rises and falls between neighbouring points faster than the normals, fitted to many, can tell.
 
     Parameters
@@ -77,7 +77,7 @@ def relief(nearest, normals):
     ndarray, (m,)
         Mean square of the slope of the chords to the eight nearest neighbours against the mean normal of their ends,
         averaged over the neighbourhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
-        turn too fast between neighbours to be right, are no relief: arcs make up for them already.
+        turn too fast between neighbours to be right, are no roughness: arcs make up for them already.
     """
     near = slice(1, _STEPS + 1)
     index, counted = nearest.index[:, near], nearest.weight[:, near] > 0.0
@@ -91,9 +91,9 @@ def relief(nearest, normals):
     return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
 
 
-def pair_heights(neighborhoods, normals):
+def pair_heights(pairs, normals):
     """Yield blocks of pairs: the chord along the first normal, along the second, and the cosine of both."""
-    first, second, points = neighborhoods.first, neighborhoods.second, neighborhoods.points
+    first, second, points = pairs.first, pairs.second, pairs.points
     for start in range(0, len(first), _BLOCK):
         block = slice(start, start + _BLOCK)
         i, j = first[block], second[block]

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .nearest import fading_weights, spacing_of
-from .quadrics import fit_surface
+from .quadrics import fit_quadrics
 
 _SAMPLE = 2000  # points at which the noise is measured
 _FEW, _MANY = 20, 60  # neighbours of the two fits that tell noise from shape
@@ -38,7 +38,7 @@ def noise_level(tree, misfit):
     distance, index = tree.query(tree.data[rows], k=_MANY + 1, workers=-1)
     spacing = spacing_of(distance)
     few, many = (
-        np.median(fit_surface(tree.data, index[:, :count], fading_weights(distance[:, :count]), rows).misfit / spacing)
+        np.median(fit_quadrics(tree.data, index[:, :count], fading_weights(distance[:, :count]), rows).misfit / spacing)
         for count in (_FEW + 1, _MANY + 1)
     )
     return float(min(few, misfit)) if many < _GROWTH * few else 0.0
@@ -64,7 +64,7 @@ def project_points(points, method, label=None):
     distance, index = cKDTree(points).query(points, k=min(_NEIGHBORS + 1, smallest), workers=-1)
     weight = fading_weights(distance)
     if method == "quadric":
-        return points + fit_surface(points, index, weight).height
+        return points + fit_quadrics(points, index, weight).height
     weight /= weight.sum(axis=1, keepdims=True)
     mean = np.einsum("ik,ikc->ic", weight, points[index])
     centered = points[index] - mean[:, None]

@@ -31,12 +31,12 @@ def unit_normals(normals, count):
     return normals / length[:, None]
 
 
-def covariance_normals(neighborhoods, weighted=True):
+def covariance_normals(pairs, weighted=True):
     """Estimate unit normals by (weighted) principal component analysis, eq. (9).
 
     Parameters
     ----------
-    neighborhoods : Neighborhoods
+    pairs : Pairs
         Of m distinct points.
     weighted : bool
         Weigh by the kernel W_h (WPCA) or count every neighbour alike (PCA).
@@ -51,7 +51,7 @@ def covariance_normals(neighborhoods, weighted=True):
     NotASurfaceError
         The points of many neighbourhoods lie along a curve.
     """
-    points, pairs = neighborhoods.points, neighborhoods
+    points = pairs.points
     if weighted:
         weights = pairs.half(kernel(pairs.distance / pairs.mean(pairs.lengths)))
         own = kernel(0.0)
@@ -94,7 +94,7 @@ def orient_normals(nearest, normals):
     Returns
     -------
     ndarray, (m, 3)
-        The same normals with consistent signs. Every connected part points away from its own centroid on the whole.
+        The same normals with consistent signs. Every component points away from its own centroid on the whole.
     """
     points = nearest.points
     n = len(points)

@@ -11,7 +11,7 @@ _BLOCK = 1 << 22  # neighbour candidates held at one time while the pairs are co
 
 
 @dataclass(frozen=True)
-class Neighborhoods:
+class Pairs:
     """Points and all pairs nearer than 3 h_ij, each once.
 
     Attributes

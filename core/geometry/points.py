@@ -85,7 +85,7 @@ class ScaledPoints:
         """Number of points beyond the first at their place."""
         return len(self.inverse) - len(self.points)
 
-    def hand_out(self, quantity, neutral):
+    def scatter(self, quantity, neutral):
         """Return a quantity of the distinct points for the caller's; those left out get the neutral value."""
         result = quantity[self.inverse]
         result[self.inverse < 0] = neutral
@@ -93,7 +93,7 @@ class ScaledPoints:
 
     def share(self, quantity, neutral):
         """Hand a quantity out in equal parts where several of the caller's points lie at one place."""
-        return self.hand_out(quantity / self.copies, neutral)
+        return self.scatter(quantity / self.copies, neutral)
 
     def leave_out(self, dropped):
         """Return the same without some of the distinct points, (m,) bool."""
@@ -189,7 +189,7 @@ def as_indices(chosen, count, name):
 
 
 def check_distances(distances, count):
-    """Check distances to a rim, (count,), infinite where there is none near.
+    """Check distances to a boundary, (count,), infinite where there is none near.
 
     Raises
     ------
@@ -199,8 +199,8 @@ def check_distances(distances, count):
     given = np.asarray(distances)
     if given.shape != (count,) or given.dtype.kind not in "iuf" or not np.all(given >= 0.0):
         raise InvalidPointsError(
-            f"Distances to the rim have the shape {given.shape} and type {given.dtype}. Give {count} numbers"
-            " that are not negative, infinity where there is no rim near."
+            f"Distances to the boundary have the shape {given.shape} and type {given.dtype}. Give {count} numbers"
+            " that are not negative, infinity where there is no boundary near."
         )
     return given.astype(np.float64)
 

@@ -11,7 +11,7 @@ _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie o
 
 
 @dataclass(frozen=True)
-class LocalSurface:
+class Quadrics:
     """A quadric through the neighbours of every point.
 
     Attributes
@@ -20,26 +20,26 @@ class LocalSurface:
         Unit normals.
     gaussian : ndarray, (m,)
         Gaussian curvature [1 / L^2].
-    steepest : ndarray, (m,)
+    max_abs_curvature : ndarray, (m,)
         The larger of the two principal curvatures, without its sign [1 / L].
     height : ndarray, (m, 3)
         From the point to the quadric, across it [L].
-    bending : ndarray, (m, 3, 3)
-        Second fundamental form: ``t . bending t`` is the curvature along the unit tangent t, positive where the surface
-        bends away from the normal.
+    shape_operator : ndarray, (m, 3, 3)
+        Second fundamental form: ``t . shape_operator t`` is the curvature along the unit tangent t, positive where the
+        surface bends away from the normal.
     misfit : ndarray, (m,)
         Root mean square distance of the neighbours from the quadric [L].
     """
 
     normals: np.ndarray
     gaussian: np.ndarray
-    steepest: np.ndarray
+    max_abs_curvature: np.ndarray
     height: np.ndarray
-    bending: np.ndarray
+    shape_operator: np.ndarray
     misfit: np.ndarray
 
 
-def fit_surface(points, index, weight, rows=None, normals=None):
+def fit_quadrics(points, index, weight, rows=None, normals=None):
     """Fit ``z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2`` around points.
 
     Parameters
@@ -57,7 +57,7 @@ def fit_surface(points, index, weight, rows=None, normals=None):
 
     Returns
     -------
-    LocalSurface
+    Quadrics
         Of the k points. The signs of the normals are arbitrary.
 
     Raises
@@ -67,7 +67,7 @@ def fit_surface(points, index, weight, rows=None, normals=None):
     """
     rows = np.arange(len(points)) if rows is None else rows
     count = len(rows)
-    fitted = LocalSurface(*(np.empty(shape) for shape in ((count, 3), count, count, (count, 3), (count, 3, 3), count)))
+    fitted = Quadrics(*(np.empty(shape) for shape in ((count, 3), count, count, (count, 3), (count, 3, 3), count)))
     curves = 0
     for start in range(0, count, _BLOCK):
         block = slice(start, start + _BLOCK)
@@ -92,12 +92,12 @@ def fit_surface(points, index, weight, rows=None, normals=None):
         mean, turn = fit[:, 3] + fit[:, 5], np.hypot(fit[:, 3] - fit[:, 5], fit[:, 4])
         fitted.normals[block] = np.einsum("iab,ib->ia", frame, local)
         fitted.gaussian[block] = (4.0 * fit[:, 3] * fit[:, 5] - fit[:, 4] ** 2) / (slope * unit) ** 2
-        fitted.steepest[block] = (np.abs(mean) + turn) / unit
+        fitted.max_abs_curvature[block] = (np.abs(mean) + turn) / unit
         form = np.empty((len(fit), 2, 2))
         form[:, 0, 0], form[:, 1, 1] = -2.0 * fit[:, 3], -2.0 * fit[:, 5]
         form[:, 0, 1] = form[:, 1, 0] = -fit[:, 4]
         tangents = frame[:, :, :0:-1]  # u, v
-        fitted.bending[block] = (tangents @ form @ np.swapaxes(tangents, 1, 2)) / unit[:, None, None]
+        fitted.shape_operator[block] = (tangents @ form @ np.swapaxes(tangents, 1, 2)) / unit[:, None, None]
         fitted.height[block] = (fit[:, 0] * unit)[:, None] * frame[:, :, 0]
         fitted.misfit[block] = np.sqrt((share * misfit).sum(axis=1)) * unit
     if curves > 0.01 * count:

@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from .components import SMALLEST, label_connected, number_by_size
 from .distances import pair_heights
 from .normals import NEIGHBORS, mirrored_cosine, near_edges
-from .quadrics import fit_surface
+from .quadrics import fit_quadrics
 
 _CLOSE = 0.6  # sheets nearer than this many spacings are taken as one
 LEANING = 0.1  # what normals may be off by, as a share of the distance
@@ -92,13 +92,13 @@ def fit_sheets(nearest):
 
     Returns
     -------
-    LocalSurface
+    Quadrics
         Of the m points.
     nearest : Nearest
         With the neighbours on other sheets at weight zero.
     """
     points, index = nearest.points, nearest.index
-    surface = fit_surface(points, index, nearest.weight)
+    surface = fit_quadrics(points, index, nearest.weight)
     spacing = nearest.spacing
     mixed = np.flatnonzero(surface.misfit > _MISFIT * spacing)
     if not len(mixed):
@@ -118,7 +118,7 @@ def fit_sheets(nearest):
     nearest = nearest.keep(kept)
     again = np.flatnonzero(~kept.all(axis=1))
     if len(again):
-        refit = fit_surface(points, index[again], nearest.weight[again], again, normals[again])
+        refit = fit_quadrics(points, index[again], nearest.weight[again], again, normals[again])
         for quantity in fields(surface):
             getattr(surface, quantity.name)[again] = getattr(refit, quantity.name)
     return surface, nearest
@@ -196,18 +196,18 @@ def unsure_orientation(nearest, normals):
     return result
 
 
-def pairs_on_one_sheet(neighborhoods, normals, unsure, bending, spacing):
+def pairs_on_one_sheet(pairs, normals, unsure, shape_operator, spacing):
     """Tell which pairs lie on one sheet of the surface.
 
     Parameters
     ----------
-    neighborhoods : Neighborhoods
+    pairs : Pairs
         With p pairs.
     normals : ndarray, (m, 3)
         Unit normals whose signs agree: two that point against each other lie on two sides of a wall.
     unsure : ndarray, (m,) bool
         Where their signs do not tell.
-    bending : ndarray, (m, 3, 3)
+    shape_operator : ndarray, (m, 3, 3)
         Second fundamental form for these normals.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
@@ -216,19 +216,19 @@ def pairs_on_one_sheet(neighborhoods, normals, unsure, bending, spacing):
     -------
     ndarray, (p,) bool
     """
-    result = np.empty(len(neighborhoods.first), dtype=bool)
-    for block, left, right, cosine in pair_heights(neighborhoods, normals):
-        mean = 0.5 * (spacing[neighborhoods.first[block]] + spacing[neighborhoods.second[block]])
-        same = same_sheet(left, right, cosine, neighborhoods.distance[block], mean, _LEANING)
-        doubt = unsure[neighborhoods.first[block]] | unsure[neighborhoods.second[block]]
+    result = np.empty(len(pairs.first), dtype=bool)
+    for block, left, right, cosine in pair_heights(pairs, normals):
+        mean = 0.5 * (spacing[pairs.first[block]] + spacing[pairs.second[block]])
+        same = same_sheet(left, right, cosine, pairs.distance[block], mean, _LEANING)
+        doubt = unsure[pairs.first[block]] | unsure[pairs.second[block]]
         same &= np.where(doubt, np.abs(cosine) > _PARALLEL, cosine > _BACK)
         # Where normals turn against the way the surface bends at both ends, two sheets face each other across a gap.
-        turn = (right - left) / neighborhoods.distance[block]
+        turn = (right - left) / pairs.distance[block]
         doubtful = np.flatnonzero(same & (turn < -_AGAINST))
-        i, j = neighborhoods.first[block][doubtful], neighborhoods.second[block][doubtful]
-        chord = neighborhoods.points[j] - neighborhoods.points[i]
-        bend = 0.5 * sum(np.einsum("pa,pab,pb->p", chord, bending[k], chord) for k in (i, j))
-        same[doubtful[bend > _BENT * neighborhoods.distance[block][doubtful]]] = False
+        i, j = pairs.first[block][doubtful], pairs.second[block][doubtful]
+        chord = pairs.points[j] - pairs.points[i]
+        bend = 0.5 * sum(np.einsum("pa,pab,pb->p", chord, shape_operator[k], chord) for k in (i, j))
+        same[doubtful[bend > _BENT * pairs.distance[block][doubtful]]] = False
         result[block] = same
     return result
 

@@ -65,7 +65,7 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=No
         The points have no sound areas; see `build_laplacian`.
     """
     cloud = read_cloud(points, options, normals, boundary, boundary_distance)
-    distance = arc_length(cloud) if options.curvature_correction else cloud.neighborhoods.distance
+    distance = arc_length(cloud) if options.curvature_correction else cloud.pairs.distance
     areas = solve_areas(cloud, distance, options).areas * cloud.scaled.scale**2
     return cloud.scaled.share(areas, NO_AREA)
 
@@ -93,9 +93,9 @@ def solve_areas(cloud, distance, options, report=lambda: None):
     AreaError
         Eq. (7), which has no bound, gave areas that are not positive.
     """
-    lengths = cloud.neighborhoods.lengths
-    target = kernel_integral(lengths, cloud.gaussian) + image_excess(lengths, cloud.rim)
-    matrix = KernelMatrix(cloud.neighborhoods, distance, cloud.rim, report)
+    lengths = cloud.pairs.lengths
+    target = kernel_integral(lengths, cloud.gaussian) + image_excess(lengths, cloud.boundary)
+    matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
     if options.curvature_correction:
         target += _gain(matrix, lengths)
     return SOLVERS[options.areas](matrix, target, cloud.definite, options.regularization)
@@ -118,19 +118,19 @@ def _gain(matrix, lengths):
 class KernelMatrix:
     """The symmetric matrix A of eq. (6), a_ij = W(distance_ij, h_ij), kept as half its pairs.
 
-    Near a rim the image of a point in it counts as a neighbour too.
+    Near a boundary the image of a point in it counts as a neighbour too.
     """
 
-    def __init__(self, neighborhoods, distance, rim, report=lambda: None):
+    def __init__(self, pairs, distance, boundary, report=lambda: None):
         self._report = report
-        lengths = neighborhoods.mean(neighborhoods.lengths)
-        own = neighborhoods.lengths
+        lengths = pairs.mean(pairs.lengths)
+        own = pairs.lengths
         values = kernel(distance / lengths) / lengths**2
-        for pairs, image, factor in mirror(neighborhoods, distance, rim):
-            values[pairs] += factor * kernel(image / lengths[pairs]) / lengths[pairs] ** 2
-        self._half = neighborhoods.half(values)
+        for rows, image, factor in mirror(pairs, distance, boundary):
+            values[rows] += factor * kernel(image / lengths[rows]) / lengths[rows] ** 2
+        self._half = pairs.half(values)
         self._diagonal = kernel(0.0) / own**2
-        for rows, image, factor in own_images(neighborhoods, rim):
+        for rows, image, factor in own_images(pairs, boundary):
             self._diagonal[rows] += factor * kernel(image / own[rows]) / own[rows] ** 2
 
     def __matmul__(self, values):
@@ -148,8 +148,8 @@ def fast_areas(matrix, target, definite=True, rho=None):
     are shorter, make up for what that changes at large. A fixed number of linear steps, unlike conjugate gradients,
     does not amplify rounding: the result is the same to 1e-10 for any order of the points.
 
-    Where pairs were left out, between close sheets, or images added, next to rims, or distances are those of noisy
-    points, M has negative eigenvalues too, most often next to none. What belongs to them, and to positive ones as
+    Where pairs were left out, between close sheets, or images added, next to boundaries, or distances are those of
+    noisy points, M has negative eigenvalues too, most often next to none. What belongs to them, and to positive ones as
     small, is no smooth part: p leaves it alone. Where they turn out to lie lower than expected, the solution starts
     anew with less resolved; none lies below -1.
 

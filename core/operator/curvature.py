@@ -54,10 +54,10 @@ def mean_curvature(laplacian):
     Returns
     -------
     ndarray, (n,)
-        Mean of the two principal curvatures [1 / L]; where the kernel reaches beyond a rim, from local quadrics.
+        Mean of the two principal curvatures [1 / L]; where the kernel reaches beyond a boundary, from local quadrics.
     """
     points = laplacian.surface_points
     centered = points - points.mean(axis=0)
     curvature = -0.5 * np.einsum("ij,ij->i", laplacian.apply(centered), laplacian.normals)
-    # At a rim the natural operator takes the surface as level across it.
-    return np.where(laplacian.near_rim, laplacian.mean_bend, curvature)
+    # At a boundary the natural operator takes the surface as level across it.
+    return np.where(laplacian.near_boundary, laplacian.mean_curvature, curvature)

@@ -112,7 +112,7 @@ def factorize(matrix):
     except RuntimeError as error:
         raise SolverError(
             f"The equations of {matrix.shape[0]} points have no single solution ({error}). Fix some points"
-            " on every connected part."
+            " on every component."
         ) from error
     return factors.solve
 

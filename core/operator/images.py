@@ -1,4 +1,4 @@
-"""The method of images: past a rim the surface goes on as in a mirror."""
+"""The method of images: past a boundary the surface goes on as in a mirror."""
 
 import functools
 
@@ -8,61 +8,61 @@ from scipy.interpolate import PchipInterpolator
 
 from ..kernel import SUPPORT, kernel
 
-_SHARED = 0.7  # cosine of the directions across the rims of two points, at least, if they are one rim
-_BEND = 0.5  # most that the curvature of a rim may change an image
+_SHARED = 0.7  # cosine of the directions across the boundaries of two points, at least, if they are one boundary
+_BEND = 0.5  # most that the curvature of a boundary may change an image
 
 
-def mirror(neighborhoods, distance, rim):
-    """Find the pairs that the mirror image of one end in the rim still reaches.
+def mirror(pairs, distance, boundary):
+    """Find the pairs that the mirror image of one end in the boundary still reaches.
 
     Parameters
     ----------
-    neighborhoods : Neighborhoods
+    pairs : Pairs
         With p pairs of m points.
     distance : ndarray, (p,)
         Distance of each pair along the surface.
-    rim : Rim
+    boundary : Boundary
         Of the m points.
 
     Returns
     -------
-    list of (pairs, distance, factor), (k,) each
+    list of (rows, distance, factor), (k,) each
         Rows of the pairs, no row twice; from one end to the image of the other, ``s'^2 = s^2 + 4 d_i d_j`` for a
-        straight rim; how much larger the image of the area is than the area. First for the nearest rims, then for the
-        second ones, then for the images of images across a corner.
+        straight boundary; how much larger the image of the area is than the area. First for the nearest boundaries,
+        then for the second ones, then for the images of images across a corner.
 
     Notes
     -----
-    Of two points along a rim of geodesic curvature k the images lie further apart than the points, by the share
-    k (d_i + d_j) of their squared distance along the rim; areas grow by as much.
+    Of two points along a boundary of geodesic curvature k the images lie further apart than the points, by the share
+    k (d_i + d_j) of their squared distance along the boundary; areas grow by as much.
     """
-    lengths = neighborhoods.lengths
-    near = rim.reached(lengths)  # further points have no image within reach
-    known = np.isfinite(rim.distance[:, 0])
-    first, second = neighborhoods.first, neighborhoods.second
-    pairs = np.zeros(0, dtype=np.intp)
+    lengths = pairs.lengths
+    near = boundary.reached(lengths)  # further points have no image within reach
+    known = np.isfinite(boundary.distance[:, 0])
+    first, second = pairs.first, pairs.second
+    rows = np.zeros(0, dtype=np.intp)
     if near.any():
-        pairs = np.flatnonzero((near[first] & known[second]) | (near[second] & known[first]))
-    first, second = first[pairs], second[pairs]
-    d, e = rim.distance[first], rim.distance[second]
-    bend = 0.5 * (rim.curvature[first] + rim.curvature[second])
-    cosine = np.einsum("iac,ibc->iab", rim.outward[first], rim.outward[second])
+        rows = np.flatnonzero((near[first] & known[second]) | (near[second] & known[first]))
+    first, second = first[rows], second[rows]
+    d, e = boundary.distance[first], boundary.distance[second]
+    bend = 0.5 * (boundary.curvature[first] + boundary.curvature[second])
+    cosine = np.einsum("iac,ibc->iab", boundary.outward[first], boundary.outward[second])
     alone = ~np.isfinite(d[:, 1]) & ~np.isfinite(e[:, 1])
-    # Which rim of the second point is the first one's nearest?
+    # Which boundary of the second point is the first one's nearest?
     alike = np.maximum(cosine, 0.0)
     swapped = ~alone & (alike[:, 0, 1] + alike[:, 1, 0] > alike[:, 0, 0] + alike[:, 1, 1])
     e[swapped] = e[swapped, ::-1]
-    bend[swapped] = 0.5 * (rim.curvature[first[swapped]] + rim.curvature[second[swapped], ::-1])
+    bend[swapped] = 0.5 * (boundary.curvature[first[swapped]] + boundary.curvature[second[swapped], ::-1])
     agreed = np.where(swapped[:, None], np.stack([cosine[:, 0, 1], cosine[:, 1, 0]], axis=1), cosine[:, [0, 1], [0, 1]])
     seen = np.isfinite(d) & np.isfinite(e) & (alone[:, None] | (agreed > _SHARED))
-    return _images(seen, distance[pairs], d, e, bend, 0.5 * (lengths[first] + lengths[second]), pairs)
+    return _images(seen, distance[rows], d, e, bend, 0.5 * (lengths[first] + lengths[second]), rows)
 
 
-def own_images(neighborhoods, rim):
+def own_images(pairs, boundary):
     """Return the images that points have within their own reach, as `mirror` does for pairs."""
-    rows = np.flatnonzero(rim.reached(neighborhoods.lengths))
-    d = rim.distance[rows]
-    return _images(np.isfinite(d), np.zeros(len(rows)), d, d, rim.curvature[rows], neighborhoods.lengths[rows], rows)
+    rows = np.flatnonzero(boundary.reached(pairs.lengths))
+    d = boundary.distance[rows]
+    return _images(np.isfinite(d), np.zeros(len(rows)), d, d, boundary.curvature[rows], pairs.lengths[rows], rows)
 
 
 def _images(seen, distance, d, e, curvature, lengths, rows):
@@ -83,17 +83,18 @@ def _images(seen, distance, d, e, curvature, lengths, rows):
     return result
 
 
-def image_excess(lengths, rim):
-    """Return what images change in the integral of the kernel at every point, to first order of the rim's curvature.
+def image_excess(lengths, boundary):
+    """Return what images change in the integral of the kernel at every point, to first order of the boundary's
+    curvature.
 
     The mean of both ends stands for the image's own area factor and distance, so that the matrix is symmetric: the
-    integral gains ``k h / 2 integral_0^3 w(a + b) (a - b) db`` at the distance a h from the rim, w being the kernel's
-    projection on a line.
+    integral gains ``k h / 2 integral_0^3 w(a + b) (a - b) db`` at the distance a h from the boundary, w being the
+    kernel's projection on a line.
     """
-    ratio = np.minimum(rim.distance / lengths[:, None], SUPPORT)
+    ratio = np.minimum(boundary.distance / lengths[:, None], SUPPORT)
     near = ratio[:, 0] < SUPPORT
     result = np.zeros(len(lengths))
-    excess = 0.5 * rim.curvature[near] * lengths[near, None] * _excess()(ratio[near])
+    excess = 0.5 * boundary.curvature[near] * lengths[near, None] * _excess()(ratio[near])
     result[near] = np.clip(excess, -0.2, 0.2).sum(axis=1)
     return result
 

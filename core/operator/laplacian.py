@@ -33,25 +33,26 @@ class LaplaceBeltrami:
         Unit normals, as given or estimated.
     areas : ndarray, (n,)
         Area elements [L^2], all positive: the lumped mass. Those of points left out are too small to count.
-    mean_bend, gaussian_curvature : ndarray, (n,)
+    mean_curvature, gaussian_curvature : ndarray, (n,)
         Mean [1 / L] and product [1 / L^2] of the two principal curvatures, from local quadrics; the product is zero
         without the curvature correction.
     boundary : ndarray, (n,) bool
-        Points at a rim of the surface.
-    near_rim : ndarray, (n,) bool
-        Points whose kernel reaches beyond a rim.
-    rim_distance : ndarray, (n,)
-        Distance to the nearest rim along the surface [L]; infinite where there is none near.
-    rim_direction : ndarray, (n, 3)
-        Unit vector across that rim, out of the surface; zero where it is not known.
+        Points at a boundary of the surface.
+    near_boundary : ndarray, (n,) bool
+        Points whose kernel reaches beyond a boundary.
+    boundary_distance : ndarray, (n,)
+        Distance to the nearest boundary along the surface [L]; infinite where there is none near.
+    boundary_direction : ndarray, (n, 3)
+        Unit vector across that boundary, out of the surface; zero where it is not known.
     component : ndarray, (n,) int
-        Connected part of each point, the largest first; -1 for points that were left out.
+        Component of each point, the largest first; -1 for points that were left out.
     smoothing_lengths : ndarray, (n,)
         h of each point [L]; the kernel reaches 3 h.
     stiffness : csr_array, (n, n)
-        Symmetric positive semi-definite, rows sum to zero, no units. At a rim it is the natural one: no flow across.
-    natural_images, fixed_images : csr_array, (n, n)
-        Weights of the mirror images in the rim that `stiffness` holds, and of those that `fixed_rim` puts in their
+        Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the natural one: no flow
+        across.
+    neumann_images, dirichlet_images : csr_array, (n, n)
+        Weights of the mirror images in the boundary that `stiffness` holds, and of those that `dirichlet` puts in their
         place; symmetric, not negative.
     options : LaplacianOptions
         The settings it was built with.
@@ -63,35 +64,35 @@ class LaplaceBeltrami:
     surface_points: np.ndarray
     normals: np.ndarray
     areas: np.ndarray
-    mean_bend: np.ndarray
+    mean_curvature: np.ndarray
     gaussian_curvature: np.ndarray
     boundary: np.ndarray
-    near_rim: np.ndarray
-    rim_distance: np.ndarray
-    rim_direction: np.ndarray
+    near_boundary: np.ndarray
+    boundary_distance: np.ndarray
+    boundary_direction: np.ndarray
     component: np.ndarray
     smoothing_lengths: np.ndarray
     stiffness: sparse.csr_array
-    natural_images: sparse.csr_array
-    fixed_images: sparse.csr_array
+    neumann_images: sparse.csr_array
+    dirichlet_images: sparse.csr_array
     options: LaplacianOptions
     notices: list
 
     @property
-    def fixed_rim(self):
-        """The operator of functions with fixed values at the rim, such as zero.
+    def dirichlet(self):
+        """The operator of functions with fixed values at the boundary, such as zero.
 
         Returns
         -------
         stiffness : csr_array, (n, n)
-            Symmetric positive semi-definite, definite where there is a rim: the image of a point in the rim carries
-            ``2 c - f`` instead of f.
+            Symmetric positive semi-definite, definite where there is a boundary: the image of a point in the boundary
+            carries ``2 c - f`` instead of f.
         pull : csr_array, (n, n)
-            ``stiffness @ f = areas * source + pull @ c`` solves -Delta f = source with the values c at the rim; c (n,)
-            holds at every point the value at the nearest rim point.
+            ``stiffness @ f = areas * source + pull @ c`` solves -Delta f = source with the values c at the boundary; c
+            (n,) holds at every point the value at the nearest boundary point.
         """
-        natural = sparse.diags_array(self.natural_images.sum(axis=1)) - self.natural_images
-        pull = sparse.diags_array(self.fixed_images.sum(axis=1)) + self.fixed_images
+        natural = sparse.diags_array(self.neumann_images.sum(axis=1)) - self.neumann_images
+        pull = sparse.diags_array(self.dirichlet_images.sum(axis=1)) + self.dirichlet_images
         return (self.stiffness - natural + pull).tocsr(), pull.tocsr()
 
     def apply(self, values, raw=False):
@@ -129,7 +130,7 @@ class LaplaceBeltrami:
             return result
         return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (lengths**2 * result)) / areas
 
-    def eigenpairs(self, count, raw=False, fixed_rim=False, progress=None):
+    def eigenpairs(self, count, raw=False, dirichlet=False, progress=None):
         """Compute the lowest eigenpairs of the negated operator, eq. (12).
 
         Parameters
@@ -138,8 +139,8 @@ class LaplaceBeltrami:
             How many, the constant mode included.
         raw : bool
             Leave out the symbol correction of the eigenvalues.
-        fixed_rim : bool
-            Modes that vanish at the rim, instead of those that meet it level.
+        dirichlet : bool
+            Modes that vanish at the boundary, instead of those that meet it level.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -156,7 +157,7 @@ class LaplaceBeltrami:
         SolverError
             The eigenvalue solver did not converge.
         """
-        stiffness = self.fixed_rim[0] if fixed_rim else self.stiffness
+        stiffness = self.dirichlet[0] if dirichlet else self.stiffness
         spectrum = solve_spectrum(self, stiffness, count, progress)
         return spectrum if raw else self.corrected(spectrum)
 
@@ -198,10 +199,10 @@ def build_laplacian(
     options : LaplacianOptions
         Settings.
     boundary : array_like, (k,) int or (n,) bool, optional
-        The points at the rim, instead of those that the options would find.
+        The points at the boundary, instead of those that the options would find.
     boundary_distance : array_like, (n,), optional
-        Distance of every point to the rim along the surface [L], instead of a measured one; infinity where it is far.
-        With `boundary`, measured ones stand next to corners, where there are two rims.
+        Distance of every point to the boundary along the surface [L], instead of a measured one; infinity where it is
+        far. With `boundary`, measured ones stand next to corners, where there are two boundaries.
     progress : callable, optional
         Called as ``progress(stage, fraction)`` in each stage; may raise `Cancelled`.
 
@@ -222,7 +223,7 @@ def build_laplacian(
     points = check_points(points)
 
     cloud = read_cloud(points, options, normals, boundary, boundary_distance, report)
-    scaled, pairs, notices = cloud.scaled, cloud.neighborhoods, cloud.notices
+    scaled, pairs, notices = cloud.scaled, cloud.pairs, cloud.notices
     if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
         notices.append(
             "The kernel of most points reaches over a third of the object, which is too wide for good results."
@@ -243,20 +244,20 @@ def build_laplacian(
     )
     return LaplaceBeltrami(
         points=points,
-        surface_points=points + scaled.hand_out(cloud.moved * scaled.scale, 0.0),
-        normals=scaled.hand_out(cloud.normals, (0.0, 0.0, 1.0)),
+        surface_points=points + scaled.scatter(cloud.moved * scaled.scale, 0.0),
+        normals=scaled.scatter(cloud.normals, (0.0, 0.0, 1.0)),
         areas=scaled.share(solution.areas * scaled.scale**2, NO_AREA),
-        mean_bend=scaled.hand_out(cloud.mean_bend / scaled.scale, 0.0),
-        gaussian_curvature=scaled.hand_out(cloud.gaussian / scaled.scale**2, 0.0),
-        boundary=scaled.hand_out(cloud.rim.at_rim, False),
-        near_rim=scaled.hand_out(cloud.rim.reached(pairs.lengths), False),
-        rim_distance=scaled.hand_out(cloud.rim.distance[:, 0] * scaled.scale, np.inf),
-        rim_direction=scaled.hand_out(cloud.rim.outward[:, 0], 0.0),
-        component=scaled.hand_out(cloud.label, -1),
-        smoothing_lengths=scaled.hand_out(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
+        mean_curvature=scaled.scatter(cloud.mean_curvature / scaled.scale, 0.0),
+        gaussian_curvature=scaled.scatter(cloud.gaussian / scaled.scale**2, 0.0),
+        boundary=scaled.scatter(cloud.boundary.at_boundary, False),
+        near_boundary=scaled.scatter(cloud.boundary.reached(pairs.lengths), False),
+        boundary_distance=scaled.scatter(cloud.boundary.distance[:, 0] * scaled.scale, np.inf),
+        boundary_direction=scaled.scatter(cloud.boundary.outward[:, 0], 0.0),
+        component=scaled.scatter(cloud.label, -1),
+        smoothing_lengths=scaled.scatter(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         stiffness=stiffness,
-        natural_images=natural,
-        fixed_images=fixed,
+        neumann_images=natural,
+        dirichlet_images=fixed,
         options=options,
         notices=notices,
     )
@@ -268,7 +269,7 @@ def narrow_laplacian(laplacian, neighbors=NARROW):
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals, rim, and the points that it takes the surface to be at are used.
+        Its normals, boundary, and the points that it takes the surface to be at are used.
     neighbors : int
         Neighbours inside the kernel's support.
 

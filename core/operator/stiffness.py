@@ -10,14 +10,14 @@ from .curvature import weight_factor
 from .images import mirror, own_images
 from .weights import balance_weights
 
-_NATURAL, _FIXED = 2.0, 2.0 / 3.0  # growth of the images' weights over that of their areas next to a curved rim
+_NATURAL, _FIXED = 2.0, 2.0 / 3.0  # growth of the images' weights over that of their areas next to a curved boundary
 
 
 def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: None):
     """Assemble K = -D G D of eq. (10) for the caller's points.
 
     Points at the same place take equal parts of its area and couple as neighbours at distance zero. The image of a
-    point in a rim has the point's value, so that it adds to the weight of the pair.
+    point in a boundary has the point's value, so that it adds to the weight of the pair.
 
     Parameters
     ----------
@@ -36,30 +36,31 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     -------
     stiffness : csr_array, (n, n)
         Symmetric, rows sum to zero, columns sorted; without units, so the same in any scale.
-    natural_images, fixed_images : csr_array, (n, n)
-        Symmetric weights of the images in one rim, those of points in their own image on the diagonal: the part of the
-        stiffness that is theirs, and what takes its place for fixed values at the rim. (An image of an image, across a
-        corner, has the point's value either way.)
+    neumann_images, dirichlet_images : csr_array, (n, n)
+        Symmetric weights of the images in one boundary, those of points in their own image on the diagonal: the part of
+        the stiffness that is theirs, and what takes its place for fixed values at the boundary. (An image of an image,
+        across a corner, has the point's value either way.)
 
     Notes
     -----
-    Next to a rim of curvature k the energy of a function along the rim comes out low by mu2 h^2 k / 4 of its own on the
-    rim, because the kernel's pairs there have their middle inside more often than outside; twice the growth of the
-    images' areas makes up for it. For functions that vanish at the rim two thirds do, as measured on discs.
+    Next to a boundary of curvature k the energy of a function along the boundary comes out low by mu2 h^2 k / 4 of its
+    own on the boundary, because the kernel's pairs there have their middle inside more often than outside; twice the
+    growth of the images' areas makes up for it. For functions that vanish at the boundary two thirds do, as measured on
+    discs.
     """
-    pairs = cloud.neighborhoods
+    pairs = cloud.pairs
     factor = weight_factor(pairs.lengths, cloud.gaussian)
     lengths = pairs.mean(pairs.lengths)
     scale = pairs.mean(factor) / lengths**4 * areas[pairs.first] * areas[pairs.second]
     own_scale = factor / pairs.lengths**4 * areas**2
-    # Weights of pairs, and of points with themselves, without images; then those of the images in one rim.
+    # Weights of pairs, and of points with themselves, without images; then those of the images in one boundary.
     plain = pair_kernel(distance / lengths) * scale, pair_kernel(0.0) * own_scale
     if balanced:
         plain = plain[0] * balance_weights(cloud, distance, plain[0], areas, report), plain[1]
     natural, fixed = (tuple(np.zeros_like(part) for part in plain) for _ in range(2))
     for part, images, h, units in (
-        (0, mirror(pairs, distance, cloud.rim), lengths, scale),
-        (1, own_images(pairs, cloud.rim), pairs.lengths, own_scale),
+        (0, mirror(pairs, distance, cloud.boundary), lengths, scale),
+        (1, own_images(pairs, cloud.boundary), pairs.lengths, own_scale),
     ):
         nearest, second, across = images
         for rows, image, larger in (nearest, second):
@@ -73,13 +74,13 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     if not natural[1].any():
         return stiffness, sparse.csr_array(stiffness.shape), sparse.csr_array(stiffness.shape)
     known = natural[0] > 0.0
-    cloud = replace(cloud, neighborhoods=pairs.keep(known))
+    cloud = replace(cloud, pairs=pairs.keep(known))
     return stiffness, *(_for_callers_points(cloud, images[0][known], images[1]) for images in (natural, fixed))
 
 
 def _for_callers_points(cloud, weights, own):
     """Return the symmetric matrix of pair weights and own weights for the caller's points, columns sorted."""
-    scaled, pairs = cloud.scaled, cloud.neighborhoods
+    scaled, pairs = cloud.scaled, cloud.pairs
     n = len(scaled.inverse)
     if scaled.duplicates:
         known = np.flatnonzero(scaled.inverse >= 0)

@@ -28,7 +28,7 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     Parameters
     ----------
     cloud : Cloud
-        Of m points, with p pairs. Next to rims, where images complete the sums, points keep their weights.
+        Of m points, with p pairs. Next to boundaries, where images complete the sums, points keep their weights.
     distance : ndarray, (p,)
         Distance of each pair along the surface.
     weights : ndarray, (p,)
@@ -42,9 +42,9 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     -------
     ndarray, (p,)
     """
-    pairs = cloud.neighborhoods
+    pairs = cloud.pairs
     lengths = pairs.lengths
-    free = ~cloud.rim.reached(lengths)
+    free = ~cloud.boundary.reached(lengths)
     blocks = list(_Block.of(cloud, distance, weights, report))
     moment = 4.0 * areas * _trace(cloud, weights, areas)
     # Terms of every point: constant, and the linear and quadratic one as complex numbers in the point's own frame.
@@ -71,7 +71,7 @@ def _trace(cloud, weights, areas):
     That of the curved surface, times ``1 + mu2 Laplacian(h^2) / 8`` where h varies: pairs are as wide as h is in their
     middle, which is on the side of the wider kernel more often.
     """
-    pairs, lengths = cloud.neighborhoods, cloud.neighborhoods.lengths
+    pairs, lengths = cloud.pairs, cloud.pairs.lengths
     squared = lengths**2
     gain = pairs.half(weights * (squared[pairs.second] - squared[pairs.first]))
     gain = (gain.sum(axis=1) - gain.sum(axis=0)) * (SECOND_MOMENT / 8.0) / areas
@@ -88,7 +88,7 @@ class _Block:
     @classmethod
     def of(cls, cloud, distance, weights, report):
         """Yield all pairs, block by block."""
-        pairs = cloud.neighborhoods
+        pairs = cloud.pairs
         start = pairs.half(weights).indptr
         tangents = np.moveaxis(frames(cloud.normals)[:, :, 1:], 2, 0)
         # Coordinate by coordinate, which is faster than rows of three.
@@ -99,7 +99,7 @@ class _Block:
             yield cls(cloud, distance, weights, start[low : high + 1], slice(low, high), *vectors)
 
     def __init__(self, cloud, distance, weights, start, points, places, normals, *tangents):
-        pairs, self.points = cloud.neighborhoods, points
+        pairs, self.points = cloud.pairs, points
         self.rows = slice(start[0], start[-1])
         self.first, self.second = i, j = pairs.first[self.rows], pairs.second[self.rows]
         self.start = start - start[0]

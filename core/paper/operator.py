@@ -6,12 +6,12 @@ from scipy import sparse
 from ..kernel import pair_kernel
 
 
-def unsymmetrized_operator(neighborhoods, normals, areas):
+def unsymmetrized_operator(pairs, normals, areas):
     """Assemble the operator of eq. (5): each row projects its neighbours on its own tangent plane.
 
     Parameters
     ----------
-    neighborhoods : Neighborhoods
+    pairs : Pairs
         Of m distinct points.
     normals : ndarray, (m, 3)
         Unit normals.
@@ -23,10 +23,10 @@ def unsymmetrized_operator(neighborhoods, normals, areas):
     csr_array, (m, m)
         L in scaled coordinates: rows sum to zero, not symmetric for any inner product in general.
     """
-    row = np.concatenate([neighborhoods.first, neighborhoods.second])
-    column = np.concatenate([neighborhoods.second, neighborhoods.first])
-    distance, lengths = np.tile(neighborhoods.distance, 2), np.tile(neighborhoods.mean(neighborhoods.lengths), 2)
-    difference = neighborhoods.points[row] - neighborhoods.points[column]
+    row = np.concatenate([pairs.first, pairs.second])
+    column = np.concatenate([pairs.second, pairs.first])
+    distance, lengths = np.tile(pairs.distance, 2), np.tile(pairs.mean(pairs.lengths), 2)
+    difference = pairs.points[row] - pairs.points[column]
     height = np.einsum("ij,ij->i", difference, normals[row])
     projected = np.sqrt(np.maximum(distance**2 - height**2, 0.0))
     weights = pair_kernel(projected / lengths) / lengths**4 * areas[column]

@@ -25,7 +25,7 @@ class Stability:
         Largest entry of L e and of areas . L, relative to the largest diagonal entry: both vanish, for e spans the
         kernel of L and the areas that of its transpose.
     parts : int
-        Dimension of the kernel: connected parts of the operator's graph.
+        Dimension of the kernel: components of the operator's graph.
     """
 
     area_ratio: float
@@ -63,7 +63,8 @@ def check_stability(laplacian):
     Returns
     -------
     Stability
-        Of the points that take part. (A5) holds for the kernel by construction; (A6) concerns rims, not measured here.
+        Of the points that take part. (A5) holds for the kernel by construction; (A6) concerns boundaries, not measured
+        here.
     """
     known = np.flatnonzero(laplacian.component >= 0)
     distinct, first = np.unique(laplacian.points[known], axis=0, return_index=True)

@@ -184,7 +184,7 @@ def moves_in_edit_mode(obj) -> bool:
 
 def settings_text(obj) -> str:
     """Text of the settings of the operator that deformations depend on."""
-    return repr((settings_values(obj.meshfree), obj.meshfree.rim_group, obj.meshfree.use_modifiers))
+    return repr((settings_values(obj.meshfree), obj.meshfree.boundary_group, obj.meshfree.use_modifiers))
 
 
 def stale_reason(obj, glance=False, trusting=False) -> str:

@@ -17,7 +17,7 @@ from bpy.app.handlers import persistent
 
 from ...core import Cancelled, Deformer, PointCloudError
 from ..objects.options import laplacian_options
-from ..objects.reading import rim_points
+from ..objects.reading import boundary_points
 from ..running import cache
 from ..running.handlers import add_handlers, remove_handlers
 from ..running.job import STOPPED, Job, running
@@ -124,10 +124,10 @@ def plan_factors(obj, rest, matrix, constraints):
     """
     settings = obj.meshfree.deform
     weights = settings.weight * constraints.strength if settings.soft else None
-    options, rim, aware = laplacian_options(obj.meshfree), rim_points(obj), settings.rotation_aware
+    options, boundary, aware = laplacian_options(obj.meshfree), boundary_points(obj), settings.rotation_aware
 
     def make(progress):
-        laplacian = cache.build(rest.astype(np.float64) @ matrix.T, options, rim, progress).laplacian
+        laplacian = cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress).laplacian
         deformer = Deformer(laplacian, constraints.moved, constraints.kept, aware, weights, progress=progress)
         return Live(constraints, rest, matrix, deformer)
 

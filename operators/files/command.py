@@ -66,10 +66,10 @@ def _parse(argv):
     commands = parser.add_subparsers(dest="command", required=True)
     analyze = commands.add_parser(
         "analyze",
-        help="areas, normals, curvature, rims and vibration modes of point clouds",
-        description="Analyze point clouds. Writes one JSON line per input: points, total area, connected parts, points"
-        " at a rim, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1 if any"
-        " input failed.",
+        help="areas, normals, curvature, boundaries and vibration modes of point clouds",
+        description="Analyze point clouds. Writes one JSON line per input: points, total area, components, points"
+        " at a boundary, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1 if"
+        " any input failed.",
     )
     analyze.add_argument("--modes", type=int, default=0, metavar="N", help="how many vibration modes to compute")
     analyze.add_argument(

@@ -130,7 +130,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
         name, place, count = obj.name, place_of(obj), len(obj.get(EIGENVALUES, ()))
 
         def write(path, progress):
-            built = cache.build(reading.points, options, reading.rim, progress)
+            built = cache.build(reading.points, options, reading.boundary, progress)
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
             save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))

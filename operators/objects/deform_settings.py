@@ -47,7 +47,7 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
     )
     rotation_aware: BoolProperty(
         name="Turn Details",
-        description="Let details turn with the surface, as bending asks for",
+        description="Let details turn with the surface, as shape_operator asks for",
         default=True,
         update=live.settings_changed,
     )

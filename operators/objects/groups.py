@@ -5,7 +5,14 @@ import numpy as np
 from ...core import PointCloudError
 from .attributes import point_count, read_attribute, tag_changed, write_attribute
 
-HANDLE, ANCHOR, FIXED, SOURCE, VALUE, RIM = ROLES = "Handle", "Anchor", "Fixed", "Source", "Value", "Rim"
+HANDLE, ANCHOR, FIXED, SOURCE, VALUE, BOUNDARY_GROUP = ROLES = (
+    "Handle",
+    "Anchor",
+    "Fixed",
+    "Source",
+    "Value",
+    "Boundary",
+)
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
 
 

@@ -64,15 +64,15 @@ class Reading:
         Positions with the object's scale, rotation and shear, but not its location: float64 of small numbers.
     matrix : ndarray, (3, 3) float64
         The linear part of the object's matrix: points = local positions @ matrix.T.
-    rim : ndarray, (n,) bool, or None
-        Points at the rim, where the user's vertex group names them.
+    boundary : ndarray, (n,) bool, or None
+        Points at the boundary, where the user's vertex group names them.
     notices : list of str
         What the user should know about how the object was read.
     """
 
     points: np.ndarray
     matrix: np.ndarray
-    rim: np.ndarray | None = None
+    boundary: np.ndarray | None = None
     notices: list = field(default_factory=list)
 
     def local(self, vectors):
@@ -108,7 +108,7 @@ def read_points(context, obj) -> Reading:
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
         notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
-    return Reading(check_points(positions) @ matrix.T, matrix, rim_points(obj), notices)
+    return Reading(check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices)
 
 
 def seen_positions(context, obj):
@@ -119,10 +119,10 @@ def seen_positions(context, obj):
     return own_positions(obj.data)
 
 
-def rim_points(obj):
-    """Read which points the rim group of an object holds, (n,) bool; None if the settings name no group."""
-    name = obj.meshfree.rim_group
-    return chosen_members(obj, name, ("Rim Group"), FEWEST) if name else None
+def boundary_points(obj):
+    """Read which points the boundary group of an object holds, (n,) bool; None if the settings name no group."""
+    name = obj.meshfree.boundary_group
+    return chosen_members(obj, name, ("Boundary Group"), FEWEST) if name else None
 
 
 def key_positions(key):
@@ -174,9 +174,9 @@ def metric(obj):
 
 
 def fingerprint(obj, glance=False, left_out=()) -> str:
-    """Checksum of the positions but those of some points, of shape keys and of the rim group.
+    """Checksum of the positions but those of some points, of shape keys and of the boundary group.
 
-    A glance is quick enough for a panel, some milliseconds for 1 million points, may see a change of the rim group
+    A glance is quick enough for a panel, some milliseconds for 1 million points, may see a change of the boundary group
     some seconds late, and is empty while that has not been counted yet. Of modifiers, if they are used, both see which
     ones there are and their settings, not what is in other data that these name.
     """
@@ -193,11 +193,11 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
     if obj.meshfree.use_modifiers:
         state = [modifier_settings(item) for item in obj.modifiers if not is_own(item)]
         checksum = zlib.crc32(repr(state).encode(), checksum)
-    if obj.meshfree.rim_group:
-        rim = members(obj, obj.meshfree.rim_group, glance)
-        if rim is None:
+    if obj.meshfree.boundary_group:
+        boundary = members(obj, obj.meshfree.boundary_group, glance)
+        if boundary is None:
             return ""
-        checksum = zlib.crc32(repr(rim.checksum).encode(), checksum)
+        checksum = zlib.crc32(repr(boundary.checksum).encode(), checksum)
     return f"{checksum:08x}"
 
 

@@ -110,14 +110,14 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         soft_max=1.0,
         precision=6,
     )
-    rims: EnumProperty(
-        name="Rims",
-        description="Where the surface ends, if no Rim Group is named",
+    boundary: EnumProperty(
+        name="Boundaries",
+        description="Where the surface ends, if no Boundary Group is named",
         items=(
-            ("AUTO", "Automatic", "Find the points at a rim, and continue the surface beyond it as in a mirror"),
+            ("AUTO", "Automatic", "Find the points at a boundary, and continue the surface beyond it as in a mirror"),
             ("OFF", "Off (Closed Surface)", "Take the surface as closed, whatever it looks like"),
         ),
-        default=DEFAULTS.rims.upper(),
+        default=DEFAULTS.boundaries.upper(),
     )
     sheets: BoolProperty(
         name="Keep Close Sheets Apart",
@@ -147,9 +147,9 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         description="Correct eigenvalues and curvature for the known effect of the kernel's width",
         default=DEFAULTS.symbol_correction,
     )
-    rim_group: StringProperty(
-        name="Rim Group",
-        description="Vertex group with the points of the rim, instead of finding them; weights above 0 count",
+    boundary_group: StringProperty(
+        name="Boundary Group",
+        description="Vertex group with the points of the boundary, instead of finding them; weights above 0 count",
     )
     use_modifiers: BoolProperty(
         name="Use Modifiers",
@@ -262,8 +262,10 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     # Results of the last analysis, for the panel and for scripts.
     total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
     point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
-    part_count: IntProperty(name="Connected Parts", description="How many parts the surface falls into", min=0)
-    rim_count: IntProperty(name="Rim Points", description="How many points lie at a rim of the surface", min=0)
+    component_count: IntProperty(name="Components", description="How many parts the surface falls into", min=0)
+    boundary_count: IntProperty(
+        name="Boundary Points", description="How many points lie at a boundary of the surface", min=0
+    )
     left_out_count: IntProperty(
         name="Points Left Out", description="How many points lie too far apart from others to take part", min=0
     )

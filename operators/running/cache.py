@@ -26,32 +26,32 @@ class Built(NamedTuple):
     mean_curvature: np.ndarray
 
 
-def build(points, options, rim, progress) -> Built:
-    """Return the operator of these points, options and rim, built only if it is not kept.
+def build(points, options, boundary, progress) -> Built:
+    """Return the operator of these points, options and boundary, built only if it is not kept.
 
     Parameters
     ----------
     points : ndarray, (n, 3)
     options : LaplacianOptions
-    rim : ndarray, (n,) bool, or None
-        The points at the rim; None leaves it to the options.
+    boundary : ndarray, (n,) bool, or None
+        The points at the boundary; None leaves it to the options.
     progress : callable
         Called as ``progress(stage, fraction)``.
     """
 
     def compute():
-        laplacian = build_laplacian(points, options=options, boundary=rim, progress=progress)
+        laplacian = build_laplacian(points, options=options, boundary=boundary, progress=progress)
         progress("Curvature", 1.0)
         return Built(laplacian, mean_curvature(laplacian))
 
-    key = content(points, options, rim)
+    key = content(points, options, boundary)
     built = fetch(key, compute)
     with _lock:
         _sources[built.laplacian] = key
     return built
 
 
-def lowest_modes(laplacian, count: int, progress, fixed_rim=False, raw=False) -> Spectrum:
+def lowest_modes(laplacian, count: int, progress, dirichlet=False, raw=False) -> Spectrum:
     """Return the lowest modes of an operator, computed only if there are not as many from before.
 
     Parameters
@@ -61,14 +61,14 @@ def lowest_modes(laplacian, count: int, progress, fixed_rim=False, raw=False) ->
     count : int
     progress : callable
         Called as ``progress(stage, fraction)``.
-    fixed_rim, raw : bool
+    dirichlet, raw : bool
         As of `LaplaceBeltrami.eigenpairs`.
     """
     progress("Spectrum", 0.0)
-    key = _modes_key(laplacian, fixed_rim)
+    key = _modes_key(laplacian, dirichlet)
     known = _get(key)
     if known is None or len(known.eigenvalues) < count:
-        known = laplacian.eigenpairs(count, raw=True, fixed_rim=fixed_rim, progress=progress)
+        known = laplacian.eigenpairs(count, raw=True, dirichlet=dirichlet, progress=progress)
         _put(key, known)
     lowest = Spectrum(known.eigenvalues[:count], known.eigenvectors[:, :count])
     return lowest if raw else laplacian.corrected(lowest)
@@ -132,8 +132,8 @@ def _forget(*_):
     clear()
 
 
-def _modes_key(laplacian, fixed_rim):
-    return content(_sources[laplacian], "modes", fixed_rim)
+def _modes_key(laplacian, dirichlet):
+    return content(_sources[laplacian], "modes", dirichlet)
 
 
 def _get(key):

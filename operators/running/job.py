@@ -296,7 +296,7 @@ class JobOperator(ReadyOperator):
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            text = f"{job.title} wrote nothing: {change.text}"
+            text = f"{job.title} wrote nothing: {change}"
             self.report({"WARNING"}, text)
             return {"CANCELLED"}
         return self.finish(context, objects, results, job.seconds)

@@ -1,4 +1,4 @@
-"""Areas, normals, curvature, rim and connected parts of the active object's points."""
+"""Areas, normals, curvature, boundary and components of the active object's points."""
 
 from dataclasses import dataclass
 
@@ -36,11 +36,11 @@ class Analysis:
 
     @property
     def counts(self) -> dict:
-        """Connected parts, points at a rim and points left out, by the names of the settings that keep them."""
+        """Components, points at a boundary and points left out, by the names of the settings that keep them."""
         component = self.laplacian.component
         return {
-            "part_count": int(component.max()) + 1,
-            "rim_count": int(np.count_nonzero(self.laplacian.boundary)),
+            "component_count": int(component.max()) + 1,
+            "boundary_count": int(np.count_nonzero(self.laplacian.boundary)),
             "left_out_count": int(np.count_nonzero(component < 0)),
         }
 
@@ -52,7 +52,7 @@ def plan_analysis(context, obj, modes: int = 0):
 
     def compute(progress):
         with StageTimes(progress) as times:
-            laplacian, curvature = cache.build(reading.points, options, reading.rim, times)
+            laplacian, curvature = cache.build(reading.points, options, reading.boundary, times)
             spectrum, unresolved = resolved_modes(laplacian, modes, times) if modes else (None, [])
         notices = reading.notices + laplacian.notices + unresolved
         return Analysis(
@@ -119,7 +119,7 @@ class AnalysisOperator(ShownOperator):
 
 
 class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
-    """Compute area, normal and curvatures of each point, the rim, the connected parts and the total area"""
+    """Compute area, normal and curvatures of each point, the boundary, the components and the total area"""
 
     bl_idname = "meshfree.analyze"
     bl_label = "Analyze Points"

@@ -107,7 +107,7 @@ def _convert(context, obj, target):
 def _group_names(obj):
     """Names of the groups that tools take, and of the parts."""
     settings = obj.meshfree
-    names = {*ROLES, *handle_names(obj), settings.deform.anchors, settings.rim_group}
+    names = {*ROLES, *handle_names(obj), settings.deform.anchors, settings.boundary_group}
     kept = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
     names |= {group.name for group in kept if _SEGMENT.fullmatch(group.name)}
     return [name for name in names if name and has_group(obj, name)]

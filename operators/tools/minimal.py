@@ -1,4 +1,4 @@
-"""Minimal surfaces: what a soap film on the rim of an object would be."""
+"""Minimal surfaces: what a soap film on the boundary of an object would be."""
 
 import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
@@ -17,7 +17,7 @@ HISTORY = "lb_area_history"  # custom property of the object: area after each st
 
 
 class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
-    """Let the points shrink to the least area that their rim can span, as a soap film does"""
+    """Let the points shrink to the least area that their boundary can span, as a soap film does"""
 
     bl_idname = "meshfree.minimal_surface"
     bl_label = "Minimal Surface"
@@ -25,8 +25,8 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
 
     group: StringProperty(
         name="Fixed",
-        description="Vertex group with the points that stay, every rim at least; where there is none of that name, the"
-        " rims that are found",
+        description="Vertex group with the points that stay, every boundary at least; where there is none of that"
+        " name, the boundaries that are found",
         default=FIXED,
     )
     tolerance: FloatProperty(
@@ -44,22 +44,22 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
         check_movable(obj, self.target)
         reading = read_points(context, obj)
         options = laplacian_options(obj.meshfree)
-        fixed = reading.rim
+        fixed = reading.boundary
         if is_chosen(obj, self.group, FIXED):
             fixed = chosen_members(obj, self.group, "Fixed")
         tolerance, steps, name = self.tolerance, self.steps, obj.name
         kind = group_kind(obj)
 
         def compute(progress):
-            rim = fixed
-            if rim is None:
-                rim = cache.build(reading.points, options, None, progress).laplacian.boundary
-                if not rim.any():
+            boundary = fixed
+            if boundary is None:
+                boundary = cache.build(reading.points, options, None, progress).laplacian.boundary
+                if not boundary.any():
                     raise PointCloudError(
-                        f'"{name}" has no rim, so that its surface would shrink to nothing. Assign the points'
+                        f'"{name}" has no boundary, so that its surface would shrink to nothing. Assign the points'
                         f' that stay to the {kind} "{FIXED}".'
                     )
-            settings = (reading.points, rim, tolerance, steps, options)
+            settings = (reading.points, boundary, tolerance, steps, options)
             return reading, cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
 
         return compute
@@ -82,8 +82,8 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
             layout.prop(self, name)
 
 
-def _shrink(points, rim, tolerance, steps, options, progress):
-    """Compute the film that a rim spans, with the share of the steps as progress."""
+def _shrink(points, boundary, tolerance, steps, options, progress):
+    """Compute the film that a boundary spans, with the share of the steps as progress."""
     count = 0
 
     def stepped(step, points, area):
@@ -93,7 +93,7 @@ def _shrink(points, rim, tolerance, steps, options, progress):
     def report(stage, fraction):
         progress("Steps", min(1.0, (count + fraction) / steps))
 
-    film = minimal_surface(points, rim, tolerance, steps, options, callback=stepped, progress=report)
+    film = minimal_surface(points, boundary, tolerance, steps, options, callback=stepped, progress=report)
     if film.reason == "cancelled":  # nobody waits for it, and it must not be kept
         raise Cancelled
     return film

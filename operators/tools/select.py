@@ -180,7 +180,7 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
 
 
 class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
-    """Select all points of the connected parts that hold selected points"""
+    """Select all points of the components that hold selected points"""
 
     bl_idname = "meshfree.select_component"
     bl_label = "Select Connected Part"
@@ -242,10 +242,10 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         items=[
             ("HANDLE", "Handle", "Points that are moved to deform the rest"),
             ("ANCHOR", "Anchor", "Points that stay where they are"),
-            ("FIXED", "Fixed", "The rim that a minimal surface keeps"),
+            ("FIXED", "Fixed", "The boundary that a minimal surface keeps"),
             ("SOURCE", "Source", "Points from which distances are measured"),
             ("VALUE", "Value", "Points with given values of a field, as weights"),
-            ("RIM", "Rim", "Points at which the surface ends; it becomes the Rim Group of the settings"),
+            ("BOUNDARY", "Boundary", "Points at which the surface ends; it becomes the Boundary Group of the settings"),
         ],
         default="HANDLE",
     )
@@ -287,26 +287,28 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         def change():
             assign(obj, name, chosen, self.action, self.weight)
             groups_changed(obj)
-            if self.role == "RIM" and self.action != "REMOVE":
-                obj.meshfree.rim_group = name
+            if self.role == "BOUNDARY" and self.action != "REMOVE":
+                obj.meshfree.boundary_group = name
             done = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
             return f'{np.count_nonzero(chosen):,} points {done} the group "{name}"'
 
         return change
 
 
-class MESHFREE_OT_select_rim(SelectionOperator, bpy.types.Operator):
-    """Select the points at the rims of the surface, as they are found or named by the Rim Group"""
+class MESHFREE_OT_select_boundary(SelectionOperator, bpy.types.Operator):
+    """Select the points at the boundaries of the surface, as they are found or named by the Boundary Group"""
 
-    bl_idname = "meshfree.select_rim"
-    bl_label = "Select Rim"
+    bl_idname = "meshfree.select_boundary"
+    bl_label = "Select Boundary"
     needs_selection = False
 
     def prepare(self, context, obj):
-        rim = analyzed(context, obj)[1].boundary
-        if not rim.any():
-            raise PointCloudError(f'"{obj.name}" has no rim: its surface is closed, or Rims is off in the settings.')
-        return lambda: select(context, obj, rim)
+        boundary = analyzed(context, obj)[1].boundary
+        if not boundary.any():
+            raise PointCloudError(
+                f'"{obj.name}" has no boundary: its surface is closed, or Boundaries is off in the settings.'
+            )
+        return lambda: select(context, obj, boundary)
 
 
 class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
@@ -328,7 +330,7 @@ CLASSES = (
     MESHFREE_OT_select_grow,
     MESHFREE_OT_select_component,
     MESHFREE_OT_select_front,
-    MESHFREE_OT_select_rim,
+    MESHFREE_OT_select_boundary,
     MESHFREE_OT_select_group,
     MESHFREE_OT_group_from_selection,
 )

@@ -70,12 +70,12 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         description="Scale the result so that it keeps its size",
         items=[
             ("NONE", "Nothing", "Let the shape shrink as it will"),
-            ("AREA", "Area", "Keep the area of each connected part"),
-            ("VOLUME", "Volume", "Keep the volume of each connected part; for closed surfaces"),
+            ("AREA", "Area", "Keep the area of each component"),
+            ("VOLUME", "Volume", "Keep the volume of each component; for closed surfaces"),
         ],
         default="NONE",
     )
-    keep_rim: BoolProperty(name="Keep Rim", description="Leave the rim where it is", default=True)
+    keep_boundary: BoolProperty(name="Keep Boundary", description="Leave the boundary where it is", default=True)
     target: target_property()
 
     @property
@@ -89,25 +89,25 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         mask = chosen_weights(obj, self.group, ("Vertex Group")) if self.group else None
         method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
         shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
-        keep_rim, name = self.keep_rim, obj.name
+        keep_boundary, name = self.keep_boundary, obj.name
 
         def compute(progress):
             laplacian = operator(progress)
-            fixed_rim = keep_rim and bool(laplacian.boundary.any())
-            if fixed_rim and shared["keep"]:
+            dirichlet = keep_boundary and bool(laplacian.boundary.any())
+            if dirichlet and shared["keep"]:
                 raise PointCloudError(
-                    f'"{name}" has a rim, which stays and fixes the size already. Set Keep to Nothing, or turn'
-                    " off Keep Rim."
+                    f'"{name}" has a boundary, which stays and fixes the size already. Set Keep to Nothing, or turn'
+                    " off Keep Boundary."
                 )
             size = np.linalg.norm(np.ptp(reading.points, axis=0))
             if wavelength > size:
                 raise PointCloudError(
                     f'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.'
                 )
-            blend = PointBlend(laplacian, fixed_rim=fixed_rim, **shared)
+            blend = PointBlend(laplacian, dirichlet=dirichlet, **shared)
             settings = (
                 method,
-                fixed_rim,
+                dirichlet,
                 modes if method == "MODES" else wavelength,
                 gain if method == "DETAIL" else 0,
             )
@@ -117,7 +117,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
                     laplacian,
                     "smooth",
                     *settings,
-                    compute=lambda: _smooth(laplacian, method, fixed_rim, modes, wavelength, gain, progress),
+                    compute=lambda: _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress),
                 )
 
             if not shared["keep"]:
@@ -144,19 +144,19 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         for name in [*names, "strength"]:
             layout.prop(self, name)
         search_group(layout, self, "group", context.object)
-        for name in ("keep", "keep_rim", "target"):
+        for name in ("keep", "keep_boundary", "target"):
             layout.prop(self, name)
 
 
-def _smooth(laplacian, method, fixed_rim, modes, wavelength, gain, progress):
+def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
     """Return the places of the points, (n, 3), that a method gives at full strength."""
-    base = cache.result(laplacian, "base", fixed_rim, compute=lambda: smoothing_base(laplacian, fixed_rim, progress))
-    settings = {"fixed_rim": fixed_rim, "progress": progress, "base": base}
+    base = cache.result(laplacian, "base", dirichlet, compute=lambda: smoothing_base(laplacian, dirichlet, progress))
+    settings = {"dirichlet": dirichlet, "progress": progress, "base": base}
     length = np.median(laplacian.smoothing_lengths)
     if method == "NOISE":
         return fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None, **settings)
     if method == "MODES":
-        spectrum = cache.lowest_modes(laplacian, modes, progress, fixed_rim, raw=True)
+        spectrum = cache.lowest_modes(laplacian, modes, progress, dirichlet, raw=True)
         return smooth_points(laplacian, modes, spectrum, **settings)
     if method == "HEAT":
         squared = ((wavelength or _HEAT * length) / (2.0 * np.pi)) ** 2

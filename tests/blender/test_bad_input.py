@@ -18,7 +18,7 @@ def far_away(points):
 
 
 def scattered(points):
-    """A hundred islands of ten points each, far from each other."""
+    """A hundred components of ten points each, far from each other."""
     return points + 1000.0 * np.repeat(points[:100], 10, axis=0)
 
 
@@ -152,19 +152,19 @@ def test_vertex_group_with_the_name_of_a_mode_that_is_not_written_does_no_harm()
 @pytest.mark.parametrize(
     ("members", "weight", "text"),
     [
-        (None, 1.0, r'"Cloud" has no vertex group named "Rim"\. Choose another Rim Group, or clear it'),
-        ([], 1.0, r'"Rim" gives 0 of 1000 points a weight above zero.*Assign.*or clear Rim Group'),
+        (None, 1.0, r'"Cloud" has no vertex group named "Boundary"\. Choose another Boundary Group, or clear it'),
+        ([], 1.0, r'"Boundary" gives 0 of 1000 points a weight above zero.*Assign.*or clear Boundary Group'),
         ([3, 4], 1.0, "gives 2 of 1000 points"),
         (range(100), 0.0, "gives 0 of 1000 points"),
     ],
     ids=["missing", "empty", "two points", "no weight"],
 )
-def test_rim_group_that_names_no_rim(operator, members, weight, text):
+def test_boundary_group_that_names_no_boundary(operator, members, weight, text):
     obj = add_object(sphere_points())
     bpy.ops.meshfree.analyze(modes=3)
-    obj.meshfree.rim_group = "Rim"
+    obj.meshfree.boundary_group = "Boundary"
     if members is not None:
-        add_group(obj, "Rim", members, weight)
+        add_group(obj, "Boundary", members, weight)
     before = everything(obj)
     with pytest.raises(RuntimeError, match=f"(?s)Error: .*{text}"):
         getattr(bpy.ops.meshfree, operator)()

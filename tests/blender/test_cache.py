@@ -21,8 +21,8 @@ AGAIN = {
     "soften": ("smooth", {"method": "HEAT"}, {"method": "HEAT", "strength": 0.0}),
     "keep area": (
         "smooth",
-        {"keep": "AREA", "keep_rim": False},
-        {"keep": "AREA", "keep_rim": False, "target": "IN_PLACE"},
+        {"keep": "AREA", "keep_boundary": False},
+        {"keep": "AREA", "keep_boundary": False, "target": "IN_PLACE"},
     ),
     "scale details": ("smooth", {"method": "DETAIL"}, {"method": "DETAIL", "strength": 0.5}),
     "keep modes": ("smooth", {"method": "MODES", "modes": 30}, {"method": "MODES", "modes": 20, "strength": 0.5}),
@@ -106,7 +106,12 @@ def test_kept_results_are_those_of_a_first_run(cache):
         bpy.ops.meshfree.smooth(strength=strength, **settings)
         return shown_points(bpy.context.object)
 
-    for settings in ({}, {"method": "MODES", "modes": 20}, {"keep_rim": False, "keep": "AREA"}, {"group": "Handle"}):
+    for settings in (
+        {},
+        {"method": "MODES", "modes": 20},
+        {"keep_boundary": False, "keep": "AREA"},
+        {"group": "Handle"},
+    ):
         cache.clear()
         expected = places(0.4, **settings)
         cache.clear()
@@ -125,22 +130,22 @@ def test_a_field_between_other_values_is_solved_once(cache, calls, core):
 
 
 def test_a_film_that_was_stopped_is_not_kept(cache, core):
-    minimal = importlib.import_module(cache.__name__.replace("cache", "minimal"))
+    minimal = importlib.import_module(cache.__name__.replace("running.cache", "tools.minimal"))
     points = wave()
-    rim = core.build_laplacian(points).boundary
+    boundary = core.build_laplacian(points).boundary
 
     def stop_later(stage, fraction):
         if fraction > 0.5:
             raise core.Cancelled
 
     with pytest.raises(core.Cancelled):
-        minimal._shrink(points, rim, 0.0, 4, options(cache), stop_later)
+        minimal._shrink(points, boundary, 0.0, 4, options(cache), stop_later)
 
 
-def test_modes_of_another_rim_are_others(cache):
+def test_modes_of_another_boundary_are_others(cache):
     built = cache.build(wave(), options(cache), None, silent)
     free = cache.lowest_modes(built.laplacian, 6, silent)
-    fixed = cache.lowest_modes(built.laplacian, 6, silent, fixed_rim=True, raw=True)
+    fixed = cache.lowest_modes(built.laplacian, 6, silent, dirichlet=True, raw=True)
     assert free.eigenvalues[0] < 1e-6 < fixed.eigenvalues[0]
     again = cache.lowest_modes(built.laplacian, 6, silent)
     assert_allclose(again.eigenvalues, built.laplacian.eigenpairs(6).eigenvalues, rtol=1e-9, atol=1e-9)
@@ -151,8 +156,7 @@ def silent(stage, fraction):
 
 
 def options(cache):
-    package = cache.__name__.rpartition(".")[0]
-    return importlib.import_module(f"{package}.options").DEFAULTS
+    return importlib.import_module(cache.__name__.replace("running.cache", "objects.options")).DEFAULTS
 
 
 class TestMemory:

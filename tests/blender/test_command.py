@@ -75,7 +75,7 @@ def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
     assert line["points"] == 1000
     assert line["total_area"] == pytest.approx(laplacian.areas.sum(), rel=1e-4)
     assert line["eigenvalues"] == pytest.approx(spectrum.eigenvalues.tolist(), rel=1e-3, abs=1e-9)
-    assert (line["part_count"], line["rim_count"], line["left_out_count"]) == (1, 0, 0)
+    assert (line["component_count"], line["boundary_count"], line["left_out_count"]) == (1, 0, 0)
     assert line["notices"] == []
     assert line["seconds"]["Spectrum"] >= 0.0
     with np.load(tmp_path / "out.npz") as arrays:
@@ -181,29 +181,29 @@ def test_settings(core, run, tmp_path):
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
 
 
-def test_rims_parts_and_points_left_out_are_told(run, tmp_path):
+def test_boundaries_parts_and_points_left_out_are_told(run, tmp_path):
     points, outermost = grid_points()
     np.savetxt(tmp_path / "in.xyz", np.vstack([points, POINTS + (20.0, 0.0, 0.0), [[0.0, 0.0, 50.0]]]))
     code, (line,) = run("analyze", tmp_path / "in.xyz", "--out", tmp_path / "out.npz")
     assert code == 0
-    assert (line["part_count"], line["rim_count"], line["left_out_count"]) == (2, outermost.sum(), 1)
+    assert (line["component_count"], line["boundary_count"], line["left_out_count"]) == (2, outermost.sum(), 1)
     assert any("left out of the operator: 1" in notice for notice in line["notices"])
     with np.load(tmp_path / "out.npz") as arrays:
         assert (arrays["boundary"][: len(points)] == outermost).all()
         assert arrays["component"][-1] == -1
-    code, (line,) = run("analyze", tmp_path / "in.xyz", "--rims", "off")
-    assert (code, line["rim_count"]) == (0, 0)
+    code, (line,) = run("analyze", tmp_path / "in.xyz", "--boundary", "off")
+    assert (code, line["boundary_count"]) == (0, 0)
 
 
-def test_rim_group_of_a_blend_file(run, tmp_path):
+def test_boundary_group_of_a_blend_file(run, tmp_path):
     points, outermost = grid_points()
     add_group(add_object(points), "Edge", outermost)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
-    code, (line,) = run("analyze", tmp_path / "in.blend", "--rim-group", "Edge", "--rims", "off")
-    assert (code, line["rim_count"]) == (0, outermost.sum())
-    code, (line,) = run("analyze", tmp_path / "in.blend", "--rim-group", "Rim")
+    code, (line,) = run("analyze", tmp_path / "in.blend", "--boundary-group", "Edge", "--boundary", "off")
+    assert (code, line["boundary_count"]) == (0, outermost.sum())
+    code, (line,) = run("analyze", tmp_path / "in.blend", "--boundary-group", "Boundary")
     assert code == 1
-    assert 'no vertex group named "Rim"' in line["error"]
+    assert 'no vertex group named "Boundary"' in line["error"]
 
 
 def test_object_of_a_blend_file(run, tmp_path):
@@ -295,7 +295,14 @@ def test_help(extension, capfd):
     command = importlib.import_module(f"{extension.__name__}.operators.files.command")
     assert command.run(["analyze", "--help"]) == 0
     shown = capfd.readouterr().out
-    for text in ("--out-dir", "--modes", "--bandwidth", "--rim-group NAME", "--no-sheets", "one JSON line per input"):
+    for text in (
+        "--out-dir",
+        "--modes",
+        "--bandwidth",
+        "--boundary-group NAME",
+        "--no-sheets",
+        "one JSON line per input",
+    ):
         assert text in shown
 
 

@@ -170,7 +170,7 @@ def ramp_color(display, obj, value):
     return tuple(display.color_node(obj).color_ramp.evaluate((value - low) / (high - low)))
 
 
-def test_rim_has_two_colors(display):
+def test_boundary_has_two_colors(display):
     points, _ = grid_points()
     obj = add_object(points)
     bpy.ops.meshfree.analyze()
@@ -230,7 +230,7 @@ def test_attributes_of_other_origin_can_be_shown(display, obj):
     [
         ("lb_mean_curvature", "Mean Curvature"),
         ("lb_eigenvector_007", "Mode 7"),
-        ("lb_boundary", "Rim"),
+        ("lb_boundary", "Boundary"),
         ("lb_component", "Connected Part"),
         ("weight", "Weight"),
     ],

@@ -49,7 +49,7 @@ class TestHarmonicField:
         field = attribute(obj, "lb_field")
         assert_allclose(field - field.mean(), 0.5 * (z - z.mean()), atol=0.02)
 
-    def test_a_rim_held_at_zero_with_a_source(self, strip):
+    def test_a_boundary_held_at_zero_with_a_source(self, strip):
         x = local_points(strip)[:, 0]
         add_group(strip, "Value", (x < 0.05) | (x > 5.85), weight=0.0)
         strip.data.attributes.new("heat", "FLOAT", "POINT").data.foreach_set("value", np.ones(1200, np.float32))

@@ -177,7 +177,7 @@ def make_file(path):
     obj = add_object(sphere_points())
     obj.meshfree.neighbors = 60
     obj.meshfree.color_map = "VIRIDIS"
-    obj.meshfree.rims = "OFF"
+    obj.meshfree.boundary = "OFF"
     bpy.ops.meshfree.spectrum(count=3)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return obj

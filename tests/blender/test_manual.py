@@ -16,7 +16,7 @@ ROW = re.compile(r"^\| \*(?P<label>.+?)\* \| `(?P<name>\w+)` \| (?P<default>.*?)
 UNITS = {"PERCENTAGE": " %", "DISTANCE": " m", "ANGLE": "°"}
 # Of the object's settings: what no panel draws, and results, which the page of the analysis tells.
 KEPT = {"name", "spacing", "spacing_of", "deform", "stages", "fingerprint", "metric", "settings_used"}
-RESULTS = {"total_area", "point_count", "part_count", "rim_count", "left_out_count"}
+RESULTS = {"total_area", "point_count", "component_count", "boundary_count", "left_out_count"}
 BINDING = {"name", "is_bound", "matrix", "handle_items", "binding_id", "point_count", "fingerprint"}
 BINDING |= {"groups_used", "settings_used"}
 
@@ -141,7 +141,7 @@ def examples():
 
 @pytest.mark.parametrize("code", list(examples()))
 def test_example(code, tmp_path, monkeypatch):
-    """It runs with a selected cloud that has a rim, and the groups that the tools look for."""
+    """It runs with a selected cloud that has a boundary, and the groups that the tools look for."""
     if "POINTCLOUD" in code and bpy.app.version < (4, 5, 0):
         pytest.skip("Blender imports no Point Cloud objects before 4.5")
     monkeypatch.chdir(tmp_path)

@@ -9,7 +9,7 @@ from tests.blender.test_smooth import shown_points
 
 
 def cylinder(height=1.0, columns=60, rows=14):
-    """Points of an open cylinder of radius 1, and which are at its two rims."""
+    """Points of an open cylinder of radius 1, and which are at its two boundaries."""
     angle, z = (index.ravel() for index in np.meshgrid(np.arange(columns), np.linspace(0.0, height, rows)))
     angle = 2.0 * np.pi * angle / columns
     return np.column_stack([np.cos(angle), np.sin(angle), z]), (z == 0.0) | (z == height)
@@ -17,13 +17,13 @@ def cylinder(height=1.0, columns=60, rows=14):
 
 @pytest.mark.parametrize("grouped", [True, False])
 def test_a_cylinder_becomes_a_catenoid(grouped):
-    points, rim = cylinder()
+    points, boundary = cylinder()
     obj = add_object(points)
     if grouped:
-        add_group(obj, "Fixed", rim)
+        add_group(obj, "Fixed", boundary)
     assert bpy.ops.meshfree.minimal_surface() == {"FINISHED"}
     after = shown_points(obj)
-    np.testing.assert_allclose(after[rim], points[rim], atol=1e-5)
+    np.testing.assert_allclose(after[boundary], points[boundary], atol=1e-5)
     waist = np.hypot(after[:, 0], after[:, 1]).min()
     assert waist == pytest.approx(0.8477, abs=0.01)  # a cosh(h / 2a) = 1 for the height 1
     history = list(obj["lb_area_history"])
@@ -31,7 +31,7 @@ def test_a_cylinder_becomes_a_catenoid(grouped):
     assert obj.data.shape_keys.key_blocks.keys() == ["Basis", "Minimal Surface"]
 
 
-def test_rims_too_far_apart_are_reported(capfd):
+def test_boundaries_too_far_apart_are_reported(capfd):
     points, _ = cylinder(height=2.0, rows=24)
     obj = add_object(points)
     assert bpy.ops.meshfree.minimal_surface() == {"FINISHED"}
@@ -42,15 +42,15 @@ def test_rims_too_far_apart_are_reported(capfd):
 def test_a_closed_surface_is_refused():
     obj = add_object(sphere_points())
     before = everything(obj)
-    with pytest.raises(RuntimeError, match="no rim.*Assign the points that stay"):
+    with pytest.raises(RuntimeError, match="no boundary.*Assign the points that stay"):
         bpy.ops.meshfree.minimal_surface()
     assert everything(obj) == before
 
 
 def test_an_edge_that_is_not_fixed():
-    points, rim = cylinder()
+    points, boundary = cylinder()
     obj = add_object(points)
-    add_group(obj, "Fixed", rim & (points[:, 2] == 0.0))
+    add_group(obj, "Fixed", boundary & (points[:, 2] == 0.0))
     before = local_points(obj)
     with pytest.raises(RuntimeError, match="ends at"):
         bpy.ops.meshfree.minimal_surface()

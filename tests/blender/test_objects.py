@@ -12,7 +12,7 @@ from tests.blender.test_display import display_points
 from tests.blender.test_panel import draw
 
 POINT_CLOUDS = pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
-ROLES = ("Handle", "Anchor", "Fixed", "Source", "Value", "Rim")
+ROLES = ("Handle", "Anchor", "Fixed", "Source", "Value", "Boundary")
 
 
 @pytest.fixture
@@ -251,11 +251,11 @@ class TestGroupColors:
     def test_more_handles_and_other_names(self, grouped, module):
         for name in ("Handle.001", "Edge", "Stay"):
             add_group(grouped, name, np.arange(5))
-        grouped.meshfree.rim_group, grouped.meshfree.deform.anchors = "Edge", "Stay"
+        grouped.meshfree.boundary_group, grouped.meshfree.deform.anchors = "Edge", "Stay"
         grouped.meshfree.show_groups = True
         colors = self.colors(module, grouped)
         assert colors["Handle.001"] == colors["Handle"]
-        assert colors["Edge"] == colors["Rim"]
+        assert colors["Edge"] == colors["Boundary"]
         assert colors["Stay"] == colors["Anchor"]
 
     def test_a_handle_that_is_added_gets_its_color(self, grouped, module):
@@ -380,7 +380,7 @@ class TestOrdinaryEdits:
         bpy.ops.object.join()
         assert module("operators.objects.result").is_stale(cloud)
         bpy.ops.meshfree.analyze()
-        assert cloud.meshfree.part_count == 2
+        assert cloud.meshfree.component_count == 2
         assert "lb_eigenvalues" not in cloud
         assert not [name for name in cloud.data.attributes.keys() if "eigenvector" in name]
         ((count, *_),) = display_points(cloud)
@@ -445,7 +445,7 @@ def test_counts_of_large_groups_come_by_and_by(cloud, module, monkeypatch):
     monkeypatch.setattr(counting, "_AT_ONCE", 100)
     monkeypatch.setattr(counting, "_CHUNK", 70)
     monkeypatch.setattr(counting, "_BIT", 0.0001)
-    cloud.meshfree.rim_group = "Handle"
+    cloud.meshfree.boundary_group = "Handle"
     assert counting.members(cloud, "Handle", glance=True) is None
     assert not module("operators.objects.reading").fingerprint(cloud, glance=True)
     exact = counting.members(cloud, "Handle")

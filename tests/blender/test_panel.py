@@ -41,7 +41,7 @@ OPERATORS = (
     "select_front",
     "select_group",
     "select_grow",
-    "select_rim",
+    "select_boundary",
     "separate_by_segment",
     "signature",
     "smooth",
@@ -201,24 +201,28 @@ def test_panel_names_scale_faces_modifiers_and_sharing():
         assert text in texts
 
 
-def test_panel_tells_of_parts_rims_and_points_left_out_where_there_are_any():
+def test_panel_tells_of_parts_boundaries_and_points_left_out_where_there_are_any():
     points, outermost = grid_points()
     obj = add_object(sphere_points())
     bpy.ops.meshfree.analyze()
-    assert not {"Connected Parts", "Rim Points", "Points Left Out"} & set(draw())
+    assert not {"Components", "Boundary Points", "Points Left Out"} & set(draw())
     obj = add_object(np.vstack([points, sphere_points() + (20.0, 0.0, 0.0), [[0.0, 0.0, 50.0]]]))
     bpy.ops.meshfree.analyze()
-    assert (obj.meshfree.part_count, obj.meshfree.rim_count, obj.meshfree.left_out_count) == (2, outermost.sum(), 1)
+    assert (obj.meshfree.component_count, obj.meshfree.boundary_count, obj.meshfree.left_out_count) == (
+        2,
+        outermost.sum(),
+        1,
+    )
     texts = draw()
-    found = {name: texts[texts.index(name) + 1] for name in ("Connected Parts", "Rim Points", "Points Left Out")}
-    assert found == {"Connected Parts": "2", "Rim Points": f"{outermost.sum()}", "Points Left Out": "1"}
+    found = {name: texts[texts.index(name) + 1] for name in ("Components", "Boundary Points", "Points Left Out")}
+    assert found == {"Components": "2", "Boundary Points": f"{outermost.sum()}", "Points Left Out": "1"}
 
 
 def test_panel_shows_every_setting_that_changes_results(extension):
     options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
-    add_object(sphere_points()).meshfree.rim_group = "Missing"
+    add_object(sphere_points()).meshfree.boundary_group = "Missing"
     texts = draw()
-    assert [name for name in (*options.NAMES, "rim_group") if texts.count(name) != 1] == []
+    assert [name for name in (*options.NAMES, "boundary_group") if texts.count(name) != 1] == []
 
 
 @pytest.mark.parametrize(

@@ -217,7 +217,7 @@ def test_weights_of_a_converted_vertex_group_are_kept():
 
 def test_results_go_stale_when_points_move(extension):
     cloud = add_pointcloud(rough_sphere(1000))
-    cloud.meshfree.rim_group = ""
+    cloud.meshfree.boundary_group = ""
     bpy.ops.meshfree.analyze()
     assert cloud.meshfree.point_count == 1000
     result = importlib.import_module(f"{extension.__name__}.operators.objects.result")

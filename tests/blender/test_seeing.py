@@ -289,7 +289,7 @@ def texts(picture):
 
 @pytest.mark.parametrize(
     ("name", "title"),
-    [("lb_area", "Area"), ("lb_normal", "Normal"), ("lb_boundary", "Rim"), ("lb_component", "Connected Part")],
+    [("lb_area", "Area"), ("lb_normal", "Normal"), ("lb_boundary", "Boundary"), ("lb_component", "Connected Part")],
 )
 def test_pictures_stay_on_their_plates(overlay, obj, name, title):
     obj.meshfree.histogram = obj.meshfree.plot_eigenvalues = True
@@ -489,7 +489,7 @@ def test_legend_is_written_anew_on_the_same_objects(legends, obj):
     after = {part: part.data for part in legend.objects}
     assert sum(before.get(part) == data for part, data in after.items()) == min(len(before), len(after))
     bpy.ops.meshfree.colormap(attribute="lb_boundary")
-    assert legend_texts() == ["Rim", "No", "Yes"] or legend_texts() == ["Rim", "Yes", "No"]
+    assert legend_texts() == ["Boundary", "No", "Yes"] or legend_texts() == ["Boundary", "Yes", "No"]
     assert len(bpy.data.curves) == 3
 
 

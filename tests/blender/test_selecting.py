@@ -160,7 +160,7 @@ def test_several_objects_in_edit_mode(obj, fails):
     bystander.select_set(True)
     partner.select_set(False)
     if fails:
-        obj.meshfree.rim_group = "Nowhere"
+        obj.meshfree.boundary_group = "Nowhere"
         with pytest.raises(RuntimeError, match="Nowhere"):
             bpy.ops.meshfree.select_grow()
     else:
@@ -200,23 +200,23 @@ def test_a_mesh_that_another_object_edits(obj):
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_the_rim_becomes_the_rim_group():
+def test_the_boundary_becomes_the_boundary_group():
     points, outermost = grid_points()
     obj = add_object(points)
-    bpy.ops.meshfree.select_rim()
+    bpy.ops.meshfree.select_boundary()
     assert (selected(obj) == outermost).all()
-    bpy.ops.meshfree.group_from_selection(role="RIM")
-    assert obj.meshfree.rim_group == "Rim"
-    assert (in_group(obj, "Rim") == outermost).all()
+    bpy.ops.meshfree.group_from_selection(role="BOUNDARY")
+    assert obj.meshfree.boundary_group == "Boundary"
+    assert (in_group(obj, "Boundary") == outermost).all()
     choose(obj, lambda points: points[:, 0] < 1.0)
-    bpy.ops.meshfree.select_group(name="Rim")
+    bpy.ops.meshfree.select_group(name="Boundary")
     assert (selected(obj) == outermost).all()
 
 
-def test_a_closed_surface_has_no_rim_to_select():
+def test_a_closed_surface_has_no_boundary_to_select():
     add_object(sphere_points(900))
-    with pytest.raises(RuntimeError, match="has no rim"):
-        bpy.ops.meshfree.select_rim()
+    with pytest.raises(RuntimeError, match="has no boundary"):
+        bpy.ops.meshfree.select_boundary()
 
 
 def test_a_group_that_is_missing_is_not_selected(obj, mode):

@@ -127,13 +127,13 @@ def test_an_error_in_one_object_leaves_all_others():
     assert everything(good) == before
 
 
-def test_a_rim_that_stays_fixes_the_size():
+def test_a_boundary_that_stays_fixes_the_size():
     obj = add_object(grid_points()[0])
     before = everything(obj)
-    with pytest.raises(RuntimeError, match='"Cloud" has a rim.*Set Keep to Nothing, or turn off Keep Rim'):
+    with pytest.raises(RuntimeError, match='"Cloud" has a boundary.*Set Keep to Nothing, or turn off Keep Boundary'):
         bpy.ops.meshfree.smooth(keep="AREA")
     assert everything(obj) == before
-    assert bpy.ops.meshfree.smooth(keep="AREA", keep_rim=False) == {"FINISHED"}
+    assert bpy.ops.meshfree.smooth(keep="AREA", keep_boundary=False) == {"FINISHED"}
 
 
 def test_in_place_is_refused_where_shape_keys_would_hide_it():

@@ -14,7 +14,7 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
-from core.geometry.boundary import no_rim
+from core.geometry.boundary import no_boundary
 from core.geometry.cloud import read_cloud
 from core.geometry.distances import arc_length
 from core.operator.areas import KernelMatrix, fast_areas, solve_areas
@@ -28,9 +28,9 @@ METHODS = ["fast", "regularized", "constrained", "uniform"]
 
 def closed_matrix(points, factor):
     """The paper's matrix of eq. (6), with one smoothing length and distances in space."""
-    options = LaplacianOptions(bandwidth="global", bandwidth_factor=factor, rims="off", sheets=False)
-    neighborhoods = read_cloud(points, options).neighborhoods
-    return KernelMatrix(neighborhoods, neighborhoods.distance, no_rim(len(points)))
+    options = LaplacianOptions(bandwidth="global", bandwidth_factor=factor, boundary="off", sheets=False)
+    pairs = read_cloud(points, options).pairs
+    return KernelMatrix(pairs, pairs.distance, no_boundary(len(points)))
 
 
 @pytest.fixture(scope="module")
@@ -87,22 +87,22 @@ class TestRelief:
         rough, exact = rough_sphere(points, wavelength, slope)
         cloud = read_cloud(rough, LaplacianOptions())
 
-        def error(relief):
-            changed = replace(cloud, relief=relief)
+        def error(roughness):
+            changed = replace(cloud, roughness=roughness)
             areas = solve_areas(changed, arc_length(changed), LaplacianOptions()).areas * cloud.scaled.scale**2
             return areas.sum() / exact - 1.0
 
-        assert abs(error(cloud.relief)) < 0.01
-        assert error(np.zeros(len(rough))) < -1.5 * abs(error(cloud.relief))
+        assert abs(error(cloud.roughness)) < 0.01
+        assert error(np.zeros(len(rough))) < -1.5 * abs(error(cloud.roughness))
 
     def test_is_its_slope_where_normals_are_smooth(self):
         rough, _ = rough_sphere(fibonacci_sphere(4000), 3, 0.2)
-        measured = read_cloud(rough, LaplacianOptions()).relief.mean()
+        measured = read_cloud(rough, LaplacianOptions()).roughness.mean()
         assert 0.4 < measured / (0.5 * 0.2**2) < 1.0  # along a chord it is half of the squared slope
 
     @pytest.mark.parametrize("points", [fibonacci_sphere(2000), random_sphere(2000)], ids=["even", "random"])
     def test_of_smooth_surfaces_is_none(self, points):
-        assert read_cloud(points, LaplacianOptions()).relief.max() < 1e-6
+        assert read_cloud(points, LaplacianOptions()).roughness.max() < 1e-6
 
     @pytest.mark.parametrize(("side", "thickness", "most"), [(40, 2, 0.01), (20, 8, 0.018), (20, 20, 0.013)])
     def test_of_sharp_edges_is_little(self, side, thickness, most):
@@ -112,8 +112,8 @@ class TestRelief:
     @pytest.mark.parametrize("level", [0.02, 0.04, 0.2])
     def test_noise_is_none(self, level):
         noisy = noisy_sphere(2000, level)
-        assert not read_cloud(noisy, LaplacianOptions()).relief.any()
-        assert read_cloud(noisy, LaplacianOptions(projection="off")).relief.min() > 0.0
+        assert not read_cloud(noisy, LaplacianOptions()).roughness.any()
+        assert read_cloud(noisy, LaplacianOptions(projection="off")).roughness.min() > 0.0
 
     def test_does_not_depend_on_the_signs_of_normals(self):
         rough, _ = rough_sphere(fibonacci_sphere(2000), 6, 0.3)

@@ -24,7 +24,7 @@ from core.options import LaplacianOptions
 def lengths(points, **settings):
     """Smoothing lengths of the caller's points, in their unit."""
     cloud = read_cloud(points, LaplacianOptions(**settings))
-    return cloud.scaled.hand_out(cloud.neighborhoods.lengths * cloud.scaled.scale, 0.0)
+    return cloud.scaled.scatter(cloud.pairs.lengths * cloud.scaled.scale, 0.0)
 
 
 def spread(values):
@@ -49,14 +49,14 @@ class TestAdaptive:
 
     def test_varies_slowly(self):
         for points, most in ((random_sphere(2000), 0.15), (uneven_sphere(2500), 0.9)):
-            pairs = read_cloud(points, LaplacianOptions()).neighborhoods
+            pairs = read_cloud(points, LaplacianOptions()).pairs
             assert np.abs(np.log(pairs.lengths[pairs.first] / pairs.lengths[pairs.second])).max() < most
 
     def test_grows_gently_where_there_is_room(self):
         # Even points, of which one half has four times as many.
         few, many = fibonacci_sphere(1500), fibonacci_sphere(6000)
         points = np.concatenate([few[few[:, 2] > 0.0], many[many[:, 2] < 0.0]])
-        pairs = read_cloud(points, LaplacianOptions()).neighborhoods
+        pairs = read_cloud(points, LaplacianOptions()).pairs
         slope = np.abs(pairs.lengths[pairs.first] - pairs.lengths[pairs.second]) / pairs.distance
         assert np.percentile(slope, 99.0) < 0.03
         h = lengths(points)
@@ -97,19 +97,19 @@ class TestAdaptive:
         assert random > 1.5 * even
 
     @pytest.mark.parametrize("side", [40, 60])
-    def test_no_other_at_the_rim_of_a_grid(self, side):
+    def test_no_other_at_the_boundary_of_a_grid(self, side):
         points = square_grid(side)
         adaptive = lengths(points)
         middle = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.25
         np.testing.assert_allclose(adaptive, adaptive[middle].mean(), rtol=0.04)
 
-    def test_hardly_any_other_at_the_rim_of_a_random_square(self):
+    def test_hardly_any_other_at_the_boundary_of_a_random_square(self):
         points = square_random(2500)
         adaptive = lengths(points)
         middle = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.25
         np.testing.assert_allclose(adaptive, adaptive[middle].mean(), rtol=0.08)
-        # Without the rim, neighbourhoods there would look sparse.
-        unaware = lengths(points, rims="off")
+        # Without the boundary, neighbourhoods there would look sparse.
+        unaware = lengths(points, boundary="off")
         assert unaware.max() > 1.1 * unaware[middle].mean()
 
     def test_narrower_in_a_narrow_surface(self):
@@ -133,7 +133,7 @@ class TestAny:
     @pytest.mark.parametrize("bandwidth", ["adaptive", "local", "global"])
     def test_pairs_are_those_within_three_mean_lengths(self, bandwidth):
         options = LaplacianOptions(bandwidth=bandwidth, sheets=False)
-        pairs = read_cloud(uneven_sphere(900), options).neighborhoods
+        pairs = read_cloud(uneven_sphere(900), options).pairs
         reach = 3.0 * pairs.mean(pairs.lengths)
         assert np.all(pairs.distance <= reach * (1.0 + 1e-12))
         between = np.linalg.norm(pairs.points[:, None] - pairs.points, axis=2)

@@ -1,4 +1,4 @@
-"""Connected parts: islands with their own operators, and lone points that are left out."""
+"""Components: components with their own operators, and lone points that are left out."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from benchmarks.samplings import (
     random_sphere,
     uneven_sphere,
 )
-from core.geometry.components import label_islands, move_apart
+from core.geometry.components import label_components, move_apart
 from core.geometry.nearest import find_nearest
 from core.options import LaplacianOptions
 
@@ -24,7 +24,7 @@ OUT = slice(900, 904)
 
 @pytest.fixture(scope="module")
 def parts():
-    """Two islands, the small one first, and four lone points between them."""
+    """Two components, the small one first, and four lone points between them."""
     return core.build_laplacian(np.concatenate([SMALL, LONE, LARGE]), options=LaplacianOptions(orient=True))
 
 
@@ -34,26 +34,26 @@ def spectrum(parts):
 
 
 class TestLabels:
-    def test_the_largest_island_is_the_first(self):
-        label = label_islands(find_nearest(np.concatenate([SMALL, LARGE])))
+    def test_the_largest_component_is_the_first(self):
+        label = label_components(find_nearest(np.concatenate([SMALL, LARGE])))
         np.testing.assert_array_equal(label, np.repeat([1, 0], [900, 1500]))
 
     @pytest.mark.parametrize("count", [45, 55])
-    def test_islands_of_fewer_than_fifty_points_are_none(self, count):
-        label = label_islands(find_nearest(np.concatenate([LARGE, 0.1 * fibonacci_sphere(count) + [3.0, 0.0, 0.0]])))
+    def test_components_of_fewer_than_fifty_points_are_none(self, count):
+        label = label_components(find_nearest(np.concatenate([LARGE, 0.1 * fibonacci_sphere(count) + [3.0, 0.0, 0.0]])))
         np.testing.assert_array_equal(label, np.repeat([0, -1 if count < 50 else 1], [1500, count]))
 
     @pytest.mark.parametrize(
         "points", [random_sphere(3000), uneven_sphere(4000), noisy_sphere(2000, 0.5)], ids=["random", "jump", "noisy"]
     )
-    def test_one_surface_is_one_island(self, points):
-        assert np.all(label_islands(find_nearest(points)) == 0)
+    def test_one_surface_is_one_component(self, points):
+        assert np.all(label_components(find_nearest(points)) == 0)
 
     def test_the_gap_is_measured_in_spacings(self):
         square = grid_points(range(20), range(20), [0.0])
         for scale in (1.0, 1e-3):
             apart, near = (
-                label_islands(find_nearest(scale * np.concatenate([square, square + [19.0 + gap, 0.0, 0.0]])))
+                label_components(find_nearest(scale * np.concatenate([square, square + [19.0 + gap, 0.0, 0.0]])))
                 for gap in (10.0, 1.5)
             )
             assert apart.max() == 1
@@ -117,12 +117,12 @@ class TestIslands:
         assert laplacian.areas[~small].sum() == pytest.approx(4.0 * np.pi, rel=3e-3)
         assert np.all(laplacian.eigenpairs(3).eigenvalues[:2] < 1e-9)
 
-    def test_a_small_island_has_the_area_that_the_same_points_have_alone(self):
-        island = 0.2 * fibonacci_sphere(120) + [3.0, 0.0, 0.0]
-        together = core.estimate_areas(np.concatenate([fibonacci_sphere(1500), island]))[1500:]
-        assert together.sum() == pytest.approx(core.estimate_areas(island).sum(), rel=1e-2)
+    def test_a_small_component_has_the_area_that_the_same_points_have_alone(self):
+        component = 0.2 * fibonacci_sphere(120) + [3.0, 0.0, 0.0]
+        together = core.estimate_areas(np.concatenate([fibonacci_sphere(1500), component]))[1500:]
+        assert together.sum() == pytest.approx(core.estimate_areas(component).sum(), rel=1e-2)
 
-    def test_a_small_open_island(self):
+    def test_a_small_open_component(self):
         points = np.concatenate(
             [grid_points(range(40), range(40), [0.0]), grid_points(range(100, 108), range(8), [0.0])]
         )
@@ -161,7 +161,7 @@ class TestIslands:
         np.testing.assert_array_equal(np.bincount(laplacian.component), [1500, 900])
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi * 1.49, rel=3e-3)
 
-    def test_a_small_noisy_island(self):
+    def test_a_small_noisy_component(self):
         points = np.concatenate([noisy_sphere(2000, 0.4), 0.15 * noisy_sphere(70, 0.4, 1) + [3.0, 0.0, 0.0]])
         laplacian = core.build_laplacian(points)
         area = laplacian.areas[laplacian.component == 1].sum()
@@ -204,7 +204,7 @@ class TestLonePoints:
         np.testing.assert_array_equal(core.estimate_areas(parts.points, options=options), parts.areas)
         np.testing.assert_array_equal(core.estimate_normals(parts.points, options), parts.normals)
 
-    def test_given_normals_and_rims_pass_them_by(self):
+    def test_given_normals_and_boundaries_pass_them_by(self):
         points = np.concatenate([LONE, LARGE])
         laplacian = core.build_laplacian(points, normals=points, boundary_distance=np.full(1504, np.inf))
         np.testing.assert_allclose(laplacian.normals[4:], LARGE, atol=1e-9)
@@ -234,10 +234,10 @@ class TestLonePoints:
 class TestTooLittleLeft:
     def test_fewer_points_than_the_neighborhoods_need(self):
         points = np.concatenate([fibonacci_sphere(90), 50.0 + 10.0 * fibonacci_sphere(90)[:60:5]])
-        with pytest.raises(core.IslandError, match="12 of 102 points lie apart"):
+        with pytest.raises(core.ComponentError, match="12 of 102 points lie apart"):
             core.build_laplacian(points)
 
-    def test_most_points_in_small_islands(self):
-        islands = [0.1 * fibonacci_sphere(30) + [3.0 * i, 3.0, 0.0] for i in range(10)]
-        with pytest.raises(core.IslandError, match="300 of 500 points lie apart"):
-            core.build_laplacian(np.concatenate([fibonacci_sphere(200), *islands]))
+    def test_most_points_in_small_components(self):
+        components = [0.1 * fibonacci_sphere(30) + [3.0 * i, 3.0, 0.0] for i in range(10)]
+        with pytest.raises(core.ComponentError, match="300 of 500 points lie apart"):
+            core.build_laplacian(np.concatenate([fibonacci_sphere(200), *components]))

@@ -49,7 +49,7 @@ def test_factors_are_hardly_larger_than_those_of_minimum_degree():
         (np.concatenate([square(500), square(500, 1) + 100.0]), 0.1),
         (square(500), 1e-9),
     ],
-    ids=["none", "one", "one place", "all coupled", "line", "two islands", "none coupled"],
+    ids=["none", "one", "one place", "all coupled", "line", "two components", "none coupled"],
 )
 def test_any_points_are_ordered(points, reach):
     order = dissection_order(near_matrix(points, reach), points)

@@ -29,16 +29,16 @@ def across(points):
 )
 @pytest.mark.parametrize("sign", ["alike", "at random"])
 def test_arcs_are_exact_to_sixth_order(points, normals, exact, sign):
-    cloud = read_cloud(points, LaplacianOptions(rims="off"))
-    pairs = replace(cloud.neighborhoods, points=points[cloud.scaled.first])
+    cloud = read_cloud(points, LaplacianOptions(boundary="off"))
+    pairs = replace(cloud.pairs, points=points[cloud.scaled.first])
     i, j = pairs.first, pairs.second
     pairs = replace(pairs, distance=np.linalg.norm(pairs.points[j] - pairs.points[i], axis=1))
     sides = np.where(np.random.default_rng(0).random(len(pairs.points)) < 0.5, -1.0, 1.0) if sign != "alike" else 1.0
     cloud = replace(
         cloud,
-        neighborhoods=pairs,
+        pairs=pairs,
         normals=(normals(pairs.points).T * sides).T,
-        relief=np.zeros(len(pairs.points)),
+        roughness=np.zeros(len(pairs.points)),
     )
     length = exact(pairs.points[i], pairs.points[j])
     known = length < 0.5  # where normals turn more there may be an edge between them

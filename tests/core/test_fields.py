@@ -20,7 +20,7 @@ def random_strip():
 
 
 @pytest.fixture(scope="module")
-def islands():
+def components():
     """Operator of a sphere, a smaller one far off, and three lone points."""
     lone = [[20.0, 0.0, 0.0], [0.0, 30.0, 0.0], [0.0, 0.0, 40.0]]
     return core.build_laplacian(
@@ -69,7 +69,7 @@ def test_without_fixed_points_it_inverts_apply(operators):
 
 def test_a_source_with_a_mean_is_refused(operators):
     laplacian = operators("even sphere")
-    with pytest.raises(core.PointCloudError, match="mean 1 over a connected part of 4000 points"):
+    with pytest.raises(core.PointCloudError, match="mean 1 over a component of 4000 points"):
         core.solve_poisson(laplacian, 1.0)
     with pytest.raises(core.PointCloudError, match="Subtract"):
         core.solve_poisson(laplacian, laplacian.points[:, 0] + 0.1)
@@ -110,21 +110,21 @@ def test_a_thin_line_of_fixed_points_parts_the_strip(request, name, value):
     assert np.abs(found - value)[flat].max() < 0.01
 
 
-def test_fixed_rim_of_a_square():
+def test_fixed_boundary_of_a_square():
     points = square_grid(40)
     laplacian = core.build_laplacian(points)
-    rim = ((points == 0.0) | (points == 1.0))[:, :2].any(axis=1)
+    boundary = ((points == 0.0) | (points == 1.0))[:, :2].any(axis=1)
     exact = np.sin(np.pi * points[:, 0]) * np.sin(np.pi * points[:, 1])
-    found = core.solve_poisson(laplacian, 2.0 * np.pi**2 * exact, rim, 0.0)
+    found = core.solve_poisson(laplacian, 2.0 * np.pi**2 * exact, boundary, 0.0)
     assert np.abs(found - exact).max() < 2e-2
 
 
-def test_fixed_rims_of_a_cylinder():
+def test_fixed_boundaries_of_a_cylinder():
     height, around = np.meshgrid(np.linspace(0.0, 1.0, 25), np.arange(80) * (2.0 * np.pi / 80), indexing="ij")
     height, around = height.ravel(), around.ravel()
     laplacian = core.build_laplacian(np.column_stack([0.5 * np.cos(around), 0.5 * np.sin(around), height]))
-    rims = (height == 0.0) | (height == 1.0)
-    found = core.harmonic_field(laplacian, rims, height[rims])
+    boundaries = (height == 0.0) | (height == 1.0)
+    found = core.harmonic_field(laplacian, boundaries, height[boundaries])
     np.testing.assert_allclose(found, height, atol=5e-3)
 
 
@@ -171,32 +171,32 @@ def test_motion_and_scale_do_not_matter():
     np.testing.assert_allclose(second / 2500.0, first[order], atol=1e-5)
 
 
-def test_parts_without_fixed_points_have_the_mean_value(islands):
-    top = islands.points[:900, 2] > 0.8
-    bottom = islands.points[:900, 2] < -0.8
+def test_parts_without_fixed_points_have_the_mean_value(components):
+    top = components.points[:900, 2] > 0.8
+    bottom = components.points[:900, 2] < -0.8
     chosen = np.flatnonzero(top | bottom)
     values = top[chosen] * 4.0 + 2.0
-    found = core.harmonic_field(islands, chosen, values)
+    found = core.harmonic_field(components, chosen, values)
     assert np.isfinite(found).all()
     np.testing.assert_allclose(found[900:], values.mean())
     assert found[:900].std() > 0.5
-    found = core.harmonic_field(islands, [0, 1300], [1.0, 3.0])
+    found = core.harmonic_field(components, [0, 1300], [1.0, 3.0])
     assert found[1300] == 3.0
     np.testing.assert_allclose(found[900:1300], 2.0)
 
 
-def test_the_mean_must_vanish_on_every_part(islands):
-    z = islands.points[:, 2]
-    source = np.where(islands.component == 0, z, 4.0 * z)
-    found = core.solve_poisson(islands, source)
+def test_the_mean_must_vanish_on_every_part(components):
+    z = components.points[:, 2]
+    source = np.where(components.component == 0, z, 4.0 * z)
+    found = core.solve_poisson(components, source)
     assert np.isfinite(found).all()
     assert relative(found[:900], 0.5 * z[:900]) < 1e-2
     assert relative(found[900:1300], 0.5 * z[900:1300]) < 1e-2
     np.testing.assert_array_equal(found[1300:], 0.0)
     with pytest.raises(core.PointCloudError, match="400 points"):
-        core.solve_poisson(islands, np.where(islands.component == 1, 1.0, source))
+        core.solve_poisson(components, np.where(components.component == 1, 1.0, source))
     # A part that is held needs no such source.
-    held = core.solve_poisson(islands, np.where(islands.component == 1, 1.0, source), np.arange(900, 920), 0.0)
+    held = core.solve_poisson(components, np.where(components.component == 1, 1.0, source), np.arange(900, 920), 0.0)
     assert np.isfinite(held).all()
     assert held[920:1300].min() > 0.0
 

@@ -22,7 +22,7 @@ def spectrum(sphere):
 
 
 @pytest.fixture(scope="module")
-def islands():
+def components():
     """Two spheres, three lone points that get no operator."""
     points = np.concatenate([fibonacci_sphere(900), 0.5 * fibonacci_sphere(600) + [5.0, 0.0, 0.0]])
     lone = [[0.0, 90.0, 0.0], [0.0, 90.0, 1.0], [0.0, 91.0, 0.0]]
@@ -106,11 +106,11 @@ def test_first_order_fairing_solves_the_implicit_equation(sphere):
     )
 
 
-def test_polynomial_of_functions_that_vanish_at_a_rim():
+def test_polynomial_of_functions_that_vanish_at_a_boundary():
     laplacian = core.build_laplacian(square_grid(30))
     x, y, _ = laplacian.points.T
     values = np.sin(np.pi * x) * np.sin(2.0 * np.pi * y)
-    found = core.chebyshev_filter(laplacian, values, core.exponential(0.02), fixed_rim=True)
+    found = core.chebyshev_filter(laplacian, values, core.exponential(0.02), dirichlet=True)
     assert relative(found, np.exp(-0.1 * np.pi**2) * values) < 3e-2
     level = np.cos(np.pi * x) * np.cos(2.0 * np.pi * y)
     found = core.chebyshev_filter(laplacian, level, core.exponential(0.02))
@@ -124,28 +124,28 @@ def test_size_of_the_object_only_sets_the_unit_of_the_response(sphere):
     np.testing.assert_allclose(found, core.chebyshev_filter(sphere, values, core.exponential(0.05)), atol=1e-4)
 
 
-def test_heat_is_kept_on_each_part_alone(islands):
-    values = np.random.default_rng(0).random(len(islands.areas))
-    found = core.chebyshev_filter(islands, values, core.exponential(0.1), tolerance=1e-8)
+def test_heat_is_kept_on_each_part_alone(components):
+    values = np.random.default_rng(0).random(len(components.areas))
+    found = core.chebyshev_filter(components, values, core.exponential(0.1), tolerance=1e-8)
     for part in (0, 1):
-        mass = np.where(islands.component == part, islands.areas, 0.0)
+        mass = np.where(components.component == part, components.areas, 0.0)
         assert mass @ found == pytest.approx(mass @ values, rel=1e-5)
     # For a long time all becomes even.
-    found = core.chebyshev_filter(islands, values, core.exponential(9.0), tolerance=1e-8)
+    found = core.chebyshev_filter(components, values, core.exponential(9.0), tolerance=1e-8)
     for part in (0, 1):
-        assert np.ptp(found[islands.component == part]) < 1e-3
-    left_out = islands.component < 0
+        assert np.ptp(found[components.component == part]) < 1e-3
+    left_out = components.component < 0
     assert np.count_nonzero(left_out) == 3
     np.testing.assert_array_equal(found[left_out], values[left_out])
 
 
-def test_fewer_modes_than_parts_are_refused(islands):
-    spectrum = islands.eigenpairs(6)
-    values = np.where(islands.component == 0, 2.0, -1.0)
+def test_fewer_modes_than_parts_are_refused(components):
+    spectrum = components.eigenpairs(6)
+    values = np.where(components.component == 0, 2.0, -1.0)
     with pytest.raises(core.PointCloudError, match="first 2 modes are the constants"):
-        core.spectral_filter(values, spectrum, islands.areas, 1)
-    found = core.spectral_filter(values, spectrum, islands.areas, 2)
-    known = islands.component >= 0
+        core.spectral_filter(values, spectrum, components.areas, 1)
+    found = core.spectral_filter(values, spectrum, components.areas, 2)
+    known = components.component >= 0
     np.testing.assert_allclose(found[known], values[known], atol=1e-6)
     assert np.all(found[~known] == 0.0)
 

@@ -39,7 +39,7 @@ def test_meridians_of_the_torus(operators):
 
 
 @pytest.mark.parametrize("sources", [[0], [1770], [0, 59, 1770]], ids=["corner", "middle", "several"])
-def test_flat_square_with_its_rim(sources):
+def test_flat_square_with_its_boundary(sources):
     points = square_grid(60)
     found = core.geodesic_distance(core.build_laplacian(points), sources)
     exact = np.linalg.norm(points[:, None] - points[None, sources], axis=2).min(axis=1)

@@ -20,7 +20,7 @@ from benchmarks.samplings import (
 CLOUDS = {
     "hemisphere": lambda: hemisphere_random(900),
     "square": lambda: square_random(900),
-    "islands": lambda: np.concatenate([random_sphere(700), 0.6 * random_sphere(400, 1) + [4, 0, 0], [[0, 9.0, 0]]]),
+    "components": lambda: np.concatenate([random_sphere(700), 0.6 * random_sphere(400, 1) + [4, 0, 0], [[0, 9.0, 0]]]),
     "noisy sphere": lambda: noisy_sphere(800, 0.3),
     "density jump": lambda: uneven_sphere(1000),
 }

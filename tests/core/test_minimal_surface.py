@@ -1,4 +1,4 @@
-"""Minimal surfaces: known ones, rims that none spans, and the ways to end."""
+"""Minimal surfaces: known ones, boundaries that none spans, and the ways to end."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 import core
 from benchmarks.plateau import cap, catenoid, catenoid_errors, helicoid, tube
 from benchmarks.samplings import fibonacci_sphere, grid_points, hemisphere_random, square_grid
-from core.applications.boundary_curve import RimCurve
+from core.applications.boundary_curve import BoundaryCurve
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +103,7 @@ class TestFlat:
         assert film.areas.sum() == pytest.approx(np.pi, rel=5e-3)
 
     def test_open_box(self):
-        # Without sharp edges and with four corners of the rim.
+        # Without sharp edges and with four corners of the boundary.
         side = np.linspace(0.0, 1.0, 17)
         box = grid_points(side, side, side[:9])
         across = np.minimum(box, 1.0 - box)[:, :2].min(axis=1) == 0.0
@@ -131,16 +131,16 @@ class TestFlat:
         # Across a crease the kernel sees both sides: within a spacing, which is 0.1 here.
         assert np.abs(film.points[free, 2] - 0.6).max() < 0.1
 
-    def test_the_rim_that_was_found(self):
+    def test_the_boundary_that_was_found(self):
         points = hemisphere_random(700, 2)
-        rim = core.build_laplacian(points).boundary
-        film = core.minimal_surface(points, rim, max_steps=2)
-        assert film.points[:, 2].max() < points[rim, 2].max() + 1e-2
+        boundary = core.build_laplacian(points).boundary
+        film = core.minimal_surface(points, boundary, max_steps=2)
+        assert film.points[:, 2].max() < points[boundary, 2].max() + 1e-2
 
 
 def test_helicoid_between_four_corners():
-    points, rim, area = helicoid(25)
-    film = core.minimal_surface(points, rim)
+    points, boundary, area = helicoid(25)
+    film = core.minimal_surface(points, boundary)
     assert film.converged
     x, y, z = film.points.T
     assert np.abs(x * np.sin(z) - y * np.cos(z)).max() < 2e-3
@@ -279,9 +279,9 @@ class TestRefusals:
             core.minimal_surface(points, fixed[:-1])
 
 
-class TestRimCurve:
+class TestBoundaryCurve:
     def test_feet_on_a_circle(self):
-        curve = RimCurve(np.roll(circle(60), 7, axis=0))
+        curve = BoundaryCurve(np.roll(circle(60), 7, axis=0))
         assert not curve.rough
         inside = circle(113, 0.8) + [0.0, 0.0, 0.1]
         foot, index = curve.nearest(inside)
@@ -292,11 +292,11 @@ class TestRimCurve:
         along = np.arange(6.0)
         wire = np.concatenate([grid_points(along, [0.0], [0.0]), grid_points([0.0], along[1:], [0.0])])
         points = np.array([[2.5, 1.0, 0.0], [1.0, 3.3, 0.0], [-1.0, -1.0, 0.0], [7.0, 1.0, 0.0]])
-        foot, _ = RimCurve(wire).nearest(points)
+        foot, _ = BoundaryCurve(wire).nearest(points)
         np.testing.assert_allclose(foot, [[2.5, 0, 0], [0, 3.3, 0], [0, 0, 0], [5, 0, 0]], atol=1e-12)
 
     def test_distances_along_a_sphere(self):
-        curve = RimCurve(circle(200))
+        curve = BoundaryCurve(circle(200))
         height = np.array([0.1, 0.3, 0.6])
         points = np.column_stack([np.cos(height), 0.0 * height, np.sin(height)])
         foot, index = curve.nearest(points)
@@ -305,12 +305,12 @@ class TestRimCurve:
 
     def test_scattered_points_are_rough(self):
         scatter = 1.0 - 0.08 * np.random.default_rng(0).random(80)
-        assert RimCurve(circle(80) * scatter[:, None]).rough
-        assert not RimCurve(circle(80)[np.random.default_rng(0).permutation(80)]).rough
+        assert BoundaryCurve(circle(80) * scatter[:, None]).rough
+        assert not BoundaryCurve(circle(80)[np.random.default_rng(0).permutation(80)]).rough
 
     def test_points_given_twice(self):
         ring = circle(40)
-        curve = RimCurve(np.concatenate([ring, ring]))
+        curve = BoundaryCurve(np.concatenate([ring, ring]))
         assert len(curve.points) == 40
         np.testing.assert_array_equal(np.concatenate([ring, ring])[curve.first], curve.points)
 
@@ -318,11 +318,11 @@ class TestRimCurve:
 def test_given_distances_hold_beside_corners_only():
     points = square_grid(30)
     inset = np.sort(np.minimum(points, 1.0 - points)[:, :2], axis=1)
-    rim = inset[:, 0] == 0.0
-    both = core.build_laplacian(points, boundary=rim, boundary_distance=inset[:, 0])
+    boundary = inset[:, 0] == 0.0
+    both = core.build_laplacian(points, boundary=boundary, boundary_distance=inset[:, 0])
     alone = core.build_laplacian(points, boundary_distance=inset[:, 0])
     # Corners want both of their sides, which one distance cannot tell.
     assert abs(both.areas.sum() - 1.0) < 1e-3 < abs(alone.areas.sum() - 1.0)
-    # Otherwise the distances that were given are taken: a rim a little further out leaves more area inside.
-    wider = core.build_laplacian(points, boundary=rim, boundary_distance=inset[:, 0] + 0.2 / 29)
+    # Otherwise the distances that were given are taken: a boundary a little further out leaves more area inside.
+    wider = core.build_laplacian(points, boundary=boundary, boundary_distance=inset[:, 0] + 0.2 / 29)
     assert wider.areas.sum() > both.areas.sum() + 1e-2

@@ -15,7 +15,7 @@ from benchmarks.samplings import (
 )
 from core.geometry.cloud import read_cloud
 from core.geometry.distances import arc_length
-from core.geometry.pairs import Neighborhoods, find_pairs
+from core.geometry.pairs import Pairs, find_pairs
 from core.kernel import SECOND_MOMENT, SUPPORT, pair_kernel
 from core.operator.areas import KernelMatrix, solve_areas
 from core.operator.curvature import kernel_integral, uneven
@@ -32,12 +32,12 @@ def prepared(points, vary=None):
     """Return a cloud, distances, areas and pair weights, as the operator has them before they are balanced."""
     options = core.LaplacianOptions()
     cloud = read_cloud(points, options)
-    pairs = cloud.neighborhoods
+    pairs = cloud.pairs
     if vary is not None:
         lengths = vary(pairs.points)
         found = find_pairs(cKDTree(pairs.points), lengths)
-        cloud = replace(cloud, neighborhoods=Neighborhoods(pairs.points, lengths, *found))
-        pairs = cloud.neighborhoods
+        cloud = replace(cloud, pairs=Pairs(pairs.points, lengths, *found))
+        pairs = cloud.pairs
     distance = arc_length(cloud)
     areas = solve_areas(cloud, distance, options).areas
     h = pairs.mean(pairs.lengths)
@@ -47,7 +47,7 @@ def prepared(points, vary=None):
 
 def moments(cloud, weights, areas):
     """Return |first moment| times h, and the second moment over 2 areas, (m, 3, 3), from exact ways on the sphere."""
-    pairs = cloud.neighborhoods
+    pairs = cloud.pairs
     points = pairs.points / norm(pairs.points, axis=1)[:, None]
     first, second = (np.zeros((len(points), *shape)) for shape in ((3,), (3, 3)))
     for here, there in ((pairs.first, pairs.second), (pairs.second, pairs.first)):
@@ -68,8 +68,8 @@ class TestBalancedWeights:
     def test_have_no_first_moment_and_the_kernels_second(self, name):
         cloud, distance, areas, weights = prepared(CLOUDS[name]())
         balanced = weights * balance_weights(cloud, distance, weights, areas)
-        x = cloud.neighborhoods.points
-        h = cloud.neighborhoods.lengths[:, None, None]
+        x = cloud.pairs.points
+        h = cloud.pairs.lengths[:, None, None]
         exact = (1.0 - SECOND_MOMENT / 12.0 * h**2) * (np.eye(3) - x[:, :, None] * x[:, None, :])
         errors = []
         for each in (weights, balanced):
@@ -96,16 +96,16 @@ class TestBalancedWeights:
         found = []
         for turned in (points, points[order]):
             cloud, distance, areas, weights = prepared(turned)
-            factor = cloud.neighborhoods.half(balance_weights(cloud, distance, weights, areas))
+            factor = cloud.pairs.half(balance_weights(cloud, distance, weights, areas))
             place = np.argsort(cloud.scaled.first)
             found.append((factor + factor.T).tocsr()[place][:, place])
         assert abs(found[0][order][:, order] - found[1]).max() < 1e-9
 
-    def test_are_as_they_were_next_to_rims(self):
+    def test_are_as_they_were_next_to_boundaries(self):
         cloud, distance, areas, weights = prepared(hemisphere_random(2000))
         factor = balance_weights(cloud, distance, weights, areas)
-        near = cloud.rim.distance[:, 0] < SUPPORT * cloud.neighborhoods.lengths
-        both = near[cloud.neighborhoods.first] & near[cloud.neighborhoods.second]
+        near = cloud.boundary.distance[:, 0] < SUPPORT * cloud.pairs.lengths
+        both = near[cloud.pairs.first] & near[cloud.pairs.second]
         assert both.any()
         np.testing.assert_array_equal(factor[both], 1.0)
         assert np.ptp(factor[~both]) > 1e-3
@@ -131,9 +131,9 @@ def sphere():
 class TestLengthsThatVary:
     def test_gain_of_the_integral(self, sphere):
         cloud, distance, *_ = sphere
-        lengths, z = cloud.neighborhoods.lengths, cloud.neighborhoods.points[:, 2]
+        lengths, z = cloud.pairs.lengths, cloud.pairs.points[:, 2]
         exact = np.full(len(z), 4.0 * np.pi / len(z))
-        sums = KernelMatrix(cloud.neighborhoods, distance, cloud.rim) @ exact
+        sums = KernelMatrix(cloud.pairs, distance, cloud.boundary) @ exact
         # h = a (1 + c z^2), Laplacian(z^2) = 2 - 6 z^2 and |grad z^2|^2 = 4 z^2 (1 - z^2).
         laplacian, slope = 0.1 * 0.15 * (2.0 - 6.0 * z**2), (0.1 * 0.15) ** 2 * 4.0 * z**2 * (1.0 - z**2)
         expected = SECOND_MOMENT * (lengths * laplacian / 4.0 + slope / 8.0)
@@ -143,7 +143,7 @@ class TestLengthsThatVary:
 
     def test_leave_the_areas_right(self, sphere):
         cloud, _, areas, _ = sphere
-        order = np.argsort(cloud.neighborhoods.points[:, 2])
+        order = np.argsort(cloud.pairs.points[:, 2])
         bands = areas[order].reshape(16, 500).mean(axis=1) * len(areas) / (4.0 * np.pi)
         assert np.abs(bands - 1.0).max() < 3.5e-4  # 1.2e-3 without the gain
 

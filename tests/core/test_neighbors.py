@@ -51,8 +51,8 @@ def test_local_length_follows_the_spacing():
 
 def test_local_length_varies_slowly():
     options = LaplacianOptions(bandwidth="local", bandwidth_factor=0.55)
-    neighborhoods = read_cloud(random_sphere(3000), options).neighborhoods
-    change = neighborhoods.lengths[neighborhoods.first] / neighborhoods.lengths[neighborhoods.second]
+    pairs = read_cloud(random_sphere(3000), options).pairs
+    change = pairs.lengths[pairs.first] / pairs.lengths[pairs.second]
     assert np.abs(np.log(change)).max() < 0.35
 
 
@@ -60,6 +60,6 @@ def test_scaled_coordinates_are_free_of_units():
     points = random_sphere(400)
     plain = read_cloud(points, LaplacianOptions())
     moved = read_cloud(1e3 * points + 7.0, LaplacianOptions())
-    np.testing.assert_allclose(moved.neighborhoods.lengths, plain.neighborhoods.lengths, rtol=1e-9)
+    np.testing.assert_allclose(moved.pairs.lengths, plain.pairs.lengths, rtol=1e-9)
     assert moved.scaled.scale == pytest.approx(1e3 * plain.scaled.scale, rel=1e-9)
     assert np.sqrt(np.mean(np.sum(plain.scaled.points**2, axis=1))) == pytest.approx(1.0, rel=1e-12)

@@ -128,7 +128,7 @@ class TestOperator:
         off = read_cloud(noisy, LaplacianOptions(projection="off"))
         center = noisy.mean(axis=0)
         for result, least, most in ((cloud, 0.0, 0.25), (off, 0.4, 0.6)):
-            assert least < off_sphere(result.neighborhoods.points * result.scaled.scale + center) < most
+            assert least < off_sphere(result.pairs.points * result.scaled.scale + center) < most
 
     def test_normals_are_within_a_few_degrees(self, noisy, laplacian):
         own = degrees_off(laplacian.normals, noisy)
@@ -166,7 +166,7 @@ class TestOperator:
         laplacian = core.build_laplacian(noisy, normals=noisy)
         np.testing.assert_allclose(laplacian.normals, noisy / np.linalg.norm(noisy, axis=1)[:, None], atol=1e-12)
 
-    def test_a_noisy_open_surface_keeps_its_rim(self):
+    def test_a_noisy_open_surface_keeps_its_boundary(self):
         points = square_random(1600)
         points[:, 2] = 0.3 / 40.0 * np.random.default_rng(1).standard_normal(1600)
         laplacian = core.build_laplacian(points)

@@ -30,7 +30,7 @@ def grid_triangles(side):
     return np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
 
 
-def away_from_rim(points, distance):
+def away_from_boundary(points, distance):
     return (np.minimum(points[:, :2], 1.0 - points[:, :2]) > distance).all(axis=1)
 
 
@@ -38,7 +38,7 @@ def test_cotangent_on_a_flat_grid_is_the_five_point_laplacian():
     side = 9
     points = square_grid(side)
     operator = build("cotangent", points, grid_triangles(side))
-    inner = away_from_rim(points, 1e-6)
+    inner = away_from_boundary(points, 1e-6)
     step = 1.0 / (side - 1)
     np.testing.assert_allclose(operator.areas[inner], step**2)
     assert operator.areas.sum() == pytest.approx(1.0)
@@ -88,12 +88,12 @@ def test_voronoi_cell_ends_at_its_reach():
 
 def test_areas_of_pcl_on_a_plane():
     points = square_grid(15)
-    np.testing.assert_allclose(build("pcl", points).areas[away_from_rim(points, 0.15)], 1.0 / 14**2)
+    np.testing.assert_allclose(build("pcl", points).areas[away_from_boundary(points, 0.15)], 1.0 / 14**2)
 
     points = square_random(900)
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
     diagram = Voronoi(points[:, :2])
-    inner = np.flatnonzero(away_from_rim(points, 0.25))
+    inner = np.flatnonzero(away_from_boundary(points, 0.25))
     expected = [ConvexHull(diagram.vertices[diagram.regions[diagram.point_region[i]]]).volume for i in inner]
     np.testing.assert_allclose(build("pcl", points @ turn).areas[inner], expected, rtol=1e-9)
 

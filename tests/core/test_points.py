@@ -68,15 +68,15 @@ def test_points_along_a_curve(normals):
         core.build_laplacian(circle, options=options)
 
 
-def test_a_small_island_is_left_out_with_a_notice(sphere):
-    island = np.array([[4.0, 0.0, 0.0], [4.01, 0.0, 0.0], [4.0, 0.01, 0.0]])
-    laplacian = core.build_laplacian(np.concatenate([sphere, island]))
+def test_a_small_component_is_left_out_with_a_notice(sphere):
+    component = np.array([[4.0, 0.0, 0.0], [4.01, 0.0, 0.0], [4.0, 0.01, 0.0]])
+    laplacian = core.build_laplacian(np.concatenate([sphere, component]))
     assert any("lie apart from the rest" in notice and ": 3." in notice for notice in laplacian.notices)
     np.testing.assert_array_equal(np.flatnonzero(laplacian.component < 0), [600, 601, 602])
     np.testing.assert_allclose(laplacian.areas[:600], core.build_laplacian(sphere).areas, rtol=1e-9)
 
 
-def test_two_large_parts_are_no_islands():
+def test_two_large_parts_are_no_components():
     sphere = fibonacci_sphere(1500)
     laplacian = core.build_laplacian(np.concatenate([sphere, sphere + [5.0, 0.0, 0.0]]))
     assert core.check_stability(laplacian).parts == 2
@@ -89,7 +89,7 @@ def one_part(laplacian):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_random_points_have_no_islands(seed):
+def test_random_points_have_no_components(seed):
     assert one_part(core.build_laplacian(random_sphere(2000, seed)))
 
 
@@ -100,7 +100,7 @@ def abrupt_change():
     return np.column_stack([plane, 0.1 * plane[:, 0] ** 2])
 
 
-def test_an_abrupt_change_of_spacing_is_no_island():
+def test_an_abrupt_change_of_spacing_is_no_component():
     laplacian = core.build_laplacian(abrupt_change())
     assert not any("apart" in notice for notice in laplacian.notices)
     assert laplacian.areas.sum() == pytest.approx(10.0, rel=0.2)
@@ -206,7 +206,7 @@ class TestGivenNormals:
         {"bandwidth_factor": float("nan")},
         {"areas": "voronoi"},
         {"regularization": -1.0},
-        {"rims": "on"},
+        {"boundary": "on"},
         {"projection": "twice"},
         {"neighbors": 10, "bandwidth_factor": 0.2},
         {"bandwidth": "local", "neighbors": 10, "bandwidth_factor": 0.2},

@@ -5,7 +5,7 @@ import pytest
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, uneven_sphere
-from core.geometry.boundary import no_rim
+from core.geometry.boundary import no_boundary
 from core.geometry.cloud import read_cloud
 from core.operator.areas import KernelMatrix
 from core.options import LaplacianOptions
@@ -15,9 +15,9 @@ from core.paper.operator import unsymmetrized_operator
 
 @pytest.fixture(scope="module")
 def problem():
-    options = LaplacianOptions(bandwidth="global", rims="off", sheets=False)
-    neighborhoods = read_cloud(uneven_sphere(400), options).neighborhoods
-    matrix, target = KernelMatrix(neighborhoods, neighborhoods.distance, no_rim(400)), np.ones(400)
+    options = LaplacianOptions(bandwidth="global", boundary="off", sheets=False)
+    pairs = read_cloud(uneven_sphere(400), options).pairs
+    matrix, target = KernelMatrix(pairs, pairs.distance, no_boundary(400)), np.ones(400)
     return matrix, target, regularized_areas(matrix, target, 1e-3).areas
 
 
@@ -59,8 +59,8 @@ class TestAlgorithm1:
 
     def test_feasible_start_is_kept(self):
         # The paper: on the uniform sphere the solution of eq. (7) is positive, and no iteration is made.
-        neighborhoods = read_cloud(fibonacci_sphere(500), LaplacianOptions.paper()).neighborhoods
-        matrix, target = KernelMatrix(neighborhoods, neighborhoods.distance, no_rim(500)), np.ones(500)
+        pairs = read_cloud(fibonacci_sphere(500), LaplacianOptions.paper()).pairs
+        matrix, target = KernelMatrix(pairs, pairs.distance, no_boundary(500)), np.ones(500)
         start = regularized_areas(matrix, target, 1e-3).areas
         np.testing.assert_allclose(algorithm_1(matrix, target, start).areas, start, rtol=1e-5)
 
@@ -76,9 +76,9 @@ def eq_5_on_the_sphere(count):
     options = LaplacianOptions(bandwidth="global", bandwidth_factor=0.55, curvature_correction=False)
     points = fibonacci_sphere(count)
     cloud = read_cloud(points, options)
-    scaled, neighborhoods = cloud.scaled, cloud.neighborhoods
+    scaled, pairs = cloud.scaled, cloud.pairs
     areas = core.estimate_areas(points, options=options)[scaled.first] / scaled.scale**2
-    matrix = unsymmetrized_operator(neighborhoods, points[scaled.first], areas) / scaled.scale**2
+    matrix = unsymmetrized_operator(pairs, points[scaled.first], areas) / scaled.scale**2
     return matrix, points[scaled.first, 0]
 
 
@@ -99,10 +99,10 @@ class TestUnsymmetrizedOperator:
         options = LaplacianOptions(curvature_correction=False)
         points = random_sphere(600) * [1.0, 0.7, 0.4]
         cloud = read_cloud(points, options)
-        scaled, neighborhoods = cloud.scaled, cloud.neighborhoods
+        scaled, pairs = cloud.scaled, cloud.pairs
         laplacian = core.build_laplacian(points, options=options)
         areas = laplacian.areas[scaled.first] / scaled.scale**2
-        weak = unsymmetrized_operator(neighborhoods, laplacian.normals[scaled.first], areas).multiply(areas[:, None])
+        weak = unsymmetrized_operator(pairs, laplacian.normals[scaled.first], areas).multiply(areas[:, None])
         assert abs(weak - weak.T).max() > 1e-3 * abs(weak).max()
         weak = laplacian.stiffness
         assert abs(weak - weak.T).max() == 0.0

@@ -175,7 +175,7 @@ class TestNodalDomains:
         moved = core.build_laplacian(37.0 * square.points[order] @ TURN.T + [5.0, -3.0, 2.0])
         np.testing.assert_array_equal(core.nodal_domains(values[order], moved), domains[order])
 
-    def test_islands_and_points_left_out(self, two_spheres):
+    def test_components_and_points_left_out(self, two_spheres):
         z = two_spheres.points[:, 2].copy()
         domains = core.nodal_domains(z, two_spheres)
         np.testing.assert_array_equal(domains[600:603], -1)
@@ -290,7 +290,7 @@ class TestSegment:
         labels = core.segment(uneven, 5)[: len(body.points)]
         assert agreement(labels, body.labels) > 0.95
 
-    def test_islands_get_parts_by_their_areas(self, two_spheres):
+    def test_components_get_parts_by_their_areas(self, two_spheres):
         labels = core.segment(two_spheres, 2)
         np.testing.assert_array_equal(labels, np.repeat([1, -1, 0], [600, 3, 1500]))
         labels = core.segment(two_spheres, 6)
@@ -317,7 +317,7 @@ class TestSegment:
             (0, core.TooFewPointsError, "0 parts were asked for"),
             (2.5, core.TooFewPointsError, "2.5 parts"),
             (True, core.TooFewPointsError, "True parts"),
-            (1, core.IslandError, "2 connected parts"),
+            (1, core.ComponentError, "2 components"),
             (900, core.TooFewPointsError, "900 parts need"),
         ],
     )

@@ -16,7 +16,7 @@ from benchmarks.samplings import (
 )
 from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
-from core.geometry.pairs import Neighborhoods
+from core.geometry.pairs import Pairs
 from core.geometry.sheets import fit_sheets, label_sheets, last_pairs, same_sheet
 from core.options import LaplacianOptions
 
@@ -110,7 +110,7 @@ class TestPairs:
     def through_the_plate(plate, options):
         points, face, inset = plate
         cloud = read_cloud(points, options)
-        face, inset, pairs = face[cloud.scaled.first], inset[cloud.scaled.first], cloud.neighborhoods
+        face, inset, pairs = face[cloud.scaled.first], inset[cloud.scaled.first], cloud.pairs
         faces = face[pairs.first] * face[pairs.second] == 0
         opposite = faces & (face[pairs.first] + face[pairs.second] == 1)
         around = inset[pairs.first] + inset[pairs.second] + 2.0
@@ -121,7 +121,7 @@ class TestPairs:
     def across_the_arms(capsule, options):
         points, along = capsule
         cloud = read_cloud(points, options)
-        along, pairs = along[cloud.scaled.first], cloud.neighborhoods
+        along, pairs = along[cloud.scaled.first], cloud.pairs
         bend = sausage_bend(len(points))
         arm = 0.5 * (6.0 - np.pi * bend)
         low = np.minimum(along[pairs.first], along[pairs.second])
@@ -151,9 +151,7 @@ class TestPairs:
     def test_none_is_left_out_where_no_sheets_are_close(self, points):
         apart = read_cloud(points, LaplacianOptions())
         assert apart.definite
-        assert len(apart.neighborhoods.first) == len(
-            read_cloud(points, LaplacianOptions(sheets=False)).neighborhoods.first
-        )
+        assert len(apart.pairs.first) == len(read_cloud(points, LaplacianOptions(sheets=False)).pairs.first)
 
 
 class TestOrientation:
@@ -193,7 +191,7 @@ class TestLabels:
         assert len(np.unique(label)) == 2
         assert len({(a, b) for a, b in zip(label.tolist(), sheet.tolist(), strict=True)}) == 2
 
-    def test_the_sheets_of_islands_are_parts_of_their_own(self):
+    def test_the_sheets_of_components_are_parts_of_their_own(self):
         points, sheet, _ = parallel_sheets(20)
         points = np.concatenate([points, points + [100.0, 0.0, 0.0], grid_points(range(30), range(30), [50.0])])
         laplacian = core.build_laplacian(points)
@@ -230,12 +228,12 @@ class TestLastPairs:
         points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.5, 0.0, 0.0], [2.5, 1.0, 0.0]])
         first, second = np.array([0, 0, 1, 1, 2]), np.array([1, 2, 2, 3, 3])
         distance = np.linalg.norm(points[first] - points[second], axis=1)
-        pairs = Neighborhoods(points, np.ones(4), first, second, distance)
+        pairs = Pairs(points, np.ones(4), first, second, distance)
         same = np.array([False, False, False, False, True])
         np.testing.assert_array_equal(last_pairs(pairs, same), [True, False, True, False, False])
         same = np.array([True, False, False, False, False])
         np.testing.assert_array_equal(last_pairs(pairs, same), [False, False, True, False, True])
 
     def test_none_where_all_have_pairs(self):
-        pairs = Neighborhoods(np.eye(3), np.ones(3), np.array([0, 0]), np.array([1, 2]), np.ones(2))
+        pairs = Pairs(np.eye(3), np.ones(3), np.array([0, 0]), np.array([1, 2]), np.ones(2))
         assert not last_pairs(pairs, np.array([True, True])).any()

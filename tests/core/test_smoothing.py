@@ -4,7 +4,7 @@ from scipy.special import sph_harm_y
 
 import core
 from benchmarks.samplings import disc_random, fibonacci_sphere, hemisphere_random, open_cylinder, square_grid
-from core.applications.smoothing import rim_places
+from core.applications.smoothing import boundary_places
 
 BUMP = 0.1
 
@@ -48,7 +48,7 @@ def ellipsoid():
 
 
 @pytest.fixture(scope="module")
-def islands():
+def components():
     points = np.concatenate([fibonacci_sphere(900), 0.5 * fibonacci_sphere(600) + [5.0, 0.0, 0.0]])
     lone = [[0.0, 90.0, 0.0], [0.0, 90.0, 1.0]]
     return core.build_laplacian(np.concatenate([points, lone]))
@@ -176,40 +176,40 @@ def test_result_moves_turns_and_grows_with_the_points(smoother):
     np.testing.assert_allclose(other, 20.0 * found @ turn + [4.0, 5.0, 6.0], atol=2e-3)
 
 
-def test_islands_keep_their_places_and_lone_points_stay(islands):
-    part = islands.component
+def test_components_keep_their_places_and_lone_points_stay(components):
+    part = components.component
     assert part.max() == 1
     for found in (
-        core.smooth_points(islands, core.exponential(9.0)),
-        core.smooth_points(islands, 8),
-        core.smooth_points(islands, core.exponential(0.1), keep="area"),
-        core.fair_points(islands, keep="volume"),
+        core.smooth_points(components, core.exponential(9.0)),
+        core.smooth_points(components, 8),
+        core.smooth_points(components, core.exponential(0.1), keep="area"),
+        core.fair_points(components, keep="volume"),
     ):
         assert np.isfinite(found).all()
-        np.testing.assert_array_equal(found[part < 0], islands.points[part < 0])
+        np.testing.assert_array_equal(found[part < 0], components.points[part < 0])
         for number, center in enumerate(([0.0, 0.0, 0.0], [5.0, 0.0, 0.0])):
             np.testing.assert_allclose(found[part == number].mean(axis=0), center, atol=5e-3)
 
 
-def test_each_island_keeps_its_own_size(islands):
-    found = core.smooth_points(islands, core.exponential(0.05), keep="volume")
+def test_each_component_keeps_its_own_size(components):
+    found = core.smooth_points(components, core.exponential(0.05), keep="volume")
     for number, radius, center in ((0, 1.0, [0.0, 0.0, 0.0]), (1, 0.5, [5.0, 0.0, 0.0])):
-        inside = islands.component == number
+        inside = components.component == number
         np.testing.assert_allclose(np.linalg.norm(found[inside] - center, axis=1), radius, rtol=4e-3)
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_constants_alone_are_no_shape(islands, count):
-    with pytest.raises(core.PointCloudError, match=r"2 connected part.* at least 5"):
-        core.smooth_points(islands, count)
+def test_constants_alone_are_no_shape(components, count):
+    with pytest.raises(core.PointCloudError, match=r"2 component.* at least 5"):
+        core.smooth_points(components, count)
 
 
-class TestRim:
-    def test_places_on_the_rim_of_a_disc(self):
+class TestBoundary:
+    def test_places_on_the_boundary_of_a_disc(self):
         points, distance = disc_random(2000)
         laplacian = core.build_laplacian(points)
-        places = rim_places(laplacian)
-        near = laplacian.near_rim
+        places = boundary_places(laplacian)
+        near = laplacian.near_boundary
         moved = np.linalg.norm(places - points, axis=1)
         np.testing.assert_allclose(moved[near], distance[near], atol=0.03)
         assert np.all(moved[~near] == 0.0)
@@ -217,7 +217,7 @@ class TestRim:
     @pytest.mark.parametrize("response", [core.exponential(0.05), core.fairing(0.01), 30])
     def test_a_flat_square_stays(self, response):
         laplacian = core.build_laplacian(square_grid(30))
-        moved = core.smooth_points(laplacian, response, fixed_rim=True)
+        moved = core.smooth_points(laplacian, response, dirichlet=True)
         np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
         corner = np.all(np.abs(laplacian.points[:, :2] - 0.5) > 0.2, axis=1)
         np.testing.assert_allclose(moved[~corner], laplacian.points[~corner], atol=2e-3)
@@ -225,29 +225,29 @@ class TestRim:
 
     def test_a_flat_disc_of_random_points_stays(self):
         laplacian = core.build_laplacian(disc_random(2000)[0])
-        moved = core.fair_points(laplacian, fixed_rim=True) - laplacian.points
+        moved = core.fair_points(laplacian, dirichlet=True) - laplacian.points
         assert np.linalg.norm(moved, axis=1).max() < 0.04  # the spacing
         assert rms(np.linalg.norm(moved, axis=1)) < 8e-3
 
-    def test_noise_falls_on_an_open_cylinder_that_keeps_its_rims(self):
+    def test_noise_falls_on_an_open_cylinder_that_keeps_its_boundaries(self):
         points = open_cylinder()[::2]
         radial = points * [0.5, 0.5, 0.0]
         noise = 0.02 * np.random.default_rng(0).standard_normal(len(points))
         noise[np.abs(points[:, 2]) > 0.99] = 0.0
         laplacian = core.build_laplacian(points + noise[:, None] * radial)
-        moved = core.fair_points(laplacian, fixed_rim=True)
-        rim = np.abs(points[:, 2]) > 0.99
+        moved = core.fair_points(laplacian, dirichlet=True)
+        boundary = np.abs(points[:, 2]) > 0.99
         np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
-        assert np.mean(laplacian.boundary[rim]) > 0.95
+        assert np.mean(laplacian.boundary[boundary]) > 0.95
         assert rms(np.linalg.norm(moved[:, :2], axis=1) - 2.0) < rms(noise) / 3.0
         free = core.fair_points(laplacian)
-        assert np.abs(free[rim, 2]).mean() < np.abs(moved[rim, 2]).mean()
+        assert np.abs(free[boundary, 2]).mean() < np.abs(moved[boundary, 2]).mean()
 
-    def test_parts_without_a_rim_are_not_in_the_way(self):
+    def test_parts_without_a_boundary_are_not_in_the_way(self):
         ball = 0.5 * fibonacci_sphere(600) + [0.0, 0.0, 4.0]
         laplacian = core.build_laplacian(np.concatenate([hemisphere_random(1500), ball]))
         assert laplacian.boundary.any()
-        moved = core.smooth_points(laplacian, core.fairing(1e-3), fixed_rim=True)
+        moved = core.smooth_points(laplacian, core.fairing(1e-3), dirichlet=True)
         assert np.isfinite(moved).all()
         np.testing.assert_allclose(moved[1500:], ball, atol=5e-3)
 
@@ -256,7 +256,7 @@ class TestRim:
         with pytest.raises(core.PointCloudError, match="enclose no volume"):
             core.fair_points(laplacian, keep="volume")
         with pytest.raises(core.PointCloudError, match="keep neither"):
-            core.fair_points(laplacian, keep="area", fixed_rim=True)
+            core.fair_points(laplacian, keep="area", dirichlet=True)
 
 
 @pytest.mark.parametrize("signs", [-1.0, "random"])

@@ -13,13 +13,13 @@ from benchmarks.samplings import (
     torus_points,
 )
 from core.geometry.nearest import find_nearest
-from core.geometry.quadrics import fit_surface, frames
+from core.geometry.quadrics import fit_quadrics, frames
 from core.options import LaplacianOptions
 
 
 def fit(points):
     nearest = find_nearest(points)
-    return fit_surface(points, nearest.index, nearest.weight)
+    return fit_quadrics(points, nearest.index, nearest.weight)
 
 
 def degrees_off(found, exact):
@@ -42,7 +42,7 @@ def test_sphere(sphere, radius):
     surface = fit(radius * points)
     assert degrees_off(surface.normals, points).max() < 0.1
     np.testing.assert_allclose(surface.gaussian, 1.0 / radius**2, rtol=0.06)
-    np.testing.assert_allclose(surface.steepest, 1.0 / radius, rtol=0.06)
+    np.testing.assert_allclose(surface.max_abs_curvature, 1.0 / radius, rtol=0.06)
     assert surface.misfit.max() < 2e-3 * radius * np.sqrt(4.0 * np.pi / 4000)
     assert np.linalg.norm(surface.height, axis=1).max() < 3e-4 * radius
 
@@ -50,13 +50,13 @@ def test_sphere(sphere, radius):
 @pytest.mark.parametrize("sample", [torus_low_discrepancy, torus_points])
 def test_torus(sample):
     points = sample(4000)
-    normals, gaussian, steepest = torus_facts(points)
+    normals, gaussian, max_abs_curvature = torus_facts(points)
     surface = fit(points)
     off = degrees_off(surface.normals, normals)
     assert np.sqrt(np.mean(off**2)) < 0.7
     assert off.max() < 3.0
     assert np.sqrt(np.mean((surface.gaussian - gaussian) ** 2)) < 0.1 * np.abs(gaussian).max()
-    np.testing.assert_allclose(surface.steepest, steepest, rtol=0.15)
+    np.testing.assert_allclose(surface.max_abs_curvature, max_abs_curvature, rtol=0.15)
 
 
 def test_cylinder():
@@ -64,13 +64,13 @@ def test_cylinder():
     surface = fit(points)
     assert degrees_off(surface.normals, points * [0.5, 0.5, 0.0]).max() < 1e-3
     assert np.abs(surface.gaussian).max() < 1e-3
-    np.testing.assert_allclose(surface.steepest, 0.5, rtol=0.01)
+    np.testing.assert_allclose(surface.max_abs_curvature, 0.5, rtol=0.01)
 
 
 def test_plane():
     surface = fit(square_random(1000))
     np.testing.assert_allclose(np.abs(surface.normals[:, 2]), 1.0, atol=1e-12)
-    for values in (surface.gaussian, surface.steepest, surface.misfit, surface.height):
+    for values in (surface.gaussian, surface.max_abs_curvature, surface.misfit, surface.height):
         np.testing.assert_allclose(values, 0.0, atol=1e-9)
 
 
@@ -78,7 +78,7 @@ def test_a_quadric_is_met_exactly():
     u, v = np.random.default_rng(0).random((2, 1500)) - 0.5
     points = np.column_stack([u, v, 0.8 * u * u - 0.5 * u * v + 0.3 * v * v + 0.1 * u])
     nearest = find_nearest(points)
-    surface = fit_surface(points, nearest.index, nearest.weight, normals=np.tile([0.0, 0.0, 1.0], (1500, 1)))
+    surface = fit_quadrics(points, nearest.index, nearest.weight, normals=np.tile([0.0, 0.0, 1.0], (1500, 1)))
     slope = np.column_stack([-(1.6 * u - 0.5 * v + 0.1), -(-0.5 * u + 0.6 * v), np.ones(1500)])
     squared = np.einsum("ij,ij->i", slope, slope)
     assert degrees_off(surface.normals, slope / np.sqrt(squared)[:, None]).max() < 1e-3
@@ -91,7 +91,7 @@ def test_some_rows_only():
     points = torus_points(1500)
     nearest, rows = find_nearest(points), np.arange(0, 1500, 7)
     every = fit(points)
-    some = fit_surface(points, nearest.index[rows], nearest.weight[rows], rows)
+    some = fit_quadrics(points, nearest.index[rows], nearest.weight[rows], rows)
     np.testing.assert_allclose(some.gaussian, every.gaussian[rows], rtol=1e-9)
     np.testing.assert_allclose(np.abs(np.einsum("ij,ij->i", some.normals, every.normals[rows])), 1.0, rtol=1e-9)
 

@@ -29,7 +29,7 @@ from benchmarks.samplings import (
 )
 
 SCANS = ["spot", "max-planck", "homer", "camelhead", "bunny", "armadillo"]
-RIM = {"spot": False, "camelhead": True}
+OPEN = {"spot": False, "camelhead": True}
 
 
 def area_error(laplacian, exact):
@@ -52,7 +52,7 @@ def test_square(points, area, most):
 
 
 @pytest.mark.parametrize(
-    ("given", "area", "mean"), [(True, 3e-3, 5e-3), (False, 1e-2, 1.5e-2)], ids=["rim given", "rim found"]
+    ("given", "area", "mean"), [(True, 3e-3, 5e-3), (False, 1e-2, 1.5e-2)], ids=["boundary given", "boundary found"]
 )
 def test_disc(given, area, mean):
     points, distance = disc_random(2000)
@@ -103,8 +103,8 @@ def test_scan(scans, name):
     facts = json.loads((scans / "reference.json").read_text(encoding="utf-8"))[name]
     laplacian = core.build_laplacian(read_ply(path))
     assert area_error(laplacian, facts["triangle_area"]) < 0.01
-    if name in RIM:
-        assert np.any(laplacian.boundary) == RIM[name]
+    if name in OPEN:
+        assert np.any(laplacian.boundary) == OPEN[name]
 
 
 @pytest.mark.parametrize(("level", "area", "mean"), [(0.1, 1e-3, 1.2e-3), (0.25, 3e-3, 3e-3), (0.5, 6e-3, 6e-3)])

@@ -1,4 +1,4 @@
-"""Rims: where the surface ends, how far from it the points are, and the images in it."""
+"""Boundaries: where the surface ends, how far from it the points are, and the images in it."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
-from core.geometry.boundary import find_rim_points, measure_rim, no_rim
+from core.geometry.boundary import find_boundary, measure_boundary, no_boundary
 from core.geometry.cloud import read_cloud
 from core.geometry.distances import arc_length
 from core.geometry.nearest import find_nearest
@@ -45,11 +45,11 @@ CLOSED = {
 UP = (0.0, 0.0, 1.0)
 
 
-def flat_rim(points):
-    """Find and measure the rim of points in the plane z = 0."""
+def flat_boundary(points):
+    """Find and measure the boundary of points in the plane z = 0."""
     nearest, normals = find_nearest(points), np.tile(UP, (len(points), 1))
-    at_rim = find_rim_points(nearest, normals)
-    return measure_rim(nearest, normals, at_rim, 20.0 * nearest.spacing)
+    at_boundary = find_boundary(nearest, normals)
+    return measure_boundary(nearest, normals, at_boundary, 20.0 * nearest.spacing)
 
 
 def side_distances(points, width, height):
@@ -72,12 +72,12 @@ def disc_of_rings(count):
 
 def row_sums(cloud):
     """The kernel's integral around every point, images included, with exact areas of a unit grid."""
-    matrix = KernelMatrix(cloud.neighborhoods, arc_length(cloud), cloud.rim)
+    matrix = KernelMatrix(cloud.pairs, arc_length(cloud), cloud.boundary)
     return matrix @ cloud_areas(cloud)
 
 
 def cloud_areas(cloud):
-    """Areas of grid points on a unit square, whose rim points own half a cell and whose corners a quarter."""
+    """Areas of grid points on a unit square, whose boundary points own half a cell and whose corners a quarter."""
     across = np.isclose(np.abs(cloud.scaled.points[:, :2]), np.abs(cloud.scaled.points[:, :2]).max())
     side = np.sqrt(len(across)) - 1.0
     return 0.5 ** across.sum(axis=1) / (side * cloud.scaled.scale) ** 2
@@ -89,93 +89,93 @@ class TestFinding:
         points = grid_points(np.arange(columns), np.arange(rows), [0.0])
         distance = side_distances(points, columns - 1.0, rows - 1.0)[:, 0]
         nearest = find_nearest(points)
-        np.testing.assert_array_equal(find_rim_points(nearest, np.tile(UP, (len(points), 1))), distance == 0.0)
+        np.testing.assert_array_equal(find_boundary(nearest, np.tile(UP, (len(points), 1))), distance == 0.0)
 
     def test_both_ends_of_a_cylinder(self):
         points = open_cylinder()
         cloud = read_cloud(points, LaplacianOptions())
-        np.testing.assert_array_equal(cloud.rim.at_rim, np.abs(points[cloud.scaled.first, 2]) > 1.0 - 1e-9)
+        np.testing.assert_array_equal(cloud.boundary.at_boundary, np.abs(points[cloud.scaled.first, 2]) > 1.0 - 1e-9)
 
-    def test_only_points_near_the_rim_of_a_random_disc(self):
+    def test_only_points_near_the_boundary_of_a_random_disc(self):
         points, distance = disc_random(4000)
-        at_rim = flat_rim(points).at_rim
+        at_boundary = flat_boundary(points).at_boundary
         spacing = np.sqrt(np.pi / 4000)
-        assert distance[at_rim].max() < 4.0 * spacing
-        # A rim point in every stretch of four spacings.
-        angle = np.sort(np.arctan2(points[at_rim, 1], points[at_rim, 0]))
+        assert distance[at_boundary].max() < 4.0 * spacing
+        # A boundary point in every stretch of four spacings.
+        angle = np.sort(np.arctan2(points[at_boundary, 1], points[at_boundary, 0]))
         assert np.diff(np.append(angle, angle[0] + 2.0 * np.pi)).max() < 4.0 * spacing
 
-    def test_the_rim_of_a_hole(self):
+    def test_the_boundary_of_a_hole(self):
         points = square_random(6000)
         center = np.linalg.norm(points - [0.5, 0.5, 0.0], axis=1)
         points, center = points[center > 0.15], center[center > 0.15]
-        rim = flat_rim(points)
-        around = rim.at_rim & (center < 0.3)
+        boundary = flat_boundary(points)
+        around = boundary.at_boundary & (center < 0.3)
         assert np.count_nonzero(around) > 40
         assert center[around].max() < 0.15 + 4.0 / np.sqrt(6000)
         close = center < 0.2
-        # The rim of a hole bends the other way.
-        assert np.median(rim.curvature[close, 0]) == pytest.approx(-1.0 / 0.15, rel=0.2)
+        # The boundary of a hole bends the other way.
+        assert np.median(boundary.curvature[close, 0]) == pytest.approx(-1.0 / 0.15, rel=0.2)
 
     @pytest.mark.parametrize("name", CLOSED)
     def test_none_on_closed_surfaces(self, name):
-        assert np.count_nonzero(read_cloud(CLOSED[name], LaplacianOptions()).rim.at_rim) == 0
+        assert np.count_nonzero(read_cloud(CLOSED[name], LaplacianOptions()).boundary.at_boundary) == 0
 
     @pytest.mark.parametrize("level", [0.1, 0.5])
     def test_none_on_a_noisy_sphere(self, level):
-        assert not np.any(read_cloud(noisy_sphere(2000, level), LaplacianOptions()).rim.at_rim)
+        assert not np.any(read_cloud(noisy_sphere(2000, level), LaplacianOptions()).boundary.at_boundary)
 
     def test_switched_off(self):
         points = square_grid(25)
-        off = read_cloud(points, LaplacianOptions(rims="off")).rim
-        assert not np.any(off.at_rim)
+        off = read_cloud(points, LaplacianOptions(boundary="off")).boundary
+        assert not np.any(off.at_boundary)
         assert np.all(np.isinf(off.distance))
-        # Without images the unit integral makes areas too large at the rim.
-        assert core.estimate_areas(points, options=LaplacianOptions(rims="off")).sum() > 1.05
+        # Without images the unit integral makes areas too large at the boundary.
+        assert core.estimate_areas(points, options=LaplacianOptions(boundary="off")).sum() > 1.05
 
 
 class TestMeasuring:
     def test_distances_on_a_square_grid_to_both_sides_of_a_corner(self):
         points = grid_points(np.arange(40.0), np.arange(40.0), [0.0])
-        rim, exact = flat_rim(points), side_distances(points, 39.0, 39.0)
-        np.testing.assert_allclose(rim.distance[:, 0], exact[:, 0], atol=0.1)
-        second = np.isfinite(rim.distance[:, 1])
-        np.testing.assert_allclose(rim.distance[second, 1], exact[second, 1], atol=0.1)
+        boundary, exact = flat_boundary(points), side_distances(points, 39.0, 39.0)
+        np.testing.assert_allclose(boundary.distance[:, 0], exact[:, 0], atol=0.1)
+        second = np.isfinite(boundary.distance[:, 1])
+        np.testing.assert_allclose(boundary.distance[second, 1], exact[second, 1], atol=0.1)
         assert np.all(second[exact[:, 1] <= 8.0])
-        assert np.abs(rim.curvature).max() < 1e-3
-        across = rim.outward[exact[:, 1] > exact[:, 0] + 1.0, 0]
+        assert np.abs(boundary.curvature).max() < 1e-3
+        across = boundary.outward[exact[:, 1] > exact[:, 0] + 1.0, 0]
         np.testing.assert_allclose(np.abs(across[:, :2]).max(axis=1), 1.0, atol=0.05)
 
     @pytest.mark.parametrize("side", [12, 16])
     def test_distances_on_a_small_square_grid(self, side):
         points = grid_points(np.arange(float(side)), np.arange(float(side)), [0.0])
-        rim, exact = flat_rim(points), side_distances(points, side - 1.0, side - 1.0)
-        np.testing.assert_allclose(rim.distance, exact, atol=0.1)
+        boundary, exact = flat_boundary(points), side_distances(points, side - 1.0, side - 1.0)
+        np.testing.assert_allclose(boundary.distance, exact, atol=0.1)
 
     @pytest.mark.parametrize("seed", range(3))
     def test_distances_and_curvature_on_a_random_disc(self, seed):
         points, exact = disc_random(2000, seed)
         spacing = np.sqrt(np.pi / 2000)
-        rim = flat_rim(points)
+        boundary = flat_boundary(points)
         near = exact < 8.0 * spacing
-        error = (rim.distance[near, 0] - exact[near]) / spacing
+        error = (boundary.distance[near, 0] - exact[near]) / spacing
         assert abs(error.mean()) < 0.15
         assert np.sqrt(np.mean(error**2)) < 0.45
-        assert np.median(rim.curvature[near, 0]) == pytest.approx(1.0, abs=0.25)
+        assert np.median(boundary.curvature[near, 0]) == pytest.approx(1.0, abs=0.25)
         radial = points[near] / np.linalg.norm(points[near], axis=1)[:, None]
-        assert np.einsum("ij,ij->i", rim.outward[near, 0], radial).min() > 0.9
+        assert np.einsum("ij,ij->i", boundary.outward[near, 0], radial).min() > 0.9
 
     @pytest.mark.parametrize("seed", range(2))
     def test_both_distances_on_a_random_square(self, seed):
         points = 60.0 * square_random(3600, seed)
-        rim, exact = flat_rim(points), side_distances(points, 60.0, 60.0)
+        boundary, exact = flat_boundary(points), side_distances(points, 60.0, 60.0)
         near = exact[:, 0] < 8.0
-        assert np.abs(rim.distance[near, 0] - exact[near, 0]).mean() < 0.35
+        assert np.abs(boundary.distance[near, 0] - exact[near, 0]).mean() < 0.35
         corner = exact[:, 1] < 5.0
-        assert np.mean(np.isfinite(rim.distance[corner, 1])) > 0.9
-        seen = np.isfinite(rim.distance[:, 1])
+        assert np.mean(np.isfinite(boundary.distance[corner, 1])) > 0.9
+        seen = np.isfinite(boundary.distance[:, 1])
         assert exact[seen, 1].max() < 30.0
-        assert np.median(np.abs(rim.distance[seen, 1] - exact[seen, 1])) < 0.5
+        assert np.median(np.abs(boundary.distance[seen, 1] - exact[seen, 1])) < 0.5
 
     def test_distances_along_a_curved_surface(self):
         points = hemisphere_random(4000)
@@ -184,33 +184,33 @@ class TestMeasuring:
         exact = np.arcsin(points[scaled.first, 2])
         spacing = np.sqrt(2.0 * np.pi / 4000)
         near = exact < 8.0 * spacing
-        error = (cloud.rim.distance[near, 0] * scaled.scale - exact[near]) / spacing
+        error = (cloud.boundary.distance[near, 0] * scaled.scale - exact[near]) / spacing
         assert abs(error.mean()) < 0.15
         assert np.sqrt(np.mean(error**2)) < 0.45
         # The equator is a geodesic.
-        assert abs(np.median(cloud.rim.curvature[near, 0])) < 0.1
+        assert abs(np.median(cloud.boundary.curvature[near, 0])) < 0.1
 
-    def test_few_points_have_no_rim(self):
+    def test_few_points_have_no_boundary(self):
         points = np.random.default_rng(0).random((200, 3)) * (1.0, 1.0, 0.0)
         nearest, normals = find_nearest(points), np.tile(UP, (200, 1))
-        rim = measure_rim(nearest, normals, np.arange(200) < 3, 20.0 * nearest.spacing)
-        assert not np.any(rim.at_rim)
-        assert np.all(np.isinf(rim.distance))
+        boundary = measure_boundary(nearest, normals, np.arange(200) < 3, 20.0 * nearest.spacing)
+        assert not np.any(boundary.at_boundary)
+        assert np.all(np.isinf(boundary.distance))
 
 
 class TestImages:
     @pytest.fixture(scope="class")
     @classmethod
     def disc_sums(cls):
-        """Integrals of the kernel with exact areas, their expected excess, and which points lie near the rim."""
+        """Integrals of the kernel with exact areas, their expected excess, and which points lie near the boundary."""
         points, areas, distance = disc_of_rings(25)
         cloud = read_cloud(points, LaplacianOptions(), boundary_distance=distance)
-        matrix = KernelMatrix(cloud.neighborhoods, cloud.neighborhoods.distance, cloud.rim)
+        matrix = KernelMatrix(cloud.pairs, cloud.pairs.distance, cloud.boundary)
         sums = matrix @ (areas[cloud.scaled.first] / cloud.scaled.scale**2)
-        near = cloud.rim.distance[:, 0] < 3.0 * cloud.neighborhoods.lengths
-        return sums, image_excess(cloud.neighborhoods.lengths, cloud.rim), near
+        near = cloud.boundary.distance[:, 0] < 3.0 * cloud.pairs.lengths
+        return sums, image_excess(cloud.pairs.lengths, cloud.boundary), near
 
-    def test_they_complete_the_kernel_at_straight_rims_and_at_corners(self):
+    def test_they_complete_the_kernel_at_straight_boundaries_and_at_corners(self):
         cloud = read_cloud(square_grid(60), LaplacianOptions())
         np.testing.assert_allclose(row_sums(cloud), 1.0, atol=1.5e-2)
 
@@ -219,12 +219,12 @@ class TestImages:
         np.testing.assert_allclose(row_sums(cloud), 1.0, atol=1.5e-2)
 
     def test_without_them_it_is_cut(self):
-        cloud = read_cloud(square_grid(40), LaplacianOptions(rims="off"))
+        cloud = read_cloud(square_grid(40), LaplacianOptions(boundary="off"))
         sums = row_sums(cloud)
         assert sums.min() < 0.4
         assert sums.max() == pytest.approx(1.0, abs=2e-2)
 
-    def test_they_nearly_complete_it_at_curved_rims(self, disc_sums):
+    def test_they_nearly_complete_it_at_curved_boundaries(self, disc_sums):
         sums, excess, near = disc_sums
         np.testing.assert_allclose(sums[near], 1.0 + excess[near], atol=0.03)
 
@@ -235,14 +235,14 @@ class TestImages:
         assert error < 0.5 * plain
 
     @pytest.mark.parametrize("wide", [6, 10, 14])
-    def test_both_rims_of_a_strip(self, wide):
+    def test_both_boundaries_of_a_strip(self, wide):
         points = grid_points(np.arange(wide + 1.0), np.arange(80.0), [0.0])
         assert core.estimate_areas(points).sum() == pytest.approx(79.0 * wide, rel=0.12)
 
-    def test_no_excess_without_rims_or_with_straight_ones(self):
-        assert np.all(image_excess(np.ones(5), no_rim(5)) == 0.0)
+    def test_no_excess_without_boundaries_or_with_straight_ones(self):
+        assert np.all(image_excess(np.ones(5), no_boundary(5)) == 0.0)
         cloud = read_cloud(square_grid(30), LaplacianOptions())
-        assert np.abs(image_excess(cloud.neighborhoods.lengths, cloud.rim)).max() < 1e-6
+        assert np.abs(image_excess(cloud.pairs.lengths, cloud.boundary)).max() < 1e-6
 
     @pytest.mark.parametrize(
         "points", [square_random(900), hemisphere_random(900)], ids=["corners and straight", "curved"]
@@ -257,21 +257,21 @@ class TestImages:
         assert values[0] >= -1e-10 * values[-1]
         assert values[1] > 1e-8 * values[-1]
 
-    def test_areas_shrink_at_the_rim(self):
+    def test_areas_shrink_at_the_boundary(self):
         points = square_grid(60)
         areas = core.estimate_areas(points) * 59.0**2
-        at_rim = side_distances(points, 1.0, 1.0)[:, 0] < 1e-9
-        assert 0.4 < areas[at_rim].mean() < 0.75
-        assert areas[~at_rim].mean() == pytest.approx(1.0, rel=0.05)
+        at_boundary = side_distances(points, 1.0, 1.0)[:, 0] < 1e-9
+        assert 0.4 < areas[at_boundary].mean() < 0.75
+        assert areas[~at_boundary].mean() == pytest.approx(1.0, rel=0.05)
 
-    def test_areas_of_a_grid_are_even_up_to_its_rim(self):
+    def test_areas_of_a_grid_are_even_up_to_its_boundary(self):
         points = square_grid(60)
         exact = 0.5 ** (side_distances(points, 1.0, 1.0) < 1e-9).sum(axis=1) / 59.0**2
         ratio = core.estimate_areas(points) / exact
         assert ratio.min() > 0.3
         assert ratio.max() < 3.0
 
-    @pytest.mark.parametrize("given", [True, False], ids=["rim given", "rim found"])
+    @pytest.mark.parametrize("given", [True, False], ids=["boundary given", "boundary found"])
     def test_few_areas_of_a_random_disc_are_near_the_floor(self, given):
         points, distance = disc_random(2000)
         areas = core.estimate_areas(points, boundary_distance=distance if given else None)
@@ -290,33 +290,33 @@ class TestGiven:
         np.testing.assert_array_equal(by_index.areas, by_mask.areas)
         np.testing.assert_array_equal(by_index.stiffness.data, by_mask.stiffness.data)
 
-    def test_the_rim_that_would_be_found_changes_nothing(self):
+    def test_the_boundary_that_would_be_found_changes_nothing(self):
         points = square_random(700)
         found = core.build_laplacian(points)
         given = core.build_laplacian(points, boundary=found.boundary)
         np.testing.assert_array_equal(given.areas, found.areas)
 
-    def test_a_given_rim_wins_over_the_options(self):
+    def test_a_given_boundary_wins_over_the_options(self):
         points = square_grid(30)
         border = side_distances(points, 1.0, 1.0)[:, 0] < 1e-9
-        options = LaplacianOptions(rims="off")
+        options = LaplacianOptions(boundary="off")
         laplacian = core.build_laplacian(points, options=options, boundary=border)
         np.testing.assert_array_equal(laplacian.boundary, border)
         assert laplacian.areas.sum() == pytest.approx(1.0, rel=2e-2)
 
-    def test_a_given_rim_is_the_same_without_other_options(self):
+    def test_a_given_boundary_is_the_same_without_other_options(self):
         points = hemisphere_random(700)
         boundary = core.build_laplacian(points).boundary
-        options = LaplacianOptions(rims="off", sheets=False)
+        options = LaplacianOptions(boundary="off", sheets=False)
         areas = core.estimate_areas(points, options=options, boundary=boundary)
         np.testing.assert_allclose(areas, core.estimate_areas(points, boundary=boundary), rtol=1e-6)
 
     @pytest.mark.parametrize("empty", [[], np.zeros(900, dtype=bool), np.zeros(0, dtype=int)])
-    def test_no_points_mean_no_rim(self, empty):
+    def test_no_points_mean_no_boundary(self, empty):
         laplacian = core.build_laplacian(square_grid(30), boundary=empty)
         assert not np.any(laplacian.boundary)
         np.testing.assert_array_equal(
-            laplacian.areas, core.estimate_areas(square_grid(30), options=LaplacianOptions(rims="off"))
+            laplacian.areas, core.estimate_areas(square_grid(30), options=LaplacianOptions(boundary="off"))
         )
 
     def test_exact_distances_give_the_eigenvalues_of_the_disc(self):
@@ -336,11 +336,11 @@ class TestGiven:
         assert cut.sum() == pytest.approx(np.pi, rel=5e-3)
         assert cut.sum() == pytest.approx(areas.sum(), rel=1e-3)
 
-    def test_infinite_distances_mean_no_rim(self):
+    def test_infinite_distances_mean_no_boundary(self):
         points, _ = disc_random(900)
         np.testing.assert_array_equal(
             core.estimate_areas(points, boundary_distance=np.full(900, np.inf)),
-            core.estimate_areas(points, options=LaplacianOptions(rims="off")),
+            core.estimate_areas(points, options=LaplacianOptions(boundary="off")),
         )
 
     def test_distances_scale_with_the_points(self):
@@ -363,6 +363,6 @@ class TestGiven:
         with pytest.raises(core.InvalidPointsError, match="600 numbers"):
             core.build_laplacian(fibonacci_sphere(600), boundary_distance=distance)
 
-    def test_too_few_points_of_a_rim_are_refused(self):
+    def test_too_few_points_of_a_boundary_are_refused(self):
         with pytest.raises(core.InvalidPointsError, match="given by 3 different points"):
             core.build_laplacian(square_grid(25), boundary=[0, 1, 2])

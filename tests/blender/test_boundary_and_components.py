@@ -1,4 +1,4 @@
-"""Where the surface ends, the vertex group that names its rim, connected parts, and points that lie alone."""
+"""Where the surface ends, the vertex group that names its boundary, components, and points that lie alone."""
 
 import importlib
 
@@ -21,11 +21,11 @@ def sheet():
     return add_object(points), outermost
 
 
-def test_rim_of_an_open_surface_is_found():
+def test_boundary_of_an_open_surface_is_found():
     obj, outermost = sheet()
     bpy.ops.meshfree.analyze()
     assert (attribute(obj, "lb_boundary") == outermost).all()
-    assert obj.meshfree.rim_count == outermost.sum()
+    assert obj.meshfree.boundary_count == outermost.sum()
     assert obj.meshfree.total_area == pytest.approx(4.0 * 3.0, rel=0.06)  # half a step beyond the outermost or not
     assert np.abs(attribute(obj, "lb_mean_curvature")).max() < 1e-4
 
@@ -34,38 +34,40 @@ def test_closed_surface_has_none():
     obj = add_object(sphere_points() * (1.0, 1.3, 0.7))
     bpy.ops.meshfree.analyze()
     assert not attribute(obj, "lb_boundary").any()
-    assert obj.meshfree.rim_count == 0
+    assert obj.meshfree.boundary_count == 0
 
 
 def test_surface_can_be_taken_as_closed():
     obj, _ = sheet()
     bpy.ops.meshfree.analyze()
     area = obj.meshfree.total_area
-    obj.meshfree.rims = "OFF"
+    obj.meshfree.boundary = "OFF"
     bpy.ops.meshfree.analyze()
     assert not attribute(obj, "lb_boundary").any()
     assert obj.meshfree.total_area > 1.05 * area
 
 
-@pytest.mark.parametrize("rims", ["AUTO", "OFF"])
-def test_vertex_group_names_the_rim(core, rims):
+@pytest.mark.parametrize("boundary", ["AUTO", "OFF"])
+def test_vertex_group_names_the_boundary(core, boundaries):
     obj, outermost = sheet()
     outermost &= local_points(obj)[:, 0] < 1.0
     add_group(obj, "Other", ~outermost)
-    add_group(obj, "Rim", outermost, weight=0.25)
-    obj.vertex_groups["Rim"].add(np.flatnonzero(~outermost)[:50].tolist(), 0.0, "REPLACE")  # weight 0 does not count
-    obj.meshfree.rim_group, obj.meshfree.rims = "Rim", rims
+    add_group(obj, "Boundary", outermost, weight=0.25)
+    obj.vertex_groups["Boundary"].add(
+        np.flatnonzero(~outermost)[:50].tolist(), 0.0, "REPLACE"
+    )  # weight 0 does not count
+    obj.meshfree.boundary_group, obj.meshfree.boundary = "Boundary", boundaries
     bpy.ops.meshfree.analyze()
     assert (attribute(obj, "lb_boundary") == outermost).all()
-    options = core.LaplacianOptions(orient=True, rims=rims.lower())
+    options = core.LaplacianOptions(orient=True, boundary=boundaries.lower())
     laplacian = core.build_laplacian(local_points(obj), options=options, boundary=np.flatnonzero(outermost))
     assert_allclose(attribute(obj, "lb_area"), laplacian.areas, rtol=1e-6)
 
 
 def test_spectrum_uses_the_group_too():
     obj, outermost = sheet()
-    add_group(obj, "Rim", outermost[::-1] & outermost)
-    obj.meshfree.rim_group = "Rim"
+    add_group(obj, "Boundary", outermost[::-1] & outermost)
+    obj.meshfree.boundary_group = "Boundary"
     bpy.ops.meshfree.spectrum(count=3)
     assert (attribute(obj, "lb_boundary") == outermost).all()
 
@@ -74,22 +76,22 @@ class TestChangesOfTheGroup:
     @pytest.fixture
     def obj(self):
         obj, outermost = sheet()
-        add_group(obj, "Rim", outermost)
+        add_group(obj, "Boundary", outermost)
         add_group(obj, "Part", outermost & (local_points(obj)[:, 0] < 2.0))
-        obj.meshfree.rim_group = "Rim"
+        obj.meshfree.boundary_group = "Boundary"
         bpy.ops.meshfree.analyze(modes=3)
         return obj
 
     def test_another_group_makes_results_stale_until_it_is_taken_back(self, obj, result):
         assert not result.is_stale(obj)
         for name in ("Part", "Missing", ""):
-            obj.meshfree.rim_group = name
+            obj.meshfree.boundary_group = name
             assert result.is_stale(obj)
-        obj.meshfree.rim_group = "Rim"
+        obj.meshfree.boundary_group = "Boundary"
         assert not result.is_stale(obj)
 
     def test_another_member_makes_results_stale(self, obj, result):
-        group = obj.vertex_groups["Rim"]
+        group = obj.vertex_groups["Boundary"]
         group.add([500], 1.0, "REPLACE")
         assert result.is_stale(obj)
         group.add([500], 0.0, "REPLACE")
@@ -98,13 +100,13 @@ class TestChangesOfTheGroup:
         assert result.is_stale(obj)
 
     def test_name_of_the_group_and_members_of_others_do_not_matter(self, obj, result):
-        obj.vertex_groups["Rim"].name = "Edge"
-        obj.meshfree.rim_group = "Edge"
+        obj.vertex_groups["Boundary"].name = "Edge"
+        obj.meshfree.boundary_group = "Edge"
         obj.vertex_groups["Part"].add([500], 1.0, "REPLACE")
         assert not result.is_stale(obj)
 
     def test_new_members_get_a_new_operator_and_old_modes_go(self, obj):
-        obj.vertex_groups["Rim"].remove(np.flatnonzero(local_points(obj)[:, 0] > 2.0).tolist())
+        obj.vertex_groups["Boundary"].remove(np.flatnonzero(local_points(obj)[:, 0] > 2.0).tolist())
         area = attribute(obj, "lb_area")
         bpy.ops.meshfree.analyze()
         assert (attribute(obj, "lb_area") != area).any()
@@ -115,7 +117,7 @@ class TestChangesOfTheGroup:
         counting = importlib.import_module(f"{extension.__name__}.operators.objects.counting")
         monkeypatch.setattr(counting, "_PATIENCE", 1e9)
         assert not result.is_stale(obj)
-        obj.vertex_groups["Rim"].add([500], 1.0, "REPLACE")
+        obj.vertex_groups["Boundary"].add([500], 1.0, "REPLACE")
         assert not result.is_stale(obj, glance=True)
         assert result.is_stale(obj)
         assert result.is_stale(obj, glance=True)
@@ -128,20 +130,20 @@ def in_group(obj, name):
 
 def test_group_is_read_with_modifiers_in_use():
     obj, outermost = sheet()
-    add_group(obj, "Rim", outermost)
-    obj.meshfree.rim_group, obj.meshfree.use_modifiers = "Rim", True
+    add_group(obj, "Boundary", outermost)
+    obj.meshfree.boundary_group, obj.meshfree.use_modifiers = "Boundary", True
     obj.modifiers.new("Wave", "WAVE")
     bpy.ops.meshfree.analyze()
     assert (attribute(obj, "lb_boundary") == outermost).all()
 
 
-def test_two_islands_are_two_parts_with_a_constant_mode_each():
+def test_two_components_are_two_parts_with_a_constant_mode_each():
     small, large = sphere_points(500, seed=1), sphere_points(800)
     obj = add_object(np.vstack([small, large + (5.0, 0.0, 0.0)]))
     bpy.ops.meshfree.spectrum(count=4)
     component = attribute(obj, "lb_component")
     assert (component == np.repeat([1, 0], [500, 800])).all()
-    assert obj.meshfree.part_count == 2
+    assert obj.meshfree.component_count == 2
     eigenvalues = np.array(obj["lb_eigenvalues"])
     assert_allclose(eigenvalues[:2], 0.0, atol=1e-6)
     assert eigenvalues[2] > 1.0
