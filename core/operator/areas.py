@@ -66,8 +66,8 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=No
     """
     cloud = read_cloud(points, options, normals, boundary, boundary_distance)
     distance = arc_length(cloud) if options.curvature_correction else cloud.pairs.distance
-    areas = solve_areas(cloud, distance, options).areas * cloud.scaled.scale**2
-    return cloud.scaled.share(areas, NO_AREA)
+    scaled, solution = cloud.scaled, solve_areas(cloud, distance, options)
+    return scaled.scatter(solution.areas * scaled.scale**2 / scaled.copies, NO_AREA)
 
 
 def solve_areas(cloud, distance, options, report=lambda: None):
@@ -94,7 +94,7 @@ def solve_areas(cloud, distance, options, report=lambda: None):
         Eq. (7), which has no bound, gave areas that are not positive.
     """
     lengths = cloud.pairs.lengths
-    target = kernel_integral(lengths, cloud.gaussian) + image_excess(lengths, cloud.boundary)
+    target = kernel_integral(lengths, cloud.gaussian_curvature) + image_excess(lengths, cloud.boundary)
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
     if options.curvature_correction:
         target += _gain(matrix, lengths)

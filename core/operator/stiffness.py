@@ -49,7 +49,7 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     discs.
     """
     pairs = cloud.pairs
-    factor = weight_factor(pairs.lengths, cloud.gaussian)
+    factor = weight_factor(pairs.lengths, cloud.gaussian_curvature)
     lengths = pairs.mean(pairs.lengths)
     scale = pairs.mean(factor) / lengths**4 * areas[pairs.first] * areas[pairs.second]
     own_scale = factor / pairs.lengths**4 * areas**2
