@@ -49,8 +49,11 @@ def find():
 def use_supported():
     """Run this program again in the Python to prefer, unless it runs there already."""
     executable = next(iter(find().values()))
-    if not os.path.samefile(executable, sys.executable):
+    if os.path.samefile(executable, sys.executable):
+        return
+    if os.name == "nt":  # where exec returns to the shell at once
         sys.exit(subprocess.call([executable, *sys.argv]))
+    os.execv(executable, [executable, *sys.argv])  # in its place, so that Ctrl-C finds one program to end
 
 
 def _versions():

@@ -1,11 +1,18 @@
-"""Run the tests: core without Blender, the installed extension in Blender's module, and in a window with real keys."""
+"""Run the tests: core without Blender, the installed extension in Blender's module, and in a window with real keys.
+
+As many suites run side by side as there are processors, while this program makes the environments of the next ones.
+What pytest prints goes to a file per suite in build/tests/, and from there to the screen where a test fails.
+"""
 
 import argparse
-import itertools
+import os
+import re
+import signal
 import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ElementTree
+from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import gui_blender
 import package
@@ -13,80 +20,120 @@ import pythons
 from environments import ROOT, ensure, ensure_blender, isolated
 
 RESULTS = ROOT / "build" / "tests"
-LIMIT = 1800  # seconds for one run of pytest
+LIMIT = 1200  # seconds for one run of pytest
+_SHOWN = 40  # lines of a run that ended without a word of pytest about what failed
 
 
-def run_pytest(name, python, folder, *options):
-    """Run the tests of a folder in an environment and count the outcomes."""
-    print(f"\n{name}: {folder}", flush=True)
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    report = RESULTS / f"{name}.xml"
-    report.unlink(missing_ok=True)
-    command = [str(python), "-m", "pytest", folder, f"--junitxml={report}", *options]
-    began = time.monotonic()
+class Suites:
+    """Runs of pytest side by side."""
+
+    def __init__(self):
+        self._pool = ThreadPoolExecutor(os.cpu_count())
+        self._runs = []
+        self._processes = set()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, *_):
+        """Wait for all; after an error or Ctrl-C end those that run, and start no other."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        if kind is not None:
+            for process in list(self._processes):
+                _end(process)
+        self._pool.shutdown()
+
+    def start(self, name, python, folder):
+        """Run the tests of a folder in an environment as soon as a processor is free."""
+        self._runs.append(self._pool.submit(self._run, name, python, folder))
+
+    def results(self):
+        """Wait for all; return their outcomes by name."""
+        return dict(run.result() for run in as_completed(self._runs))
+
+    def _run(self, name, python, folder):
+        report, log = RESULTS / f"{name}.xml", RESULTS / f"{name}.txt"
+        report.unlink(missing_ok=True)
+        command = [str(python), "-m", "pytest", folder, "-p", "no:cacheprovider", f"--junitxml={report}"]
+        print(f"{name:12} runs {folder}, see {log.relative_to(ROOT)}", flush=True)
+        began = time.monotonic()
+        with log.open("wb") as output:
+            # In a session of its own, so that Ctrl-C reaches it once: by `_end`.
+            options = {"cwd": ROOT, "env": isolated(), "stdin": subprocess.DEVNULL, "start_new_session": True}
+            process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, **options)
+        self._processes.add(process)
+        try:
+            # Blender may crash or hang at exit, after pytest's closing line: that is a failure too.
+            process.wait(LIMIT)
+            ending = f"exit code {process.returncode}"
+        except subprocess.TimeoutExpired:
+            _end(process)
+            ending = f"stopped after {LIMIT} s"
+        self._processes.remove(process)
+        counts = _count(report)
+        sound = process.returncode == 0 and ending.startswith("exit")
+        if not sound and not counts["failed"] and not counts["errors"]:
+            counts["errors"] = 1
+        words = f"{name:12} {_words(counts, time.monotonic() - began)}"
+        text = "" if sound else _failures(log.read_text(encoding="utf-8", errors="replace"))
+        print(text + words + ("" if sound else f", {ending}"), flush=True)
+        return name, counts
+
+
+def _end(process):
+    """End a run that was started here: pytest says where it is and closes its window, or is killed with all it has."""
+    if os.name == "nt":
+        process.kill()
+        return
     try:
-        # Blender may crash or hang at exit, after pytest's closing line: that is a failure too.
-        code = subprocess.run(command, cwd=ROOT, env=isolated(), stdin=subprocess.DEVNULL, timeout=LIMIT).returncode
+        process.send_signal(signal.SIGINT)
+        process.wait(20)
     except subprocess.TimeoutExpired:
-        print(f"{name}: stopped after {LIMIT} s")
-        code = -1
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _count(report):
+    """Count the outcomes in a report of pytest's."""
     suite = ElementTree.parse(report).find("testsuite").attrib if report.exists() else {}
     counts = {word: int(suite.get(key, 0)) for word, key in (("failed", "failures"), ("skipped", "skipped"))}
     counts["errors"] = int(suite.get("errors", 0))
     counts["passed"] = int(suite.get("tests", 0)) - sum(counts.values())
-    if code != 0 and not counts["failed"] and not counts["errors"]:
-        print(f"{name}: exit code {code}")
-        counts["errors"] = 1
-    return {**counts, "seconds": time.monotonic() - began}
+    return counts
 
 
-def run_gui(required):
-    """Run the tests in a window; where this machine cannot have it, say so, and stop if it is required."""
+def _failures(text):
+    """What pytest printed from the first failure on, or its last lines."""
+    found = re.search(r"^=+ (ERRORS|FAILURES) =+$", text, re.MULTILINE)
+    return text[found.start() :] if found else "".join(text.splitlines(keepends=True)[-_SHOWN:])
+
+
+def _words(counts, seconds):
+    words = [f"{counts[word]} {word}" for word in ("failed", "passed", "skipped", "errors") if counts[word]]
+    return f"{', '.join(words)} in {seconds:.2f}s"
+
+
+def start_gui(suites, required):
+    """Start the tests in a window; where this machine cannot have it, say so, and stop if it is required."""
     try:
         gui_blender.ensure()
     except gui_blender.LeftOutError as error:
         if required:
             sys.exit(f"No test ran: {error}")
-        print(f"\nLeft out: tests in a window, for {error}")
-        return {}
+        print(f"Left out: tests in a window, for {error}")
+        return
     version, python = next(iter(pythons.find().items()))
-    python = ensure(f"core-{version}", "test", python)
-    results = {"gui": run_pytest("gui", python, "tests/gui", "--cache-clear")}
-    if results["gui"]["failed"] + results["gui"]["errors"]:
-        # A window on a busy machine may lose a key or draw too late; what fails for a reason fails again.
-        print("\nSome tests in the window failed: these once more")
-        results["gui"] = run_pytest("gui", python, "tests/gui", "--last-failed")
-    return results
+    suites.start("gui", ensure(f"core-{version}", "test", python), "tests/gui")
 
 
-def report(results):
-    """Print a line per run and their sum in pytest's words."""
-    print()
-    for name, counts in results.items():
-        print(f"{name:12} {_words(counts)}")
-    total = {key: sum(counts[key] for counts in results.values()) for key in next(iter(results.values()))}
-    print(f"{f' {_words(total)} ':=^80}")
-    return total["failed"] + total["errors"]
-
-
-def _words(counts):
-    words = [f"{counts[word]} {word}" for word in ("failed", "passed", "skipped", "errors") if counts[word]]
-    return f"{', '.join(words)} in {counts['seconds']:.2f}s"
-
-
-def run_modules(everything):
-    """Run the tests of core and in Blender's module: for the Python to prefer, or for all that can run here."""
-    results = {}
-    found = pythons.find() if everything else dict(itertools.islice(pythons.find().items(), 1))
-    for version, python in found.items():
-        name = f"core-{version}"
-        results[name] = run_pytest(name, ensure(name, "test", python), "tests/core")
-        for blender in pythons.BLENDERS[version][: None if everything else 1]:
-            name = f"blender-{blender}"
-            results[name] = run_pytest(name, ensure_blender(blender, python), "tests/blender")
-    for version in pythons.BLENDERS.keys() - pythons.find().keys():
-        print(f"\nLeft out: Blender {' and '.join(pythons.BLENDERS[version])}, no Python {version} is found")
-    return results
+def start_modules(suites, found, blenders):
+    """Start the tests of core in every Python given, and of the extension in so many versions of Blender for each."""
+    for version, python in found:
+        suites.start(f"core-{version}", ensure(f"core-{version}", "test", python), "tests/core")
+    package.build([package.this_platform()])
+    for version, python in found:
+        for blender in pythons.BLENDERS[version][:blenders]:
+            suites.start(f"blender-{blender}", ensure_blender(blender, python), "tests/blender")
 
 
 def main():
@@ -96,11 +143,25 @@ def main():
     choice.add_argument("--all", action="store_true", help="every supported Python and Blender that can run here")
     choice.add_argument("--gui", action="store_true", help="only those in a window")
     options = parser.parse_args()
-    package.build([package.this_platform()])
-    results = {} if options.gui else run_modules(options.all)
-    if options.gui or options.all:
-        results.update(run_gui(required=options.gui))
-    sys.exit(bool(report(results)))
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # what stops a run from outside ends its suites too
+    began = time.monotonic()
+    found = list(pythons.find().items())
+    with Suites() as suites:
+        if options.gui:
+            package.build([package.this_platform()])
+        else:
+            start_modules(suites, found if options.all else found[:1], None if options.all else 1)
+        if options.gui or options.all:
+            start_gui(suites, required=options.gui)
+        results = suites.results()
+    for version in pythons.BLENDERS.keys() - pythons.find().keys():
+        print(f"Left out: Blender {' and '.join(pythons.BLENDERS[version])}, no Python {version} is found")
+    total = {
+        word: sum(counts[word] for counts in results.values()) for word in ("failed", "passed", "skipped", "errors")
+    }
+    print(f"{f' {_words(total, time.monotonic() - began)} ':=^80}")
+    sys.exit(bool(total["failed"] + total["errors"]))
 
 
 if __name__ == "__main__":
