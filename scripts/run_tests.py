@@ -166,4 +166,7 @@ def main():
 
 if __name__ == "__main__":
     pythons.use_supported()
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit("Stopped, and all that ran is ended")
