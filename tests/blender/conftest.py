@@ -43,11 +43,17 @@ def archive():
 
 @pytest.fixture(autouse=True)
 def empty_scene(installed):
-    """Start every test from an empty scene."""
+    """Start every test from an empty scene; what others computed is still known, for many use the same clouds.
+
+    Tests of the computation itself empty the cache.
+    """
     import bpy
 
-    bpy.ops.wm.read_homefile(use_empty=True)
+    cache = importlib.import_module(f"{MODULE}.operators.running.cache")
+    kept = dict(cache._kept)
+    bpy.ops.wm.read_homefile(use_empty=True)  # which gives the memory back
     assert MODULE in bpy.context.preferences.addons
+    cache._kept.update(kept)
 
 
 @pytest.fixture

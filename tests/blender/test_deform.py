@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import textwrap
+import time
 from types import SimpleNamespace
 
 import bpy
@@ -461,6 +462,7 @@ class TestBake:
         told = []
         steps = bake.MESHFREE_OT_deform_bake._prepared_frames(operator, lambda *progress: told.append(progress))
         while live.find(strip) is None:
+            time.sleep(0.01)  # as a window's timer leaves the processor to the thread
             next(steps)
         assert {stage for stage, _ in told} - {"Frames"}
         assert len(bake.all_steps(steps)) == 4
