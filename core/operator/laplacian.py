@@ -239,7 +239,7 @@ def build_laplacian(
     report("Operator", 0.8)
     if not options.curvature_correction:
         distance = projected_distance(pairs, cloud.normals)
-    stiffness, natural, fixed = assemble_stiffness(
+    stiffness, neumann, dirichlet = assemble_stiffness(
         cloud, distance, solution.areas, options.curvature_correction, lambda: report("Operator", 0.8)
     )
     return LaplaceBeltrami(
@@ -256,8 +256,8 @@ def build_laplacian(
         component=scaled.scatter(cloud.component, -1),
         smoothing_lengths=scaled.scatter(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         stiffness=stiffness,
-        neumann_images=natural,
-        dirichlet_images=fixed,
+        neumann_images=neumann,
+        dirichlet_images=dirichlet,
         options=options,
         notices=notices,
     )

@@ -111,13 +111,13 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         precision=6,
     )
     boundary: EnumProperty(
-        name="Boundaries",
+        name="Boundary",
         description="Where the surface ends, if no Boundary Group is named",
         items=(
             ("AUTO", "Automatic", "Find the points at a boundary, and continue the surface beyond it as in a mirror"),
             ("OFF", "Off (Closed Surface)", "Take the surface as closed, whatever it looks like"),
         ),
-        default=DEFAULTS.boundaries.upper(),
+        default=DEFAULTS.boundary.upper(),
     )
     sheets: BoolProperty(
         name="Keep Close Sheets Apart",
