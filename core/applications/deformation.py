@@ -83,7 +83,7 @@ class Deformer:
     """
 
     def __init__(
-        self, laplacian, handles, anchors=(), rotation_aware=True, weights=None, neighbors=_NEIGHBORS, progress=None
+        self, laplacian, handles, anchors=(), *, rotation_aware=True, weights=None, neighbors=_NEIGHBORS, progress=None
     ):
         report = progress or (lambda stage, fraction: None)
         n = len(laplacian.points)
@@ -141,7 +141,7 @@ class Deformer:
         matrix = free_rows[:, self._free] + sparse.diags_array(self._pull[self._free])
         self._solve = factorize(matrix) if len(self._free) else None
 
-    def solve(self, handle_positions, steps=_STEPS, rtol=_RTOL, start=None, progress=None):
+    def solve(self, handle_positions, *, steps=_STEPS, rtol=_RTOL, start=None, progress=None):
         """Find the points for new positions of the handles.
 
         Parameters

@@ -42,7 +42,7 @@ def signature_energies(spectrum, count=100):
     return np.linspace(low + 2.0 * width, high - 2.0 * width, _at_least_one(count))
 
 
-def heat_kernel_signature(spectrum, times=None, count=100, normalized=False):
+def heat_kernel_signature(spectrum, times=None, *, count=100, normalized=False):
     """Compute the heat kernel signature: how much heat is left at a point some time after it was put there.
 
     Parameters
@@ -81,7 +81,7 @@ def heat_kernel_signature(spectrum, times=None, count=100, normalized=False):
     return spectrum.eigenvectors**2 @ decay
 
 
-def wave_kernel_signature(spectrum, energies=None, count=100):
+def wave_kernel_signature(spectrum, energies=None, *, count=100):
     """Compute the wave kernel signature: the mean chance to meet a particle of some energy at a point.
 
     It tells details apart better than the heat kernel signature, as each energy looks at a narrow band of modes.

@@ -19,7 +19,7 @@ _LEAST = 2e-3  # share of the wide operator everywhere: it connects what the nar
 _GRAZING = 0.1  # least distance from the edge of a set of fixed points, in spacings
 
 
-def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=None):
+def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=None):
     """Solve -Delta u = source.
 
     Parameters
@@ -100,7 +100,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, progress=Non
     return result
 
 
-def harmonic_field(laplacian, fixed, fixed_values, progress=None):
+def harmonic_field(laplacian, fixed, fixed_values, *, progress=None):
     """Spread fixed values smoothly over the surface: Delta f = 0.
 
     Parameters
@@ -134,7 +134,7 @@ def harmonic_field(laplacian, fixed, fixed_values, progress=None):
     index, values = read_values(fixed, fixed_values, len(laplacian.points))
     if not len(index):
         raise InvalidPointsError("No points are fixed, so the field is not determined. Fix at least one point.")
-    result = solve_poisson(laplacian, 0.0, index, values, progress)
+    result = solve_poisson(laplacian, 0.0, index, values, progress=progress)
     return np.clip(result, values.min(), values.max())  # only rounding lies outside
 
 

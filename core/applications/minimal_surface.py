@@ -27,7 +27,7 @@ _LOPSIDED = 0.2  # mean offset of the neighbours over their mean distance at a b
 _RTOL, _PRODUCTS = 1e-6, 500  # of the linear solves
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class MinimalSurface:
     """Points moved towards the least area that their fixed boundary can span.
 
@@ -63,7 +63,7 @@ class MinimalSurface:
 
 
 def minimal_surface(
-    points, fixed, epsilon=1e-4, max_steps=100, options=LaplacianOptions(), callback=None, progress=None
+    points, fixed, *, epsilon=1e-4, max_steps=100, options=LaplacianOptions(), callback=None, progress=None
 ):
     """Move points until the area is the least that the fixed points permit.
 

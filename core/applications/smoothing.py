@@ -19,6 +19,7 @@ def smooth_points(
     laplacian,
     response,
     spectrum=None,
+    *,
     strength=1.0,
     mask=None,
     keep=None,
@@ -75,14 +76,16 @@ def smooth_points(
     """
     if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
-    blend = PointBlend(laplacian, strength, mask, keep, dirichlet)
-    base = smoothing_base(laplacian, dirichlet, progress) if base is None else base
+    blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
+    base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
     rest = laplacian.points - base
     if spectrum is None and callable(response):
-        filtered = chebyshev_filter(laplacian, rest, response, dirichlet, tolerance=_TOLERANCE, progress=progress)
+        filtered = chebyshev_filter(
+            laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
+        )
     elif callable(response):
         end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
-        filtered = spectral_filter(rest, spectrum, laplacian.areas, response, end)
+        filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
     else:
         if spectrum is None:
             spectrum = laplacian.eigenpairs(response, raw=True, dirichlet=dirichlet, progress=progress)
@@ -99,6 +102,7 @@ def smooth_points(
 def fair_points(
     laplacian,
     time=None,
+    *,
     order=3,
     strength=1.0,
     mask=None,
@@ -148,10 +152,19 @@ def fair_points(
     if time is None:
         known = laplacian.component >= 0
         time = 0.5 * np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known])
-    return smooth_points(laplacian, fairing(time, order), None, strength, mask, keep, dirichlet, progress, base)
+    return smooth_points(
+        laplacian,
+        fairing(time, order),
+        strength=strength,
+        mask=mask,
+        keep=keep,
+        dirichlet=dirichlet,
+        progress=progress,
+        base=base,
+    )
 
 
-def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
+def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
     """Move the points along their normals by a vibration mode (Figure 9 of the paper).
 
     Parameters
@@ -189,7 +202,7 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
     return points + (amplitude * np.cos(phase) / largest) * mode[:, None] * laplacian.normals
 
 
-def smoothing_base(laplacian, dirichlet=False, progress=None):
+def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     """Return the part of the points' places that filters leave alone.
 
     Parameters
@@ -285,7 +298,7 @@ class PointBlend:
         A mask, strength or choice that makes no sense.
     """
 
-    def __init__(self, laplacian, strength=1.0, mask=None, keep=None, dirichlet=False):
+    def __init__(self, laplacian, *, strength=1.0, mask=None, keep=None, dirichlet=False):
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         if not np.isfinite(strength):

@@ -16,7 +16,7 @@ from .stiffness import assemble_stiffness
 NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that random points bear
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class LaplaceBeltrami:
     """A discrete Laplace-Beltrami operator on points.
 
@@ -130,7 +130,7 @@ class LaplaceBeltrami:
             return result
         return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (lengths**2 * result)) / areas
 
-    def eigenpairs(self, count, raw=False, dirichlet=False, progress=None):
+    def eigenpairs(self, count, raw=False, *, dirichlet=False, progress=None):
         """Compute the lowest eigenpairs of the negated operator, eq. (12).
 
         Parameters
@@ -186,7 +186,7 @@ class LaplaceBeltrami:
 
 
 def build_laplacian(
-    points, normals=None, options=LaplacianOptions(), boundary=None, boundary_distance=None, progress=None
+    points, normals=None, options=LaplacianOptions(), *, boundary=None, boundary_distance=None, progress=None
 ):
     """Build the operator from a point cloud.
 
@@ -285,4 +285,4 @@ def narrow_laplacian(laplacian, neighbors=NARROW):
         bandwidth_factor=1.0 / 3.0,  # the support of 3 h ends at the last neighbour
         projection="off",
     )
-    return build_laplacian(laplacian.surface_points, laplacian.normals, options, laplacian.boundary)
+    return build_laplacian(laplacian.surface_points, laplacian.normals, options, boundary=laplacian.boundary)

@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Stability:
     """What Theorem 1 asks of a cloud, and what it promises of the operator.
 
@@ -72,11 +72,11 @@ def check_stability(laplacian):
     stiffness, areas = laplacian.stiffness[known][:, known], laplacian.areas[known]
     largest = stiffness.diagonal().max()
     return Stability(
-        float(areas.max() / areas.min()),
-        float(reach.max()),
-        int(np.diff(stiffness.indptr).max()),
-        float((laplacian.smoothing_lengths[known[first]] / reach).min()),
-        float(np.abs(stiffness.sum(axis=1)).max() / largest),
-        float(np.abs(stiffness.sum(axis=0)).max() / largest),
-        int(connected_components(stiffness, directed=False, return_labels=False)),
+        area_ratio=float(areas.max() / areas.min()),
+        fill_distance=float(reach.max()),
+        most_neighbors=int(np.diff(stiffness.indptr).max()),
+        least_bandwidth=float((laplacian.smoothing_lengths[known[first]] / reach).min()),
+        row_sum=float(np.abs(stiffness.sum(axis=1)).max() / largest),
+        column_sum=float(np.abs(stiffness.sum(axis=0)).max() / largest),
+        parts=int(connected_components(stiffness, directed=False, return_labels=False)),
     )
