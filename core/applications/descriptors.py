@@ -121,7 +121,7 @@ def wave_kernel_signature(spectrum, energies=None, *, count=100):
 def _nonzero(spectrum):
     """Return the number of constant modes and the eigenvalues of all others."""
     values = spectrum.eigenvalues
-    inverse_area = np.max(spectrum.eigenvectors[:, 0] ** 2)  # that of the part on which a constant mode lives
+    inverse_area = np.max(spectrum.eigenvectors[:, 0] ** 2)  # that of the component on which a constant mode lives
     constant = int(np.searchsorted(values, _ZERO * 4.0 * np.pi * inverse_area))
     if constant == len(values):
         raise PointCloudError(

@@ -69,14 +69,14 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
     source = _read_source(source, count)
     index, values = read_values(fixed, fixed_values, count)
     report("Equations", 0.0)
-    part = coupled_components(laplacian)
-    known = part >= 0
+    component = coupled_components(laplacian)
+    known = component >= 0
     is_fixed = np.zeros(count, dtype=bool)
     is_fixed[index] = True
-    held = np.zeros(part.max() + 1, dtype=bool)
-    held[part[known & is_fixed]] = True
-    loose = np.flatnonzero(known)[~held[part[known]]]  # points of parts without any fixed point
-    source = _without_mean(laplacian.areas, source, part, loose)
+    held = np.zeros(component.max() + 1, dtype=bool)
+    held[component[known & is_fixed]] = True
+    loose = np.flatnonzero(known)[~held[component[known]]]  # points of components without any fixed point
+    source = _without_mean(laplacian.areas, source, component, loose)
 
     result = np.full(count, values.mean() if len(values) else 0.0)
     level = result[0]
@@ -96,7 +96,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
     result[free] = solve_symmetric(matrix, load, result[free], 1.0 / matrix.diagonal(), report)
     if laplacian.options.symbol_correction:
         result[loose] -= SECOND_MOMENT / 8.0 * laplacian.smoothing_lengths[loose] ** 2 * source[loose]
-    result[loose] += level - _means(laplacian.areas, result, part, loose)
+    result[loose] += level - _means(laplacian.areas, result, component, loose)
     return result
 
 
@@ -183,22 +183,22 @@ def _read_source(source, count):
     return np.broadcast_to(given.astype(np.float64), count)
 
 
-def _means(areas, values, part, rows):
-    """Return the area-weighted mean of values (n,) over the part of each of some rows, (k,)."""
-    part, areas = part[rows], areas[rows]
-    total = np.bincount(part, areas)
-    return (np.bincount(part, areas * values[rows]) / np.where(total > 0.0, total, 1.0))[part]
+def _means(areas, values, component, rows):
+    """Return the area-weighted mean of values (n,) over the component of each of some rows, (k,)."""
+    component, areas = component[rows], areas[rows]
+    total = np.bincount(component, areas)
+    return (np.bincount(component, areas * values[rows]) / np.where(total > 0.0, total, 1.0))[component]
 
 
-def _without_mean(areas, source, part, rows):
-    """Take the mean out of the source on parts that nothing holds, or raise if there is one."""
-    mean, size = (_means(areas, values, part, rows) for values in (source, np.abs(source)))
+def _without_mean(areas, source, component, rows):
+    """Take the mean out of the source on components that nothing holds, or raise if there is one."""
+    mean, size = (_means(areas, values, component, rows) for values in (source, np.abs(source)))
     wrong = np.flatnonzero(np.abs(mean) > _MEAN * size)
     if len(wrong):
         raise PointCloudError(
             f"The source has the mean {mean[wrong[0]]:.3g} over a component of"
-            f" {np.count_nonzero(part == part[rows[wrong[0]]])} points where nothing is fixed: only sources of"
-            " mean zero have a solution there. Subtract the area-weighted mean of each part, or fix a point."
+            f" {np.count_nonzero(component == component[rows[wrong[0]]])} points where nothing is fixed: only sources"
+            " of mean zero have a solution there. Subtract the area-weighted mean of each component, or fix a point."
         )
     result = source.copy()
     result[rows] -= mean

@@ -284,7 +284,7 @@ def check_modes(count, spectrum, areas):
     constant = int(np.count_nonzero(spectrum.eigenvalues < _ZERO * 4.0 * np.pi / areas.sum()))
     if count < constant:
         raise PointCloudError(
-            f"The first {constant} modes are the constants of as many separate parts, and {count} of them cannot"
+            f"The first {constant} modes are the constants of as many components, and {count} of them cannot"
             f" be chosen. Keep at least {constant} modes."
         )
     return int(count)

@@ -30,7 +30,7 @@ def smooth_points(
     """Filter the shape of the surface by frequency.
 
     The coordinates are three functions on the points. Each component keeps its centre, so that the result moves
-    and turns with the points, and parts do not collapse into each other.
+    and turns with the points, and components do not collapse into each other.
 
     Parameters
     ----------
@@ -89,11 +89,11 @@ def smooth_points(
     else:
         if spectrum is None:
             spectrum = laplacian.eigenpairs(response, raw=True, dirichlet=dirichlet, progress=progress)
-        parts = laplacian.component.max() + 1
-        if not dirichlet and response <= parts:
+        components = laplacian.component.max() + 1
+        if not dirichlet and response <= components:
             raise PointCloudError(
-                f"The first {response} modes move {parts} component(s) as a whole and have no shape. Keep"
-                f" at least {parts + 3} modes."
+                f"The first {response} modes move {components} component(s) as a whole and have no shape. Keep"
+                f" at least {components + 3} modes."
             )
         filtered = spectral_filter(rest, spectrum, laplacian.areas, response)
     return blend(base + filtered)
@@ -218,15 +218,15 @@ def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     ndarray, (n, 3)
         The centre of each component or, with a fixed boundary, the harmonic surface that spans it [L].
     """
-    points, part = laplacian.points, laplacian.component
+    points, component = laplacian.points, laplacian.component
     base = points.copy()
-    known = part >= 0
-    base[known] = _centers(laplacian, laplacian.areas)[part[known]]
+    known = component >= 0
+    base[known] = _centers(laplacian, laplacian.areas)[component[known]]
     if dirichlet:
         boundary = boundary_places(laplacian)
         pull = laplacian.dirichlet[1]
         order, root, multiply = corrected_operator(laplacian, dirichlet=True, raw=True)
-        # In terms of the distance from the centre: parts without a boundary, whose equations are singular, stay there.
+        # As distances from the centre: where there is no boundary the equations are singular, and all stays in place.
         force = (pull @ np.where(laplacian.near_boundary[:, None], boundary - base, 0.0))[order] * root[:, None]
         operator = LinearOperator((len(order),) * 2, matvec=multiply, dtype=np.float64)
         base[order] += root[:, None] * np.column_stack(
@@ -236,12 +236,12 @@ def smoothing_base(laplacian, *, dirichlet=False, progress=None):
 
 
 def _centers(laplacian, weights):
-    """Return the weighted mean of the points of each component, (parts, 3); that of weight zero is not used."""
+    """Return the weighted mean of the points of each component, (components, 3); that of weight zero is not used."""
     known = laplacian.component >= 0
-    part, weights = laplacian.component[known], weights[known]
-    total = np.bincount(part, weights)
+    component, weights = laplacian.component[known], weights[known]
+    total = np.bincount(component, weights)
     total[total == 0.0] = 1.0
-    sums = [np.bincount(part, weights * column) for column in laplacian.points[known].T]
+    sums = [np.bincount(component, weights * column) for column in laplacian.points[known].T]
     return np.column_stack(sums) / total[:, None]
 
 
@@ -321,9 +321,9 @@ class PointBlend:
         if keep is not None and dirichlet:
             raise PointCloudError("A boundary that stays fixes the size already: keep neither area nor volume with it.")
         if keep == "volume" and laplacian.boundary.any():
-            parts = len(np.unique(laplacian.component[laplacian.boundary]))
+            components = len(np.unique(laplacian.component[laplacian.boundary]))
             raise PointCloudError(
-                f"Components that have a boundary and enclose no volume: {parts}. Keep the area instead."
+                f"Components that have a boundary and enclose no volume: {components}. Keep the area instead."
             )
 
     def __call__(self, filtered):
@@ -332,12 +332,12 @@ class PointBlend:
         if self.keep is None or not self.weights.any():
             return points + self.weights[:, None] * (filtered - points)
         known = self.laplacian.component >= 0
-        part = np.where(known, self.laplacian.component, 0)
-        center = _centers(self.laplacian, self.laplacian.areas * self.mask)[part]
+        component = np.where(known, self.laplacian.component, 0)
+        center = _centers(self.laplacian, self.laplacian.areas * self.mask)[component]
 
         def result(scale):
-            return points + self.weights[:, None] * (center + scale[part][:, None] * (filtered - center) - points)
+            return points + self.weights[:, None] * (center + scale[component][:, None] * (filtered - center) - points)
 
         measure = SurfaceSize(self.laplacian, self.keep)
-        touched = np.bincount(part, self.weights) != 0.0
+        touched = np.bincount(component, self.weights) != 0.0
         return result(match_size(lambda scale: measure(result(scale)), measure.before, touched))
