@@ -13,7 +13,7 @@ _CHOICES = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LaplacianOptions:
     """Settings of `build_laplacian`.
 

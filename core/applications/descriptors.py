@@ -42,7 +42,7 @@ def signature_energies(spectrum, count=100):
     return np.linspace(low + 2.0 * width, high - 2.0 * width, _at_least_one(count))
 
 
-def heat_kernel_signature(spectrum, times=None, count=100, normalized=False):
+def heat_kernel_signature(spectrum, times=None, *, count=100, normalized=False):
     """Compute the heat kernel signature: how much heat is left at a point some time after it was put there.
 
     Parameters
@@ -81,7 +81,7 @@ def heat_kernel_signature(spectrum, times=None, count=100, normalized=False):
     return spectrum.eigenvectors**2 @ decay
 
 
-def wave_kernel_signature(spectrum, energies=None, count=100):
+def wave_kernel_signature(spectrum, energies=None, *, count=100):
     """Compute the wave kernel signature: the mean chance to meet a particle of some energy at a point.
 
     It tells details apart better than the heat kernel signature, as each energy looks at a narrow band of modes.
@@ -121,7 +121,7 @@ def wave_kernel_signature(spectrum, energies=None, count=100):
 def _nonzero(spectrum):
     """Return the number of constant modes and the eigenvalues of all others."""
     values = spectrum.eigenvalues
-    inverse_area = np.max(spectrum.eigenvectors[:, 0] ** 2)  # that of the part on which a constant mode lives
+    inverse_area = np.max(spectrum.eigenvectors[:, 0] ** 2)  # that of the component on which a constant mode lives
     constant = int(np.searchsorted(values, _ZERO * 4.0 * np.pi * inverse_area))
     if constant == len(values):
         raise PointCloudError(

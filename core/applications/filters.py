@@ -46,7 +46,7 @@ def fairing(time, order=3):
     return lambda eigenvalues: 1.0 / (1.0 + (time * np.asarray(eigenvalues)) ** order)
 
 
-def band(low, high=np.inf, softness=0.1):
+def band(low, high=np.inf, *, softness=0.1):
     """Return the response that keeps the eigenvalues from low to high and fades out on both sides.
 
     Parameters
@@ -75,7 +75,7 @@ def band(low, high=np.inf, softness=0.1):
     return respond
 
 
-def boost(gain, low, high=np.inf, softness=0.25):
+def boost(gain, low, high=np.inf, *, softness=0.25):
     """Return the response that multiplies the details of a `band` by a gain and keeps all else.
 
     Parameters
@@ -87,11 +87,11 @@ def boost(gain, low, high=np.inf, softness=0.25):
     """
     if not np.isfinite(gain):
         raise PointCloudError(f"The gain of the details is {gain!r}. Use a finite number.")
-    part = band(low, high, softness)
+    part = band(low, high, softness=softness)
     return lambda eigenvalues: 1.0 + (gain - 1.0) * part(eigenvalues)
 
 
-def spectral_filter(values, spectrum, areas, response, rest=0.0):
+def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
     """Filter a function by its modes.
 
     Parameters
@@ -144,7 +144,7 @@ def spectral_filter(values, spectrum, areas, response, rest=0.0):
     return result.reshape(values.shape)
 
 
-def chebyshev_filter(laplacian, values, response, dirichlet=False, raw=False, tolerance=1e-4, progress=None):
+def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False, tolerance=1e-4, progress=None):
     """Filter a function by a polynomial of the operator, without any eigenvectors.
 
     The result is that of `spectral_filter` with all modes: the polynomial is that of the operator with the symbol
@@ -284,7 +284,7 @@ def check_modes(count, spectrum, areas):
     constant = int(np.count_nonzero(spectrum.eigenvalues < _ZERO * 4.0 * np.pi / areas.sum()))
     if count < constant:
         raise PointCloudError(
-            f"The first {constant} modes are the constants of as many separate parts, and {count} of them cannot"
+            f"The first {constant} modes are the constants of as many components, and {count} of them cannot"
             f" be chosen. Keep at least {constant} modes."
         )
     return int(count)

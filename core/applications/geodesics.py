@@ -13,7 +13,7 @@ _BEND = 0.35  # sine of half the angle between two normals, at most, at which an
 _GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point: the surface is there
 
 
-def geodesic_distance(laplacian, sources, progress=None):
+def geodesic_distance(laplacian, sources, *, progress=None):
     """Measure the distance along the surface from the nearest of some points.
 
     Parameters

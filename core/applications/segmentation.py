@@ -20,7 +20,7 @@ _LEAST = 0.03  # a cluster of a smaller share of the mean area is no part, but a
 _ROUNDS = 4  # of leaving such clusters out
 
 
-def nodal_domains(values, laplacian, threshold=0.02, bridge=0.1, smallest=5):
+def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
     """Divide the points into connected sets on which a function keeps its sign.
 
     Points hang together through their nearest neighbours on the same sheet, so that two domains of one sign do not join
@@ -79,7 +79,7 @@ def nodal_domains(values, laplacian, threshold=0.02, bridge=0.1, smallest=5):
     return _by_size(graph, domain, values)
 
 
-def segment(laplacian, parts, spectrum=None, progress=None):
+def segment(laplacian, parts, *, spectrum=None, progress=None):
     """Divide the surface into a number of components, such as the limbs of a figure.
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a

@@ -19,6 +19,7 @@ def smooth_points(
     laplacian,
     response,
     spectrum=None,
+    *,
     strength=1.0,
     mask=None,
     keep=None,
@@ -29,7 +30,7 @@ def smooth_points(
     """Filter the shape of the surface by frequency.
 
     The coordinates are three functions on the points. Each component keeps its centre, so that the result moves
-    and turns with the points, and parts do not collapse into each other.
+    and turns with the points, and components do not collapse into each other.
 
     Parameters
     ----------
@@ -75,22 +76,24 @@ def smooth_points(
     """
     if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
-    blend = PointBlend(laplacian, strength, mask, keep, dirichlet)
-    base = smoothing_base(laplacian, dirichlet, progress) if base is None else base
+    blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
+    base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
     rest = laplacian.points - base
     if spectrum is None and callable(response):
-        filtered = chebyshev_filter(laplacian, rest, response, dirichlet, tolerance=_TOLERANCE, progress=progress)
+        filtered = chebyshev_filter(
+            laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
+        )
     elif callable(response):
         end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
-        filtered = spectral_filter(rest, spectrum, laplacian.areas, response, end)
+        filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
     else:
         if spectrum is None:
             spectrum = laplacian.eigenpairs(response, raw=True, dirichlet=dirichlet, progress=progress)
-        parts = laplacian.component.max() + 1
-        if not dirichlet and response <= parts:
+        components = laplacian.component.max() + 1
+        if not dirichlet and response <= components:
             raise PointCloudError(
-                f"The first {response} modes move {parts} component(s) as a whole and have no shape. Keep"
-                f" at least {parts + 3} modes."
+                f"The first {response} modes move {components} component(s) as a whole and have no shape. Keep"
+                f" at least {components + 3} modes."
             )
         filtered = spectral_filter(rest, spectrum, laplacian.areas, response)
     return blend(base + filtered)
@@ -99,6 +102,7 @@ def smooth_points(
 def fair_points(
     laplacian,
     time=None,
+    *,
     order=3,
     strength=1.0,
     mask=None,
@@ -148,10 +152,19 @@ def fair_points(
     if time is None:
         known = laplacian.component >= 0
         time = 0.5 * np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known])
-    return smooth_points(laplacian, fairing(time, order), None, strength, mask, keep, dirichlet, progress, base)
+    return smooth_points(
+        laplacian,
+        fairing(time, order),
+        strength=strength,
+        mask=mask,
+        keep=keep,
+        dirichlet=dirichlet,
+        progress=progress,
+        base=base,
+    )
 
 
-def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
+def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
     """Move the points along their normals by a vibration mode (Figure 9 of the paper).
 
     Parameters
@@ -189,7 +202,7 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
     return points + (amplitude * np.cos(phase) / largest) * mode[:, None] * laplacian.normals
 
 
-def smoothing_base(laplacian, dirichlet=False, progress=None):
+def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     """Return the part of the points' places that filters leave alone.
 
     Parameters
@@ -205,15 +218,15 @@ def smoothing_base(laplacian, dirichlet=False, progress=None):
     ndarray, (n, 3)
         The centre of each component or, with a fixed boundary, the harmonic surface that spans it [L].
     """
-    points, part = laplacian.points, laplacian.component
+    points, component = laplacian.points, laplacian.component
     base = points.copy()
-    known = part >= 0
-    base[known] = _centers(laplacian, laplacian.areas)[part[known]]
+    known = component >= 0
+    base[known] = _centers(laplacian, laplacian.areas)[component[known]]
     if dirichlet:
         boundary = boundary_places(laplacian)
         pull = laplacian.dirichlet[1]
         order, root, multiply = corrected_operator(laplacian, dirichlet=True, raw=True)
-        # In terms of the distance from the centre: parts without a boundary, whose equations are singular, stay there.
+        # As distances from the centre: where there is no boundary the equations are singular, and all stays in place.
         force = (pull @ np.where(laplacian.near_boundary[:, None], boundary - base, 0.0))[order] * root[:, None]
         operator = LinearOperator((len(order),) * 2, matvec=multiply, dtype=np.float64)
         base[order] += root[:, None] * np.column_stack(
@@ -223,12 +236,12 @@ def smoothing_base(laplacian, dirichlet=False, progress=None):
 
 
 def _centers(laplacian, weights):
-    """Return the weighted mean of the points of each component, (parts, 3); that of weight zero is not used."""
+    """Return the weighted mean of the points of each component, (components, 3); that of weight zero is not used."""
     known = laplacian.component >= 0
-    part, weights = laplacian.component[known], weights[known]
-    total = np.bincount(part, weights)
+    component, weights = laplacian.component[known], weights[known]
+    total = np.bincount(component, weights)
     total[total == 0.0] = 1.0
-    sums = [np.bincount(part, weights * column) for column in laplacian.points[known].T]
+    sums = [np.bincount(component, weights * column) for column in laplacian.points[known].T]
     return np.column_stack(sums) / total[:, None]
 
 
@@ -285,7 +298,7 @@ class PointBlend:
         A mask, strength or choice that makes no sense.
     """
 
-    def __init__(self, laplacian, strength=1.0, mask=None, keep=None, dirichlet=False):
+    def __init__(self, laplacian, *, strength=1.0, mask=None, keep=None, dirichlet=False):
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         if not np.isfinite(strength):
@@ -308,9 +321,9 @@ class PointBlend:
         if keep is not None and dirichlet:
             raise PointCloudError("A boundary that stays fixes the size already: keep neither area nor volume with it.")
         if keep == "volume" and laplacian.boundary.any():
-            parts = len(np.unique(laplacian.component[laplacian.boundary]))
+            components = len(np.unique(laplacian.component[laplacian.boundary]))
             raise PointCloudError(
-                f"Components that have a boundary and enclose no volume: {parts}. Keep the area instead."
+                f"Components that have a boundary and enclose no volume: {components}. Keep the area instead."
             )
 
     def __call__(self, filtered):
@@ -319,12 +332,12 @@ class PointBlend:
         if self.keep is None or not self.weights.any():
             return points + self.weights[:, None] * (filtered - points)
         known = self.laplacian.component >= 0
-        part = np.where(known, self.laplacian.component, 0)
-        center = _centers(self.laplacian, self.laplacian.areas * self.mask)[part]
+        component = np.where(known, self.laplacian.component, 0)
+        center = _centers(self.laplacian, self.laplacian.areas * self.mask)[component]
 
         def result(scale):
-            return points + self.weights[:, None] * (center + scale[part][:, None] * (filtered - center) - points)
+            return points + self.weights[:, None] * (center + scale[component][:, None] * (filtered - center) - points)
 
         measure = SurfaceSize(self.laplacian, self.keep)
-        touched = np.bincount(part, self.weights) != 0.0
+        touched = np.bincount(component, self.weights) != 0.0
         return result(match_size(lambda scale: measure(result(scale)), measure.before, touched))

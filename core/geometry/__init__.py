@@ -6,21 +6,3 @@ from .distances import arc_length, arc_squared, circle_arc, pair_heights, projec
 from .nearest import find_nearest
 from .points import FEWEST, as_indices, as_mask, check_points, check_values
 from .quadrics import frames
-
-__all__ = [
-    "FEWEST",
-    "SMALLEST",
-    "arc_length",
-    "arc_squared",
-    "as_indices",
-    "as_mask",
-    "check_points",
-    "check_values",
-    "circle_arc",
-    "estimate_normals",
-    "find_nearest",
-    "frames",
-    "pair_heights",
-    "projected_distance",
-    "read_cloud",
-]

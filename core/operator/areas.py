@@ -44,7 +44,7 @@ class AreaSolution:
     converged: bool
 
 
-def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=None, boundary_distance=None):
+def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary=None, boundary_distance=None):
     """Estimate the area element of every point, the operator's own, without the operator.
 
     Parameters

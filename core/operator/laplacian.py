@@ -16,7 +16,7 @@ from .stiffness import assemble_stiffness
 NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that random points bear
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class LaplaceBeltrami:
     """A discrete Laplace-Beltrami operator on points.
 
@@ -130,7 +130,7 @@ class LaplaceBeltrami:
             return result
         return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (lengths**2 * result)) / areas
 
-    def eigenpairs(self, count, raw=False, dirichlet=False, progress=None):
+    def eigenpairs(self, count, raw=False, *, dirichlet=False, progress=None):
         """Compute the lowest eigenpairs of the negated operator, eq. (12).
 
         Parameters
@@ -186,7 +186,7 @@ class LaplaceBeltrami:
 
 
 def build_laplacian(
-    points, normals=None, options=LaplacianOptions(), boundary=None, boundary_distance=None, progress=None
+    points, normals=None, options=LaplacianOptions(), *, boundary=None, boundary_distance=None, progress=None
 ):
     """Build the operator from a point cloud.
 
@@ -239,7 +239,7 @@ def build_laplacian(
     report("Operator", 0.8)
     if not options.curvature_correction:
         distance = projected_distance(pairs, cloud.normals)
-    stiffness, natural, fixed = assemble_stiffness(
+    stiffness, neumann, dirichlet = assemble_stiffness(
         cloud, distance, solution.areas, options.curvature_correction, lambda: report("Operator", 0.8)
     )
     return LaplaceBeltrami(
@@ -256,8 +256,8 @@ def build_laplacian(
         component=scaled.scatter(cloud.component, -1),
         smoothing_lengths=scaled.scatter(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         stiffness=stiffness,
-        neumann_images=natural,
-        dirichlet_images=fixed,
+        neumann_images=neumann,
+        dirichlet_images=dirichlet,
         options=options,
         notices=notices,
     )
@@ -285,4 +285,4 @@ def narrow_laplacian(laplacian, neighbors=NARROW):
         bandwidth_factor=1.0 / 3.0,  # the support of 3 h ends at the last neighbour
         projection="off",
     )
-    return build_laplacian(laplacian.surface_points, laplacian.normals, options, laplacian.boundary)
+    return build_laplacian(laplacian.surface_points, laplacian.normals, options, boundary=laplacian.boundary)

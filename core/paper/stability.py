@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Stability:
     """What Theorem 1 asks of a cloud, and what it promises of the operator.
 
@@ -24,7 +24,7 @@ class Stability:
     row_sum, column_sum : float
         Largest entry of L e and of areas . L, relative to the largest diagonal entry: both vanish, for e spans the
         kernel of L and the areas that of its transpose.
-    parts : int
+    components : int
         Dimension of the kernel: components of the operator's graph.
     """
 
@@ -34,7 +34,7 @@ class Stability:
     least_bandwidth: float
     row_sum: float
     column_sum: float
-    parts: int
+    components: int
 
     def concerns(self):
         """Return a sentence for each assumption that does not hold comfortably; none for a sound operator."""
@@ -48,8 +48,8 @@ class Stability:
             )
         if self.most_neighbors > 5000:
             found.append(f"(A3) One support holds {self.most_neighbors} points.")
-        if self.parts > 1:
-            found.append(f"The operator falls into {self.parts} parts, each with its own constant.")
+        if self.components > 1:
+            found.append(f"The operator falls into {self.components} components, each with its own constant.")
         return found
 
 
@@ -72,11 +72,11 @@ def check_stability(laplacian):
     stiffness, areas = laplacian.stiffness[known][:, known], laplacian.areas[known]
     largest = stiffness.diagonal().max()
     return Stability(
-        float(areas.max() / areas.min()),
-        float(reach.max()),
-        int(np.diff(stiffness.indptr).max()),
-        float((laplacian.smoothing_lengths[known[first]] / reach).min()),
-        float(np.abs(stiffness.sum(axis=1)).max() / largest),
-        float(np.abs(stiffness.sum(axis=0)).max() / largest),
-        int(connected_components(stiffness, directed=False, return_labels=False)),
+        area_ratio=float(areas.max() / areas.min()),
+        fill_distance=float(reach.max()),
+        most_neighbors=int(np.diff(stiffness.indptr).max()),
+        least_bandwidth=float((laplacian.smoothing_lengths[known[first]] / reach).min()),
+        row_sum=float(np.abs(stiffness.sum(axis=1)).max() / largest),
+        column_sum=float(np.abs(stiffness.sum(axis=0)).max() / largest),
+        components=int(connected_components(stiffness, directed=False, return_labels=False)),
     )
