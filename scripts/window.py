@@ -194,12 +194,16 @@ class Window:
             self.python("None", DRAWING)
 
     def wait_until(self, expression, seconds=30):
-        """Ask until an expression is true, and return its value."""
+        """Ask until an expression is true in Blender, and return its value."""
+        return self.wait_for(lambda: self.python(expression), expression, seconds)
+
+    def wait_for(self, condition, meaning, seconds=30):
+        """Ask until a function without arguments, about the screen for instance, returns what is true; return that."""
         until = time.monotonic() + seconds
-        while not (value := self.python(expression)):
+        while not (value := condition()):
             if time.monotonic() > until:
                 self.shot("waited_in_vain")
-                raise WindowError(f"Not true within {seconds} s: {expression}")
+                raise WindowError(f"Not true within {seconds} s: {meaning}")
             time.sleep(0.02)
         return value
 

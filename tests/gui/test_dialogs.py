@@ -77,18 +77,19 @@ class TestDialogs:
     def test_closing(self, cloud, name):
         closed = cloud.pixels(cloud.region())
         cloud.search(name)
-        opened = cloud.pixels(cloud.region())
-        assert (closed != opened).any(axis=2).sum() > 5000
+        cloud.wait_for(
+            lambda: (closed != cloud.pixels(cloud.region())).any(axis=2).sum() > 5000, "the dialog is on the screen"
+        )
         cloud.key("Escape")
         cloud.point_at_view()
-        assert cloud.python(WORKING) == []
+        cloud.wait_until(f"not {WORKING}")
         assert cloud.python(UNCHANGED)
 
     def test_a_click_outside(self, cloud):
         cloud.search("Smooth Points")
         x, y, width, height = cloud.region()
         cloud.click(x + 0.05 * width, y + 0.95 * height)
-        assert cloud.python(WORKING) == []
+        cloud.wait_until(f"not {WORKING}")
         assert cloud.python(UNCHANGED)
         cloud.key("Escape")
         assert cloud.python(UNCHANGED)

@@ -86,7 +86,7 @@ class TestPresets:
         gui.type("Mine")
         gui.shot("preset_dialog")
         gui.key("Return", "Return")  # of the name, of the dialog
-        assert gui.python(PRESET_FILES) == ["Mine.py"]
+        gui.wait_for(lambda: gui.python(PRESET_FILES) == ["Mine.py"], "the preset is a file")
 
         gui.python(f"{NEIGHBORS} = {usual}")
         gui.click(*menu)
@@ -95,7 +95,7 @@ class TestPresets:
         gui.wait_until(f"{NEIGHBORS} == {usual + 7}")
 
         gui.press("meshfree.add_preset(remove_active=True", across=0.84)
-        assert gui.python(PRESET_FILES) == []
+        gui.wait_for(lambda: gui.python(PRESET_FILES) == [], "the file of the preset is gone")
 
 
 class TestView:
@@ -109,19 +109,23 @@ class TestView:
         settings = "bpy.data.objects['Cloud'].meshfree"
         gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
         gui.python(f"{settings}.histogram = {settings}.plot_eigenvalues = False")
-        shown = colors(gui.pixels(corner(gui)))
-        assert shown > 1000
+
+        def drawn():
+            return colors(gui.pixels(corner(gui)))
+
+        gui.wait_for(lambda: drawn() > 1000, "the legend is drawn")
+        shown = drawn()
         gui.python(f"{settings}.histogram = {settings}.plot_eigenvalues = True")
         gui.point_at_view()
         gui.key("KP_Divide")
         gui.wait_until("view3d()[0].spaces.active.local_view is not None")
-        assert colors(gui.pixels(corner(gui))) == pytest.approx(shown, rel=0.1)
+        gui.wait_for(lambda: drawn() == pytest.approx(shown, rel=0.1), "the legend is drawn as before")
         gui.python("view3d()[0].spaces.active.overlay.show_overlays = False")
-        assert colors(gui.pixels(corner(gui))) < 100
+        gui.wait_for(lambda: drawn() < 100, "no legend is drawn")
         gui.python("view3d()[0].spaces.active.overlay.show_overlays = True")
         gui.key("KP_Divide")
         gui.wait_until("view3d()[0].spaces.active.local_view is None")
-        assert colors(gui.pixels(corner(gui))) == pytest.approx(shown, rel=0.1)
+        gui.wait_for(lambda: drawn() == pytest.approx(shown, rel=0.1), "the legend is drawn as before")
 
     def test_the_active_object_outside_of_the_local_view(self, gui):
         add_sphere(gui)
@@ -163,9 +167,8 @@ class TestSidebar:
         around = (x - 160, y - 30, 330, 160)
         assert red(gui.pixels(around)) == 0
         gui.move(x + 3, y + 1)
-        gui.python("time.sleep(1.5)")
-        gui.settle()
-        assert red(gui.pixels(around)) > 100  # as Blender writes why a button is disabled
+        # As Blender writes why a button is disabled, some time after the mouse came to rest.
+        gui.wait_for(lambda: red(gui.pixels(around)) > 100, "red words in a tooltip")
         assert not gui.python("bpy.ops.meshfree.separate_by_segment.poll()")
 
     def test_the_info_log_has_the_words_of_scripts(self, gui):

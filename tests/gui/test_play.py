@@ -104,7 +104,7 @@ class TestAnalysis:
         gui.wait_until(ANALYZED, 60)
         gui.settle()
         assert gui.python("view3d()[0].spaces.active.shading.type") == "MATERIAL"
-        assert colored(gui.pixels(middle)) > gray + 20000
+        gui.wait_for(lambda: colored(gui.pixels(middle)) > gray + 20000, "the points are colored", 240)
 
 
 class TestJobs:
@@ -148,7 +148,7 @@ class TestJobs:
         add_sphere(gui, 500)
         gui.search(name)
         gui.key("Escape")  # no error in Python is seen, says the fixture
-        assert gui.python(WORKING) == []
+        gui.wait_until(f"not {WORKING}")
         assert gui.python(UNCHANGED)
 
     def test_orbit_while_it_works(self, gui):
@@ -158,7 +158,7 @@ class TestJobs:
         before = gui.python(view)
         x, y = gui.view_center()
         gui.drag((x, y), (x + 100, y + 30), "middle")
-        assert gui.python(view) != before
+        gui.wait_for(lambda: gui.python(view) != before, "the view has turned")
         finish(gui)
         assert gui.python("bpy.context.object.data.shape_keys.key_blocks.keys()") == ["Basis", "Smooth"]
 
@@ -192,7 +192,7 @@ class TestDeformation:
         gui.wait_until("'Cloud Handle' in bpy.data.objects", 60)
         finish(gui)
         gui.click(*gui.python("on_screen(bpy.data.objects['Cloud Handle'].matrix_world.translation)"))
-        assert gui.python("bpy.context.object.name") == "Cloud Handle"
+        gui.wait_until("bpy.context.object.name == 'Cloud Handle'")
         gui.key("g", "x", "1")
         gui.wait_until(f"{MOVED} > 0.9")
         gui.shot("handle_on_its_way")
