@@ -59,6 +59,13 @@ class TestLabels:
             assert apart.max() == 1
             assert near.max() == 0
 
+    @pytest.mark.parametrize(("count", "joined"), [(8, True), (9, False)])
+    def test_the_spacing_is_that_to_the_eighth_neighbor(self, count, joined):
+        # Clumps in a row: the eighth neighbour of a point is in the next clump, or still in its own.
+        x = np.arange(20.0)[:, None] + np.linspace(-1e-3, 1e-3, count)
+        label = label_components(find_nearest(grid_points(x.ravel(), [0.0], [0.0])))
+        assert np.all(label == 0) == joined
+
     def test_moving_apart_keeps_all_distances_within_a_part(self):
         points = np.concatenate([SMALL, LARGE])
         label = np.repeat([1, 0], [900, 1500])
