@@ -10,6 +10,9 @@ from benchmarks.samplings import (
     fibonacci_sphere,
     marching_cubes_sphere,
     random_sphere,
+    sausage,
+    square_grid,
+    square_random,
     torus_low_discrepancy,
     torus_points,
     uneven_sphere,
@@ -25,6 +28,10 @@ CLOUDS = {
     "random torus": lambda: torus_points(5000),
     "coarse torus": lambda: torus_low_discrepancy(2000),
     "fine torus": lambda: torus_low_discrepancy(8000),
+    "square grid": lambda: square_grid(60),
+    "random square": lambda: square_random(2500),
+    "capsule": lambda: sausage()[0],
+    "bent capsule": lambda: sausage(bent=True)[0],
 }
 
 

@@ -35,7 +35,7 @@ def closed_matrix(points, factor):
 
 @pytest.fixture(scope="module")
 def uneven():
-    return closed_matrix(uneven_sphere(1000), 0.5), np.ones(1000)
+    return closed_matrix(uneven_sphere(400), 0.5), np.ones(400)
 
 
 def objective(matrix, areas, target, rho=1e-3):
@@ -134,7 +134,7 @@ def test_areas_are_the_operators_own():
 @pytest.mark.parametrize("method", METHODS)
 def test_scale_shift_rotation_and_order(method):
     sphere = random_sphere if method == "fast" else fibonacci_sphere  # eqs. (7) and (8) need wide kernels elsewhere
-    points = sphere(1200) * [1.0, 0.8, 0.6]
+    points = sphere(700) * [1.0, 0.8, 0.6]
     options = LaplacianOptions(areas=method)
     areas = core.estimate_areas(points, options=options)
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]

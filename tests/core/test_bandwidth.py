@@ -133,7 +133,7 @@ class TestAny:
     @pytest.mark.parametrize("bandwidth", ["adaptive", "local", "global"])
     def test_pairs_are_those_within_three_mean_lengths(self, bandwidth):
         options = LaplacianOptions(bandwidth=bandwidth, sheets=False)
-        pairs = read_cloud(uneven_sphere(900), options).pairs
+        pairs = read_cloud(uneven_sphere(450), options).pairs
         reach = 3.0 * pairs.mean(pairs.lengths)
         assert np.all(pairs.distance <= reach * (1.0 + 1e-12))
         between = np.linalg.norm(pairs.points[:, None] - pairs.points, axis=2)
@@ -145,7 +145,7 @@ class TestAny:
 
     @pytest.mark.parametrize("bandwidth", ["adaptive", "local", "global"])
     def test_free_of_units_position_and_order(self, bandwidth):
-        points = uneven_sphere(1200)
+        points = uneven_sphere(600)
         order = np.random.default_rng(1).permutation(len(points))
         turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
         before = lengths(points, bandwidth=bandwidth)

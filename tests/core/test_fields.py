@@ -156,7 +156,7 @@ def test_indices_and_masks_agree_whatever_their_order(strip):
 
 
 def test_motion_and_scale_do_not_matter():
-    points = random_sphere(1500)
+    points = random_sphere(800)
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
     order = np.random.default_rng(1).permutation(len(points))
     moved = core.build_laplacian(50.0 * points[order] @ turn + [1.0, 2.0, 3.0])

@@ -3,7 +3,7 @@ import pytest
 
 import core
 from benchmarks.accuracy import relative, sphere_errors
-from benchmarks.samplings import fibonacci_sphere, icosahedral_sphere, random_sphere, torus_points
+from benchmarks.samplings import fibonacci_sphere, hemisphere_random, icosahedral_sphere, random_sphere, torus_points
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +81,8 @@ class TestAccuracy:
         assert max(sphere_errors(laplacian)[:2]) < 1e-2
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=5e-4)
 
-    def test_even_sphere(self):
-        assert max(sphere_errors(core.build_laplacian(fibonacci_sphere(4000)))) < 3e-3
+    def test_even_sphere(self, operators):
+        assert max(sphere_errors(operators("even sphere"))) < 3e-3
 
     def test_curvature_correction_helps_where_the_surface_bends_two_ways(self):
         points = torus_points(4000)
@@ -177,6 +177,11 @@ class TestMeanCurvature:
         radius = np.linalg.norm(laplacian.points[:, :2], axis=1)
         exact = (2.0 * radius - 1.0) / (2.0 * 0.4 * radius)
         assert relative(core.mean_curvature(laplacian), exact) < 0.03
+
+    def test_up_to_the_boundary_of_a_hemisphere(self):
+        laplacian = core.build_laplacian(hemisphere_random(1500), options=core.LaplacianOptions(orient=True))
+        assert laplacian.boundary.any()
+        np.testing.assert_allclose(core.mean_curvature(laplacian), 1.0, rtol=3e-2)
 
 
 class TestProgress:

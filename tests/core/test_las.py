@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import las_to_ply
 from core.files import read_points
 
 ROOT = Path(__file__).parents[2]
@@ -28,35 +29,47 @@ def write_las(path, points=POINTS):
     las.write(str(path))
 
 
-def convert(*paths):
-    return subprocess.run(
-        [sys.executable, "-m", "scripts.las_to_ply", *map(str, paths)], cwd=ROOT, capture_output=True, text=True
-    )
+@pytest.fixture
+def convert(monkeypatch):
+    def run(*paths):
+        monkeypatch.setattr(sys, "argv", ["las_to_ply.py", *map(str, paths)])
+        las_to_ply.main()
+
+    return run
 
 
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
-def test_coordinates_and_columns_survive(tmp_path, name):
+def test_coordinates_and_columns_survive(convert, capsys, tmp_path, name):
     write_las(tmp_path / name)
-    done = convert(tmp_path / name)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "500 points, intensity, classification" in done.stdout
+    convert(tmp_path / name)
+    printed = capsys.readouterr()
+    assert "500 points, intensity, classification" in printed.out
+    assert printed.err == ""
     table = read_points(tmp_path / "a.ply")
     assert_allclose(table.points, POINTS, rtol=0.0, atol=1e-6)
     assert_array_equal(table.attributes["intensity"], np.arange(500))
     assert_array_equal(table.attributes["classification"], np.full(500, 2))
     assert_allclose(table.attributes["height"], np.linspace(0.0, 1.0, 500), atol=1e-6)
     assert_allclose(table.colors[0], [1.0, 0.0, 0.5, 1.0], atol=0.01)
-    again = convert(tmp_path / name)
+    with pytest.raises(SystemExit, match="exists already"):
+        convert(tmp_path / name)
+
+
+def test_as_a_program(tmp_path):
+    write_las(tmp_path / "a.las")
+    command = [sys.executable, "-m", "scripts.las_to_ply", str(tmp_path / "a.las")]
+    first, again = (subprocess.run(command, cwd=ROOT, capture_output=True, text=True) for _ in range(2))
+    assert (first.returncode, first.stderr) == (0, "")
+    assert "500 points" in first.stdout
     assert again.returncode == 1
     assert "exists already" in again.stderr
+    assert "Traceback" not in again.stderr
 
 
-def test_broken_files(tmp_path):
+def test_broken_files(convert, tmp_path):
     (tmp_path / "a.las").write_bytes(b"LASF, but no more")
     write_las(tmp_path / "b.laz", POINTS[:0])
     for name, text in (("a.las", "cannot be read"), ("b.laz", "no points"), ("c.las", "cannot be read")):
-        done = convert(tmp_path / name)
-        assert done.returncode == 1
-        assert text in done.stderr
-        assert "Traceback" not in done.stderr
+        with pytest.raises(SystemExit, match=text):  # said, without a traceback
+            convert(tmp_path / name)
     assert not list(tmp_path.glob("*.ply"))

@@ -23,7 +23,7 @@ from core.applications.graph import near_graph
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
 
-def limbs(count=4000, seed=0):
+def limbs(count=2400, seed=0):
     """Return random points on four spheres of different sizes that reach into a large one, and their number, 0 to 4."""
     centers = np.array([[0.0, 0, 0], [1.7, 0, 0.1], [-1.75, 0.2, 0], [0.1, 1.8, 0.3], [0, -1.6, 0.6]])
     radii = np.array([1.0, 0.9, 0.85, 0.95, 0.8])
@@ -50,8 +50,8 @@ def rectangle():
 
 
 @pytest.fixture(scope="module")
-def square():
-    return core.build_laplacian(square_random(2500))
+def square(operators):
+    return operators("random square")
 
 
 @pytest.fixture(scope="module")
@@ -290,7 +290,7 @@ class TestSegment:
         assert size.min() > 0.5 * size.mean()
 
     def test_density_does_not_matter(self, body):
-        more = limbs(3000, 1)[0]
+        more = limbs(1800, 1)[0]
         uneven = core.build_laplacian(np.concatenate([body.points, more[more[:, 0] > 0.0]]))
         labels = core.segment(uneven, 5)[: len(body.points)]
         assert agreement(labels, body.labels) > 0.95

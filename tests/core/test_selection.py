@@ -46,9 +46,8 @@ def test_not_to_a_close_sheet():
     np.testing.assert_array_equal(grown, sheet == 0)
 
 
-def test_along_a_bent_sausage_and_not_across_the_gap():
-    points, along = sausage(3000, bent=True)
-    laplacian = core.build_laplacian(points)
+def test_along_a_bent_sausage_and_not_across_the_gap(operators):
+    laplacian, along = operators("bent capsule"), sausage(bent=True)[1]
     grown = core.grow(laplacian, along < 0.0, 1.5)
     assert np.all(grown[along < 1.3])
     assert not np.any(grown[along > 1.7])
