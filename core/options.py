@@ -42,7 +42,7 @@ class LaplacianOptions:
         Measure distances along the surface, correct areas and weights for its Gaussian curvature and for h that varies,
         and give the weights around every point the moments of the kernel. Without it, eqs. (6) and (10) as they stand:
         distances in space for the areas, in the mean-normal plane for the weights.
-    boundaries : {"auto", "off"}
+    boundary : {"auto", "off"}
         "auto": find where the surface ends, unless the boundary is given, and mirror the points there. "off": take the
         surface as closed.
     sheets : bool

@@ -117,7 +117,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
             ("AUTO", "Automatic", "Find the points at a boundary, and continue the surface beyond it as in a mirror"),
             ("OFF", "Off (Closed Surface)", "Take the surface as closed, whatever it looks like"),
         ),
-        default=DEFAULTS.boundaries.upper(),
+        default=DEFAULTS.boundary.upper(),
     )
     sheets: BoolProperty(
         name="Keep Close Sheets Apart",
