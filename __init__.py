@@ -6,7 +6,7 @@ def _modules():
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
-    from .operators.objects import counting, settings
+    from .operators.objects import counting, earlier, settings
     from .operators.running import cache, job
     from .operators.tools import analyze, convert, fields, minimal, segment, smooth, spectrum
     from .operators.tools import select as selecting
@@ -15,6 +15,7 @@ def _modules():
 
     return (
         settings,
+        earlier,
         cache,
         counting,
         job,

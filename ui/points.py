@@ -3,7 +3,7 @@
 import bpy
 
 from ..operators.objects.counting import members
-from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, FIXED, HANDLE, SOURCE, VALUE, has_group
+from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, FIXED, HANDLE, SOURCE, VALUE, has_group, role_group
 from ..operators.objects.reading import TYPES
 from ..operators.tools.convert import MESHFREE_OT_convert
 from .panel import SidebarPanel
@@ -41,11 +41,12 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
             row = column.split(factor=0.66, align=True)
             icon = {"icon_value": swatch(role)} if obj.meshfree.show_groups else {}
             row.operator("meshfree.group_from_selection", text=f"Assign to {title}", **icon).role = role.upper()
-            found = members(obj, role, glance=True)
+            group = role_group(obj, role)
+            found = members(obj, group, glance=True)
             text = "..." if found is None else f"{found.count:,}"
             selecting = row.row(align=True)
-            selecting.enabled = has_group(obj, role)
-            selecting.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = role
+            selecting.enabled = has_group(obj, group)
+            selecting.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = group
         if bpy.app.version >= MESHFREE_OT_convert.since:
             to_mesh = obj.type != "MESH"
             text = "Convert to Mesh" if to_mesh else "Convert to Point Cloud"

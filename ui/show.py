@@ -6,7 +6,7 @@ import bpy
 
 from ..operators.deform.binding import handle_names, positions_now
 from ..operators.objects.attributes import MEAN_CURVATURE, read_attribute
-from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES
+from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, role_group
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
 from ..operators.running.stages import redraw_views
@@ -160,7 +160,7 @@ def _group_colors(obj) -> dict:
     settings = obj.meshfree
     if not settings.show_groups:
         return {}
-    names = {role: role for role in ROLES}
+    names = {role_group(obj, role): role for role in ROLES}
     if settings.boundary_group:
         names[settings.boundary_group] = BOUNDARY_GROUP
     names[settings.deform.anchors or ANCHOR] = ANCHOR

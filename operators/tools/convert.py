@@ -10,7 +10,7 @@ from ...core import PointCloudError
 from ..deform.binding import handle_names, is_bound
 from ..objects.attributes import SELECTION, point_count, write_attribute
 from ..objects.counting import renew_counts
-from ..objects.groups import ROLES, group_weights, has_group
+from ..objects.groups import ROLES, group_weights, has_group, role_group
 from ..objects.modifiers import get_input, is_display, set_input
 from ..objects.result import check_writable
 from ..running.application import chosen_objects
@@ -107,7 +107,8 @@ def _convert(context, obj, target):
 def _group_names(obj):
     """Names of the groups that tools take, and of the parts."""
     settings = obj.meshfree
-    names = {*ROLES, *handle_names(obj), settings.deform.anchors, settings.boundary_group}
+    names = {role_group(obj, role) for role in ROLES}
+    names |= {*handle_names(obj), settings.deform.anchors, settings.boundary_group}
     kept = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
     names |= {group.name for group in kept if _SEGMENT.fullmatch(group.name)}
     return [name for name in names if name and has_group(obj, name)]

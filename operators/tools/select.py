@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from ...core import PointCloudError, grow
 from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.counting import renew_counts
-from ..objects.groups import HANDLE, assign, check_assignable, chosen_members
+from ..objects.groups import HANDLE, assign, check_assignable, chosen_members, role_group
 from ..objects.reading import obstacle
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
@@ -281,7 +281,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     f'All selected points of "{obj.name}" face away from the viewer. Turn off Front Only, or'
                     " look from the other side."
                 )
-        name = self.name or self.role.title()
+        name = self.name or role_group(obj, self.role.title())
         check_assignable(obj, name, must_exist=self.action == "REMOVE")
 
         def change():
