@@ -112,7 +112,7 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         precision=6,
     )
     boundary: EnumProperty(
-        name="Boundaries",
+        name="Boundary",
         description="Where the surface ends, if no Boundary Group is named",
         items=(
             ("AUTO", "Automatic", "Find the points at a boundary, and continue the surface beyond it as in a mirror"),

@@ -306,7 +306,7 @@ class MESHFREE_OT_select_boundary(SelectionOperator, bpy.types.Operator):
         boundary = analyzed(context, obj)[1].boundary
         if not boundary.any():
             raise PointCloudError(
-                f'"{obj.name}" has no boundary: its surface is closed, or Boundaries is off in the settings.'
+                f'"{obj.name}" has no boundary: its surface is closed, or Boundary is off in the settings.'
             )
         return lambda: select(context, obj, boundary)
 
