@@ -1,8 +1,16 @@
 """Mesh-Free Laplacian: areas, normals, curvature and vibration modes of point clouds, inside Blender."""
 
+_registered = []
+
 
 def _modules():
     """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
+    try:
+        import scipy.sparse  # noqa: F401
+    except ImportError:  # none of the wheels is for this Python
+        from .ui import missing
+
+        return (missing,)
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
@@ -56,13 +64,15 @@ def register():
             bpy.utils.register_class(cls)
         if hasattr(module, "attach"):
             module.attach()
+        _registered.append(module)
 
 
 def unregister():
     """Take everything out again, in reverse order."""
     import bpy
 
-    for module in reversed(_modules()):
+    while _registered:
+        module = _registered.pop()
         if hasattr(module, "detach"):
             module.detach()
         for cls in reversed(getattr(module, "CLASSES", ())):
