@@ -363,6 +363,7 @@ def test_pictures_of_many_parts_name_the_first_ones(overlay, obj):
     bpy.ops.meshfree.colormap(attribute="part", color_map="CATEGORICAL")
     legend, histogram = overlay.pictures(obj, bpy.context.scene)
     assert texts(legend)[1:] == [*map(str, range(11)), "29 more"]
+    assert len(legend.places) == 6 * (1 + 11)  # the plate, and a box for each that is named
     assert {"0", "39"} <= set(texts(histogram))
 
 
