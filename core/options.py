@@ -42,7 +42,7 @@ class LaplacianOptions:
         Measure distances along the surface, correct areas and weights for its Gaussian curvature and for h that varies,
         and give the weights around every point the moments of the kernel. Without it, eqs. (6) and (10) as they stand:
         distances in space for the areas, in the mean-normal plane for the weights.
-    boundaries : {"auto", "off"}
+    boundary : {"auto", "off"}
         "auto": find where the surface ends, unless the boundary is given, and mirror the points there. "off": take the
         surface as closed.
     sheets : bool
@@ -52,6 +52,11 @@ class LaplacianOptions:
         for it, never, or always; or onto local tangent planes, as the paper does for noisy points.
     symbol_correction : bool
         Correct eigenvalues and `apply` for the known effect of the kernel's width on a flat patch.
+
+    Raises
+    ------
+    PointCloudError
+        A choice that there is not, a number out of range, or a kernel that is too narrow for its neighbours.
     """
 
     bandwidth: str = "adaptive"
@@ -87,7 +92,12 @@ class LaplacianOptions:
 
     @classmethod
     def paper(cls):
-        """Return the paper's own setting: global h, WPCA normals, eq. (8) with rho = 1e-3, no corrections."""
+        """Return the paper's own setting: global h, WPCA normals, eq. (8) with rho = 1e-3, no corrections.
+
+        Returns
+        -------
+        LaplacianOptions
+        """
         return cls(
             bandwidth="global",
             bandwidth_factor=1.0,

@@ -63,7 +63,9 @@ class Deformer:
     PointCloudError
         No handles, points that are handles and anchors, weights that are negative or of a wrong number.
     InvalidPointsError
-        Sets of points that are none.
+        Sets of points that are neither indices nor truth values, or name a point twice.
+    SolverError
+        The equations cannot be factorised.
 
     Notes
     -----
@@ -73,7 +75,7 @@ class Deformer:
 
     The normal equations, ``K M^-1 K (x - x_o) = 0`` with the stiffness K and the areas M at the points that are free,
     are factorised. Before the rotation-aware steps each component is turned and moved as a whole to where its
-    constrained points fit best, so that parts which are moved rigidly come out rigid to round-off.
+    constrained points fit best, so that components which are moved rigidly come out rigid to round-off.
 
     References
     ----------
@@ -149,7 +151,7 @@ class Deformer:
         handle_positions : array_like, (h, 3)
             Where the handles are to be [L], in the order of their indices.
         steps : int
-            Most rotation-aware steps; a single one is fit for dragging, and with none each part turns as a whole.
+            Most rotation-aware steps; a single one is fit for dragging, and with none each component turns as a whole.
         rtol : float
             Stop when no point moves by more than this share of the size.
         start : array_like, (n, 3), optional

@@ -1,4 +1,4 @@
-"""Signatures of points that depend on the inner shape alone: shape_operator the surface does not change them."""
+"""Signatures of points that depend on the inner shape alone: bending the surface does not change them."""
 
 import numpy as np
 
@@ -25,6 +25,11 @@ def signature_times(spectrum, count=100):
         Ascending, evenly in the logarithm [L^2], from ``4 ln 10 / highest`` to ``4 ln 10 / lowest`` nonzero eigenvalue:
         from where the modes that are missing matter no more to where all is even. They grow with the size of the object
         squared, so that signatures of scaled copies agree.
+
+    Raises
+    ------
+    PointCloudError
+        A spectrum of constants alone, or a count below 1.
     """
     values = _nonzero(spectrum)[1]
     return np.geomspace(_RANGE / values[-1], _RANGE / values[0], _at_least_one(count))
@@ -33,10 +38,22 @@ def signature_times(spectrum, count=100):
 def signature_energies(spectrum, count=100):
     """Return the energies of a wave kernel signature that suit a spectrum.
 
+    Parameters
+    ----------
+    spectrum : Spectrum
+        At least two different eigenvalues above zero.
+    count : int
+        How many energies.
+
     Returns
     -------
     ndarray, (count,)
         Ascending and even: logarithms of eigenvalues, two windows inside the range of the spectrum.
+
+    Raises
+    ------
+    PointCloudError
+        Fewer than two different eigenvalues above zero, or a count below 1.
     """
     low, high, width = _window(spectrum)
     return np.linspace(low + 2.0 * width, high - 2.0 * width, _at_least_one(count))
@@ -59,7 +76,7 @@ def heat_kernel_signature(spectrum, times=None, *, count=100, normalized=False):
     Returns
     -------
     ndarray, (n, k)
-        ``sum_k exp(-lambda_k t) phi_k^2`` [1 / L^2]; zero at points that the operator left out.
+        ``sum_m exp(-lambda_m t) phi_m^2`` [1 / L^2], a column per time; zero at points that the operator left out.
 
     Raises
     ------
@@ -98,8 +115,9 @@ def wave_kernel_signature(spectrum, energies=None, *, count=100):
     Returns
     -------
     ndarray, (n, k)
-        Means of ``phi_k^2`` [1 / L^2] weighted by ``exp(-(e - log lambda_k)^2 / (2 sigma^2))``, sigma a share of 0.07
-        of the range of the logarithms; the integral over the surface is 1. Zero at points that the operator left out.
+        Means of ``phi_m^2`` [1 / L^2] weighted by ``exp(-(e - log lambda_m)^2 / (2 sigma^2))``, sigma a share of 0.07
+        of the range of the logarithms, a column per energy; the integral over the surface is 1. Zero at points that
+        the operator left out.
 
     Raises
     ------

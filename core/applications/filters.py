@@ -23,6 +23,16 @@ def exponential(time):
     ----------
     time : float
         [L^2], not negative. Details of a wavelength below about ``6 sqrt(time)`` fade.
+
+    Returns
+    -------
+    callable
+        From an array of eigenvalues [1 / L^2] to an array of factors of the same shape, as of all responses.
+
+    Raises
+    ------
+    PointCloudError
+        A time that is negative or not finite.
     """
     if not 0.0 <= time < np.inf:
         raise PointCloudError(f"The time of an exponential response is {time!r}. Use a number that is not negative.")
@@ -38,6 +48,16 @@ def fairing(time, order=3):
         [L^2], not negative. What has a wavelength of ``2 pi sqrt(time)`` is halved.
     order : int
         1 for the flow of heat, 2 or 3 for a sharper line between what stays and what goes.
+
+    Returns
+    -------
+    callable
+        From eigenvalues [1 / L^2] to factors.
+
+    Raises
+    ------
+    PointCloudError
+        A time that is negative or not finite, or another order.
     """
     if not 0.0 <= time < np.inf:
         raise PointCloudError(f"The time of the fairing is {time!r}. Use a number that is not negative.")
@@ -57,6 +77,16 @@ def band(low, high=np.inf, *, softness=0.1):
     softness : float
         Relative width of the fade in frequency, the root of the eigenvalue. A small one asks `chebyshev_filter` for
         many products.
+
+    Returns
+    -------
+    callable
+        From eigenvalues [1 / L^2] to factors.
+
+    Raises
+    ------
+    PointCloudError
+        Edges out of order or negative, or a softness that is not above zero.
     """
     if not (0.0 <= low < high and softness > 0.0):
         raise PointCloudError(
@@ -84,6 +114,16 @@ def boost(gain, low, high=np.inf, *, softness=0.25):
         Above 1 for stronger details, below for weaker ones.
     low, high, softness : float
         As for `band`. With an infinite high, noise grows as well.
+
+    Returns
+    -------
+    callable
+        From eigenvalues [1 / L^2] to factors.
+
+    Raises
+    ------
+    PointCloudError
+        A gain that is not finite, or an empty band.
     """
     if not np.isfinite(gain):
         raise PointCloudError(f"The gain of the details is {gain!r}. Use a finite number.")

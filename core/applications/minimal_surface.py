@@ -94,8 +94,8 @@ def minimal_surface(
     Raises
     ------
     InvalidPointsError
-        Too few fixed points, or nothing but fixed points; a part without any, or an edge that is not fixed; a tolerance
-        or a number of steps out of range.
+        Too few fixed points, or nothing but fixed points; a component without any, or a boundary that is not fixed; a
+        tolerance or a number of steps out of range.
     PointCloudError
         No operator can be built on the given points.
     Cancelled

@@ -80,7 +80,7 @@ def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
 
 
 def segment(laplacian, parts, *, spectrum=None, progress=None):
-    """Divide the surface into a number of components, such as the limbs of a figure.
+    """Divide the surface into a number of parts, such as the limbs of a figure.
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
     factor that fades to zero at the last mode used, so that their distances depend neither on the signs of modes nor on
@@ -94,7 +94,7 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
     parts : int
         How many parts; at least one for each component of the cloud. The others are dealt out by area.
     spectrum : Spectrum, optional
-        Its natural modes, to save time; used if there are enough of them, which is ``modes_needed``.
+        Its Neumann modes, to save time; used if there are enough of them, which is ``modes_needed``.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -113,6 +113,8 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
         Fewer parts than components.
     InvalidPointsError
         A spectrum of other points.
+    SolverError
+        The eigenvalue solver did not converge.
 
     References
     ----------
@@ -158,6 +160,7 @@ def modes_needed(laplacian, parts):
     ----------
     laplacian : LaplaceBeltrami
     parts : int
+        How many parts are to be asked for.
 
     Returns
     -------

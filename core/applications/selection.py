@@ -14,7 +14,7 @@ def grow(laplacian, chosen, distance):
     """Add all points within a distance along the surface to a set of points.
 
     Distances are lengths of paths from neighbour to neighbour on the same sheet, so that the set does not jump to
-    another sheet, or another part, that passes nearby. They are a few percent too long at most.
+    another sheet, or another component, that passes nearby. They are a few percent too long at most.
 
     Parameters
     ----------

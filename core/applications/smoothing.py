@@ -30,7 +30,7 @@ def smooth_points(
     """Filter the shape of the surface by frequency.
 
     The coordinates are three functions on the points. Each component keeps its centre, so that the result moves
-    and turns with the points, and parts do not collapse into each other.
+    and turns with the points, and components do not collapse into each other.
 
     Parameters
     ----------
@@ -66,9 +66,10 @@ def smooth_points(
     Raises
     ------
     PointCloudError
-        A response, mask, strength or choice that makes no sense, or modes that are constants alone.
-    UnresolvedModesError, TooFewPointsError, SolverError
-        From the spectrum, where it is computed here, or a scale that is not found.
+        A response, mask, strength or choice that makes no sense, modes that are constants alone, or a volume to keep
+        of a surface that encloses none.
+    TooFewPointsError, SolverError
+        From the spectrum, where it is computed here; a scale that is not found.
 
     References
     ----------
@@ -136,7 +137,8 @@ def fair_points(
     Raises
     ------
     PointCloudError
-        A time, order, mask, strength or choice that makes no sense.
+        A time, order, mask, strength or choice that makes no sense, or a volume to keep of a surface that encloses
+        none.
     SolverError
         A scale is not found.
 
@@ -217,6 +219,13 @@ def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     -------
     ndarray, (n, 3)
         The centre of each component or, with a fixed boundary, the harmonic surface that spans it [L].
+
+    Raises
+    ------
+    PointCloudError
+        A fixed boundary without points of its own.
+    SolverError
+        The solver did not converge.
     """
     points, part = laplacian.points, laplacian.component
     base = points.copy()
@@ -292,6 +301,11 @@ class PointBlend:
     laplacian, strength, mask, keep, dirichlet
         As in `smooth_points`, whose results without these are filtered places.
 
+    Attributes
+    ----------
+    mask, weights : ndarray, (n,)
+        Weight of each point, zero where it stays, and the same times the strength.
+
     Raises
     ------
     PointCloudError
@@ -327,7 +341,23 @@ class PointBlend:
             )
 
     def __call__(self, filtered):
-        """Return the result for filtered places, (n, 3)."""
+        """Return the result for filtered places.
+
+        Parameters
+        ----------
+        filtered : ndarray, (n, 3)
+            Where the filter at full strength puts the points [L].
+
+        Returns
+        -------
+        ndarray, (n, 3)
+            New places for ``laplacian.points`` [L].
+
+        Raises
+        ------
+        SolverError
+            A scale is not found.
+        """
         points = self.laplacian.points
         if self.keep is None or not self.weights.any():
             return points + self.weights[:, None] * (filtered - points)

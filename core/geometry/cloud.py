@@ -229,7 +229,8 @@ def estimate_normals(points, options=LaplacianOptions()):
     Returns
     -------
     ndarray, (n, 3)
-        Those from the covariance are of arbitrary sign unless ``options.orient``. Points left out get the z axis.
+        Unit normals. Those from quadrics agree in sign, outwards on closed surfaces; those from the covariance are of
+        arbitrary sign unless ``options.orient``. Points left out get the z axis.
 
     Raises
     ------

@@ -52,7 +52,7 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
     points : array_like, (n, 3)
         Coordinates [L].
     normals, options, boundary, boundary_distance
-        See `build_laplacian`.
+        As in `build_laplacian`.
 
     Returns
     -------

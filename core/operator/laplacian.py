@@ -49,7 +49,7 @@ class LaplaceBeltrami:
     smoothing_lengths : ndarray, (n,)
         h of each point [L]; the kernel reaches 3 h.
     stiffness : csr_array, (n, n)
-        Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the natural one: no flow
+        Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the Neumann one: no flow
         across.
     neumann_images, dirichlet_images : csr_array, (n, n)
         Weights of the mirror images in the boundary that `stiffness` holds, and of those that `dirichlet` puts in their
@@ -140,7 +140,7 @@ class LaplaceBeltrami:
         raw : bool
             Leave out the symbol correction of the eigenvalues.
         dirichlet : bool
-            Modes that vanish at the boundary, instead of those that meet it level.
+            Dirichlet modes, which vanish at the boundary, instead of Neumann modes, which meet it level.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -151,9 +151,9 @@ class LaplaceBeltrami:
         Raises
         ------
         TooFewPointsError
-            More modes than the points can have.
+            More modes than a third of the points, or a count below 1.
         UnresolvedModesError
-            Modes asked for that vary faster than the smoothing length resolves, unless `raw`.
+            Modes asked for that vary faster than the smoothing length resolves; never with `raw`.
         SolverError
             The eigenvalue solver did not converge.
         """
@@ -213,7 +213,10 @@ def build_laplacian(
     Raises
     ------
     PointCloudError
-        The input has no sound answer; the text says why and what to do.
+        The input has no sound answer; the text says why and what to do. Its children tell what it is: points, normals
+        or a boundary of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighbourhoods need
+        (`TooFewPointsError`), points along a curve (`NotASurfaceError`), components of too few points alone
+        (`ComponentError`), areas of eq. (7) that are not positive (`AreaError`).
 
     References
     ----------
