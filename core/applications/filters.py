@@ -161,9 +161,31 @@ def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
         More modes than the spectrum holds, fewer than there are constant ones, or a response that is not a number for
         each eigenvalue.
 
+    See Also
+    --------
+    LaplaceBeltrami.eigenpairs : Computes the spectrum.
+    chebyshev_filter : The same without a spectrum.
+    smooth_points : Filters the points themselves.
+    exponential, fairing, band, boost : Responses.
+
     References
     ----------
     Vallet, Levy. Spectral geometry processing with manifold harmonics. 2008. Section 4 and Figure 12 of the paper.
+
+    Examples
+    --------
+    On the unit sphere z is a mode of eigenvalue 2, and x y of eigenvalue 6, which the first four modes do not hold:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> values = z + points[:, 0] * points[:, 1]
+    >>> smooth = core.spectral_filter(values, laplacian.eigenpairs(9), laplacian.areas, 4)
+    >>> print(np.abs(smooth - z).max().round(2))
+    0.0
     """
     n, count = spectrum.eigenvectors.shape
     values = check_values(values, n)

@@ -55,9 +55,29 @@ def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
     PointCloudError
         A threshold or bridge outside of [0, 1), or a smallest size below 1.
 
+    See Also
+    --------
+    LaplaceBeltrami.eigenpairs : Computes modes.
+    segment : Parts by many modes at once.
+
     References
     ----------
     Figures 10, 11 and 16 of the paper. Counted as there, from 1, mode k is column k - 1; mode 1 is constant.
+
+    Examples
+    --------
+    On a sphere the height changes its sign at the equator, and x y has a domain in each quarter:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> print(np.bincount(core.nodal_domains(z, laplacian)))
+    [400 400]
+    >>> print(core.nodal_domains(points[:, 0] * points[:, 1], laplacian).max() + 1)
+    4
     """
     n = len(laplacian.points)
     values = check_values(values, n, columns=False)
@@ -116,9 +136,29 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
     SolverError
         The eigenvalue solver did not converge.
 
+    See Also
+    --------
+    modes_needed : How many modes it works with.
+    nodal_domains : Parts by the sign of one function.
+    heat_kernel_signature : Points told apart by modes.
+
     References
     ----------
     Rustamov. Laplace-Beltrami eigenfunctions for deformation invariant shape representation. 2007.
+
+    Examples
+    --------
+    A dumbbell comes apart at its waist, where z is zero:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> dumbbell = points * (0.4 + np.abs(z))[:, None]
+    >>> labels = core.segment(core.build_laplacian(dumbbell), 2)
+    >>> print(labels.max() + 1, np.ptp(labels[z > 0.1]), np.ptp(labels[z < -0.1]))
+    2 0 0
     """
     n = len(laplacian.points)
     if isinstance(parts, bool) or not isinstance(parts, (int, np.integer)) or parts < 1:
