@@ -221,7 +221,7 @@ def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False,
         Maps an array of eigenvalues [1 / L^2] to factors. It should be smooth: the more abrupt, the more products with
         the operator.
     dirichlet : bool
-        Take the functions to vanish at the boundary, instead of meeting it level.
+        Take the functions to vanish at the boundary (Dirichlet), instead of meeting it level (Neumann).
     raw : bool
         Leave out the symbol correction.
     tolerance : float

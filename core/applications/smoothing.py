@@ -52,7 +52,7 @@ def smooth_points(
         its area, or enclosed volume, before. The volume needs a closed surface and normals that point outwards.
     dirichlet : bool
         Boundary points stay where they are: what is filtered is the distance from the surface that spans the boundary
-        like a soap film. Otherwise a boundary shrinks like all else, as the modes meet it level.
+        like a soap film. Otherwise a boundary shrinks like all else, as Neumann modes meet it level.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
     base : ndarray, (n, 3), optional
