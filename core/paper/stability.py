@@ -82,7 +82,7 @@ def check_stability(laplacian):
     >>> points = np.column_stack([ring.real, ring.imag, z])
     >>> laplacian = core.build_laplacian(points)
     >>> stability = core.check_stability(laplacian)
-    >>> print(stability.parts, stability.row_sum < 1e-12, stability.concerns())
+    >>> print(stability.components, stability.row_sum < 1e-12, stability.concerns())
     1 True []
     """
     known = np.flatnonzero(laplacian.component >= 0)
