@@ -103,7 +103,7 @@ def scans():
         whole = connected(laplacian.component, laplacian)
         for parts in PARTS:
             began = time.perf_counter()
-            labels = core.segment(laplacian, parts, spectrum)
+            labels = core.segment(laplacian, parts, spectrum=spectrum)
             seconds.append(time.perf_counter() - began)
             wrong += len(np.unique(labels)) != parts or labels.min() < 0
             cut += connected(labels, laplacian) - whole

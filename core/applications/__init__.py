@@ -9,31 +9,3 @@ from .minimal_surface import MinimalSurface, minimal_surface
 from .segmentation import modes_needed, nodal_domains, segment
 from .selection import grow
 from .smoothing import PointBlend, displace_by_mode, fair_points, smooth_points, smoothing_base
-
-__all__ = [
-    "Deformer",
-    "MinimalSurface",
-    "PointBlend",
-    "band",
-    "boost",
-    "chebyshev_filter",
-    "displace_by_mode",
-    "exponential",
-    "fair_points",
-    "fairing",
-    "geodesic_distance",
-    "grow",
-    "harmonic_field",
-    "heat_kernel_signature",
-    "minimal_surface",
-    "modes_needed",
-    "nodal_domains",
-    "segment",
-    "signature_energies",
-    "signature_times",
-    "smooth_points",
-    "smoothing_base",
-    "solve_poisson",
-    "spectral_filter",
-    "wave_kernel_signature",
-]

@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..geometry import arc_squared
+
 _AROUND = 9  # nearest points of the boundary among which those before and after a point are sought
 _OPPOSITE = -0.3  # cosine between the ways to both, at most
 _ROUGH = 0.07  # height of typical points over the line between their neighbours, in units of its length
@@ -95,4 +97,4 @@ class BoundaryCurve:
         other = boundary_normals[index]
         side = np.where(np.einsum("ic,ic->i", normals, other) < 0.0, -1.0, 1.0)
         turn = np.einsum("ic,ic->i", way, normals - side[:, None] * other)
-        return np.sqrt(np.einsum("ic,ic->i", way, way) + turn**2 / 12.0)
+        return np.sqrt(arc_squared(np.einsum("ic,ic->i", way, way), turn))

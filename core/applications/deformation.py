@@ -63,7 +63,14 @@ class Deformer:
     PointCloudError
         No handles, points that are handles and anchors, weights that are negative or of a wrong number.
     InvalidPointsError
-        Sets of points that are none.
+        Sets of points that are neither indices nor truth values, or name a point twice.
+    SolverError
+        The equations cannot be factorised.
+
+    See Also
+    --------
+    grow : Chooses the points around others.
+    smooth_points : Filters the shape.
 
     Notes
     -----
@@ -73,17 +80,32 @@ class Deformer:
 
     The normal equations, ``K M^-1 K (x - x_o) = 0`` with the stiffness K and the areas M at the points that are free,
     are factorised. Before the rotation-aware steps each component is turned and moved as a whole to where its
-    constrained points fit best, so that parts which are moved rigidly come out rigid to round-off.
+    constrained points fit best, so that components which are moved rigidly come out rigid to round-off.
 
     References
     ----------
     Petronetto, Paiva, Helou, Stewart, Nonato. Mesh-free discrete Laplace-Beltrami operator. 2013. Figure 13.
     Sorkine. Differential representations for mesh processing. Computer Graphics Forum 25, 2006.
     Sorkine, Alexa. As-rigid-as-possible surface modeling. SGP 2007.
+
+    Examples
+    --------
+    The cap at one pole is lifted by one, that at the other stays, and all follow, by a half on average:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> deformer = core.Deformer(laplacian, z > 0.8, z < -0.8)
+    >>> moved = deformer.solve(points[deformer.handles] + [0, 0, 1])
+    >>> print((moved - points)[[0, 799], 2].round(2), (moved - points)[:, 2].mean().round(2))
+    [1. 0.] 0.5
     """
 
     def __init__(
-        self, laplacian, handles, anchors=(), rotation_aware=True, weights=None, neighbors=_NEIGHBORS, progress=None
+        self, laplacian, handles, anchors=(), *, rotation_aware=True, weights=None, neighbors=_NEIGHBORS, progress=None
     ):
         report = progress or (lambda stage, fraction: None)
         n = len(laplacian.points)
@@ -111,11 +133,11 @@ class Deformer:
         self._row = row[self._held]
         if not len(moving):
             return
-        # The centre of each part at rest, so that sums of products do not lose digits far from the origin.
-        center = np.zeros((self._parts, 3))
-        np.add.at(center, self._part, self.points[moving])
-        center /= np.bincount(self._part)[:, None]
-        self._rest = self.points[moving] - center[self._part]
+        # The centre of each component at rest, so that sums of products do not lose digits far from the origin.
+        center = np.zeros((self._components, 3))
+        np.add.at(center, self._component, self.points[moving])
+        center /= np.bincount(self._component)[:, None]
+        self._rest = self.points[moving] - center[self._component]
         self._size = float(np.sqrt(np.mean(np.sum(self._rest**2, axis=1))))
         stiffness = sparsify(narrow.stiffness[moving][:, moving])
         inverse = sparse.diags_array(1.0 / narrow.areas[moving], format="csr")
@@ -141,7 +163,7 @@ class Deformer:
         matrix = free_rows[:, self._free] + sparse.diags_array(self._pull[self._free])
         self._solve = factorize(matrix) if len(self._free) else None
 
-    def solve(self, handle_positions, steps=_STEPS, rtol=_RTOL, start=None, progress=None):
+    def solve(self, handle_positions, *, steps=_STEPS, rtol=_RTOL, start=None, progress=None):
         """Find the points for new positions of the handles.
 
         Parameters
@@ -149,7 +171,7 @@ class Deformer:
         handle_positions : array_like, (h, 3)
             Where the handles are to be [L], in the order of their indices.
         steps : int
-            Most rotation-aware steps; a single one is fit for dragging, and with none each part turns as a whole.
+            Most rotation-aware steps; a single one is fit for dragging, and with none each component turns as a whole.
         rtol : float
             Stop when no point moves by more than this share of the size.
         start : array_like, (n, 3), optional
@@ -177,8 +199,8 @@ class Deformer:
         if not len(self._moving):
             self.steps, self.converged = 0, True
             return result
-        turn, shift = self._fit_parts(target)
-        frame = self._turned(turn, self._rest) + shift[self._part]
+        turn, shift = self._fit_components(target)
+        frame = self._turned(turn, self._rest) + shift[self._component]
         inside = ~loose
         wanted = np.zeros_like(frame)
         wanted[self._row[inside]] = target[inside] - frame[self._row[inside]]
@@ -217,31 +239,33 @@ class Deformer:
         products = (self._edges @ centered).reshape(3, len(now), 3)
         return nearest_rotations(np.ascontiguousarray(products.transpose(2, 0, 1)))
 
-    def _fit_parts(self, target):
-        """Return the turn of each part, (parts, 3, 3), identity in the linear mode, and its new centre, (parts, 3)."""
+    def _fit_components(self, target):
+        """Return the turn of each component, (c, 3, 3), identity in the linear mode, and its new centre, (c, 3)."""
         inside = self._row >= 0
         row, target = self._row[inside], target[inside]
-        part = self._part[row]
+        component = self._component[row]
         rest = self._rest[row]
-        count = np.bincount(part, minlength=self._parts)[:, None]
-        total = sparse.csr_array((np.ones(len(part)), (part, np.arange(len(part)))), shape=(self._parts, len(part)))
+        count = np.bincount(component, minlength=self._components)[:, None]
+        total = sparse.csr_array(
+            (np.ones(len(component)), (component, np.arange(len(component)))), shape=(self._components, len(component))
+        )
         before, after = total @ rest / count, total @ target / count
-        turn = np.tile(np.eye(3), (self._parts, 1, 1))
+        turn = np.tile(np.eye(3), (self._components, 1, 1))
         if self.rotation_aware:
-            pairs = np.einsum("ka,kb->kab", target - after[part], rest - before[part])
+            pairs = np.einsum("ka,kb->kab", target - after[component], rest - before[component])
             products = (total @ pairs.reshape(-1, 9)).reshape(-1, 3, 3)
-            # A trace of the identity keeps a part from turning about an axis that all its constraints lie on.
-            spread = total @ np.sum((rest - before[part]) ** 2, axis=1)
+            # A trace of the identity keeps a component from turning about an axis that all its constraints lie on.
+            spread = total @ np.sum((rest - before[component]) ** 2, axis=1)
             products += 1e-9 * spread[:, None, None] * np.eye(3)
             turn = np.moveaxis(nearest_rotations(np.moveaxis(products, 0, 2)), 2, 0)
         shift = after - np.einsum("pab,pb->pa", turn, before)
         return turn, shift
 
     def _turned(self, turn, vectors):
-        """Turn vectors at the moving points with their parts."""
-        if self._parts == 1:
+        """Turn vectors at the moving points with their components."""
+        if self._components == 1:
             return vectors @ turn[0].T
-        return np.einsum("nab,nb->na", turn[self._part], vectors)
+        return np.einsum("nab,nb->na", turn[self._component], vectors)
 
     def _check_sets(self, held):
         if not len(self.handles):
@@ -257,18 +281,19 @@ class Deformer:
         known = np.unique(component[held[weights > 0.0]])
         known = known[known >= 0]
         self._moving = np.flatnonzero(np.isin(component, known))
-        self._part = np.searchsorted(known, component[self._moving])
-        self._parts = len(known)
+        self._component = np.searchsorted(known, component[self._moving])
+        self._components = len(known)
         lone = int(np.count_nonzero(component < 0))
-        parts = len(np.unique(component[component >= 0])) - len(known)
+        components = len(np.unique(component[component >= 0])) - len(known)
         if lone:
             self.notices.append(
                 f"{lone} points belong to no surface. They stay where they are, unless they are handles."
             )
-        if parts:
+        if components:
             free = len(component) - lone - len(self._moving)
             self.notices.append(
-                f"{parts} components with {free} points have neither handles nor anchors. They stay where they are."
+                f"{components} components with {free} points have neither handles nor anchors. They stay where they"
+                " are."
             )
 
 

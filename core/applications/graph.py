@@ -59,7 +59,7 @@ def near_graph(laplacian, count):
     first = known[first]
     place = np.full(n, -1)
     place[known] = inverse.reshape(-1)
-    points, label = laplacian.surface_points[first], laplacian.component[first]
+    points, component = laplacian.surface_points[first], laplacian.component[first]
 
     m = len(first)
     distance, index = cKDTree(points).query(points, k=min(_SEEN * count + 1, m), workers=-1)
@@ -69,7 +69,7 @@ def near_graph(laplacian, count):
     joined &= distance <= (1.0 + 1e-9) * last[:, None]
     row, column = np.nonzero(joined)
     lengths = sparse.csr_array((distance[row, column], (row, index[row, column])), shape=(m, m))
-    return NearGraph(_bridge(lengths.maximum(lengths.T), points, label), place, first)
+    return NearGraph(_bridge(lengths.maximum(lengths.T), points, component), place, first)
 
 
 def _coupled(stiffness, first, index):
@@ -82,18 +82,18 @@ def _coupled(stiffness, first, index):
     return result.reshape(index.shape)
 
 
-def _bridge(lengths, points, label):
+def _bridge(lengths, points, component):
     """Join pieces of one component at their nearest points, so that it hangs together.
 
     The stiffness leaves a point without pairs where no other one seems to lie on its sheet.
     """
     piece = connected_components(lengths, directed=False)[1]
-    if piece.max() == label.max():
+    if piece.max() == component.max():
         return lengths.tocsr()
     size = np.bincount(piece)
     ends = []
-    for part in range(label.max() + 1):
-        pieces = np.unique(piece[label == part])
+    for number in range(component.max() + 1):
+        pieces = np.unique(piece[component == number])
         main = pieces[np.argmax(size[pieces])]
         own = np.flatnonzero(piece == main)
         tree = cKDTree(points[own])
@@ -102,15 +102,15 @@ def _bridge(lengths, points, label):
             distance, nearest = tree.query(points[rows])
             best = distance.argmin()
             ends.append((rows[best], own[nearest[best]], distance[best]))
-    row, column, distance = (np.array(part) for part in zip(*ends, strict=True))
+    row, column, distance = (np.array(values) for values in zip(*ends, strict=True))
     bridges = sparse.csr_array((distance, (row, column)), shape=lengths.shape)
     return (lengths + bridges + bridges.T).tocsr()
 
 
 def coupled_components(laplacian):
-    """Number the parts of the cloud between which the operator couples no points, (n,) int.
+    """Number the components of the cloud between which the operator couples no points, (n,) int.
 
-    Parts of fewer than 50 points are -1: points left out, and single ones within a component that are so far off
+    Those of fewer than 50 points are -1: points left out, and single ones within a component that are so far off
     its surface that they lost all neighbours.
     """
     count, label = connected_components(laplacian.stiffness, directed=False)

@@ -27,7 +27,7 @@ _LOPSIDED = 0.2  # mean offset of the neighbours over their mean distance at a b
 _RTOL, _PRODUCTS = 1e-6, 500  # of the linear solves
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class MinimalSurface:
     """Points moved towards the least area that their fixed boundary can span.
 
@@ -63,7 +63,7 @@ class MinimalSurface:
 
 
 def minimal_surface(
-    points, fixed, epsilon=1e-4, max_steps=100, options=LaplacianOptions(), callback=None, progress=None
+    points, fixed, *, epsilon=1e-4, max_steps=100, options=LaplacianOptions(), callback=None, progress=None
 ):
     """Move points until the area is the least that the fixed points permit.
 
@@ -94,12 +94,18 @@ def minimal_surface(
     Raises
     ------
     InvalidPointsError
-        Too few fixed points, or nothing but fixed points; a part without any, or an edge that is not fixed; a tolerance
-        or a number of steps out of range.
+        Too few fixed points, or nothing but fixed points; a component without any, or a boundary that is not fixed; a
+        tolerance or a number of steps out of range.
     PointCloudError
         No operator can be built on the given points.
     Cancelled
         Raised by `progress` before there is an operator of the given points.
+
+    See Also
+    --------
+    MinimalSurface : The result.
+    mean_curvature : Zero on it, but at fixed points.
+    fair_points : Takes noise away.
 
     Notes
     -----
@@ -129,6 +135,18 @@ def minimal_surface(
     ----------
     Petronetto et al. 2013, section 5, Figure 14. Pinkall, Polthier. Computing discrete minimal surfaces and their
     conjugates. 1993.
+
+    Examples
+    --------
+    A cushion over a square of area four becomes flat while its boundary is fixed:
+
+    >>> import numpy as np
+    >>> import core
+    >>> x, y = np.mgrid[-1:1:21j, -1:1:21j].reshape(2, -1)
+    >>> points = np.column_stack([x, y, 0.5 * (1 - x**2) * (1 - y**2)])
+    >>> film = core.minimal_surface(points, np.maximum(np.abs(x), np.abs(y)) == 1)
+    >>> print(film.converged, round(film.initial_area, 1), film.areas.sum().round(1))
+    True 4.6 4.0
     """
     points = check_points(points)
     fixed = as_mask(fixed, len(points))
@@ -229,7 +247,7 @@ class _Film:
         self.boundary = _boundary_points(first, fixed)
         self.curve = BoundaryCurve(first.points[self.boundary]) if len(self.boundary) else None
         self.free = np.flatnonzero(~fixed & (first.component >= 0))
-        self.parts = first.component.max()
+        self.components = first.component.max()
 
     def state(self, points, before):
         """Build the operator of moved points, the boundary's distances by the normals before, and the next step."""
@@ -244,7 +262,7 @@ class _Film:
             points, options=self.options, boundary=self.boundary, boundary_distance=distance, progress=self.progress
         )
         torn = np.count_nonzero(laplacian.component[self.free] < 0)
-        if torn or laplacian.component.max() > self.parts:
+        if torn or laplacian.component.max() > self.components:
             raise NotASurfaceError(f"The surface came apart; {torn} points lie apart from the rest. Use more points.")
         return self._with_step(points, laplacian, foot)
 
@@ -313,7 +331,7 @@ def _boundary_points(laplacian, fixed):
     loose = np.setdiff1d(component[component >= 0], component[rows])
     if len(loose):
         raise InvalidPointsError(
-            f"{np.count_nonzero(np.isin(component, loose))} of {len(points)} points are in parts of the surface"
+            f"{np.count_nonzero(np.isin(component, loose))} of {len(points)} points are in components of the surface"
             " without fixed points, which would shrink to nothing. Fix their boundaries, or delete them."
         )
     nearest = find_nearest(points)

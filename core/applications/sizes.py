@@ -23,7 +23,7 @@ class SurfaceSize:
         Raises
         ------
         PointCloudError
-            The volume of a part is not one by its normals.
+            The volume of a component is not one by its normals.
         """
         self.laplacian, self.kind = laplacian, kind
         self.known = laplacian.component >= 0
@@ -42,7 +42,7 @@ class SurfaceSize:
                 )
 
     def __call__(self, moved):
-        """Return the size of each part for new places of all points, (parts,)."""
+        """Return the size of each component for new places of all points, (components,)."""
         growth, normals = self._metric(moved)
         return self._sizes(moved, self.laplacian.areas[self.known] * growth, normals)
 
@@ -65,23 +65,23 @@ class SurfaceSize:
         return self._along_axes(places, areas, normals).mean(axis=1)
 
     def _along_axes(self, places, areas, normals):
-        """Return the volume of each part by the divergence of (x, 0, 0), (0, y, 0) and (0, 0, z), (parts, 3)."""
-        part = self.laplacian.component[self.known]
-        total = np.bincount(part)
+        """Return the volume of each component by the divergence of (x, 0, 0), (0, y, 0) and (0, 0, z), (c, 3)."""
+        component = self.laplacian.component[self.known]
+        total = np.bincount(component)
         columns = []
         for x, across in zip(places[self.known].T, normals.T, strict=True):
-            center = np.bincount(part, x) / total
-            columns.append(np.bincount(part, areas * (x - center[part]) * across))
+            center = np.bincount(component, x) / total
+            columns.append(np.bincount(component, areas * (x - center[component]) * across))
         return np.column_stack(columns)
 
 
 def match_size(size, wanted, touched):
-    """Return the scale of each part at which its size is the one wanted, by secant steps on all parts together.
+    """Return the scale of each component at which its size is the one wanted, by secant steps on all of them together.
 
     Raises
     ------
     SolverError
-        Some part has no such scale near 1.
+        Some component has no such scale near 1.
     """
     last, scale = np.ones(len(wanted)), np.ones(len(wanted))
     error = np.where(touched, size(scale) / wanted - 1.0, 0.0)

@@ -19,6 +19,7 @@ def smooth_points(
     laplacian,
     response,
     spectrum=None,
+    *,
     strength=1.0,
     mask=None,
     keep=None,
@@ -29,7 +30,7 @@ def smooth_points(
     """Filter the shape of the surface by frequency.
 
     The coordinates are three functions on the points. Each component keeps its centre, so that the result moves
-    and turns with the points, and parts do not collapse into each other.
+    and turns with the points, and components do not collapse into each other.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def smooth_points(
         its area, or enclosed volume, before. The volume needs a closed surface and normals that point outwards.
     dirichlet : bool
         Boundary points stay where they are: what is filtered is the distance from the surface that spans the boundary
-        like a soap film. Otherwise a boundary shrinks like all else, as the modes meet it level.
+        like a soap film. Otherwise a boundary shrinks like all else, as Neumann modes meet it level.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
     base : ndarray, (n, 3), optional
@@ -65,32 +66,60 @@ def smooth_points(
     Raises
     ------
     PointCloudError
-        A response, mask, strength or choice that makes no sense, or modes that are constants alone.
-    UnresolvedModesError, TooFewPointsError, SolverError
-        From the spectrum, where it is computed here, or a scale that is not found.
+        A response, mask, strength or choice that makes no sense, modes that are constants alone, or a volume to keep
+        of a surface that encloses none.
+    TooFewPointsError, SolverError
+        From the spectrum, where it is computed here; a scale that is not found.
+
+    See Also
+    --------
+    fair_points : An implicit step against noise.
+    spectral_filter : Filters any function by modes.
+    chebyshev_filter : Filters any function without modes.
+    exponential, fairing, band, boost : Responses.
 
     References
     ----------
     Vallet, Levy. Spectral geometry processing with manifold harmonics. 2008. Section 4 and Figure 12 of the paper.
+
+    Examples
+    --------
+    Coordinates of the unit sphere are modes of eigenvalue 2, so that the flow of heat for the time 0.1 shrinks it by
+    exp(-0.2), unless its area is kept:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> smaller = core.smooth_points(laplacian, core.exponential(0.1))
+    >>> print(np.linalg.norm(smaller, axis=1).mean().round(2))
+    0.82
+    >>> same = core.smooth_points(laplacian, core.exponential(0.1), keep="area")
+    >>> print(np.linalg.norm(same, axis=1).mean().round(2))
+    1.0
     """
     if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
-    blend = PointBlend(laplacian, strength, mask, keep, dirichlet)
-    base = smoothing_base(laplacian, dirichlet, progress) if base is None else base
+    blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
+    base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
     rest = laplacian.points - base
     if spectrum is None and callable(response):
-        filtered = chebyshev_filter(laplacian, rest, response, dirichlet, tolerance=_TOLERANCE, progress=progress)
+        filtered = chebyshev_filter(
+            laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
+        )
     elif callable(response):
         end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
-        filtered = spectral_filter(rest, spectrum, laplacian.areas, response, end)
+        filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
     else:
         if spectrum is None:
             spectrum = laplacian.eigenpairs(response, raw=True, dirichlet=dirichlet, progress=progress)
-        parts = laplacian.component.max() + 1
-        if not dirichlet and response <= parts:
+        components = laplacian.component.max() + 1
+        if not dirichlet and response <= components:
             raise PointCloudError(
-                f"The first {response} modes move {parts} component(s) as a whole and have no shape. Keep"
-                f" at least {parts + 3} modes."
+                f"The first {response} modes move {components} component(s) as a whole and have no shape. Keep"
+                f" at least {components + 3} modes."
             )
         filtered = spectral_filter(rest, spectrum, laplacian.areas, response)
     return blend(base + filtered)
@@ -99,6 +128,7 @@ def smooth_points(
 def fair_points(
     laplacian,
     time=None,
+    *,
     order=3,
     strength=1.0,
     mask=None,
@@ -132,26 +162,55 @@ def fair_points(
     Raises
     ------
     PointCloudError
-        A time, order, mask, strength or choice that makes no sense.
+        A time, order, mask, strength or choice that makes no sense, or a volume to keep of a surface that encloses
+        none.
     SolverError
         A scale is not found.
 
-    References
-    ----------
-    Desbrun, Meyer, Schroder, Barr. Implicit fairing of irregular meshes using diffusion and curvature flow. 1999.
+    See Also
+    --------
+    smooth_points : Filters by any response, or by modes.
+    fairing : The response.
 
     Notes
     -----
     The operator's spectrum is bounded by its wide kernel. A polynomial of it then inverts the equations in fewer
     products than conjugate gradients, whose steps grow with the power ``order / 2`` of the time, not with its root.
+
+    References
+    ----------
+    Desbrun, Meyer, Schroder, Barr. Implicit fairing of irregular meshes using diffusion and curvature flow. 1999.
+
+    Examples
+    --------
+    Radii that scatter by 0.02 scatter by a fifth of that afterwards:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
+    >>> smooth = core.fair_points(core.build_laplacian(noisy))
+    >>> print(np.linalg.norm(noisy, axis=1).std().round(3), np.linalg.norm(smooth, axis=1).std().round(3))
+    0.02 0.004
     """
     if time is None:
         known = laplacian.component >= 0
         time = 0.5 * np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known])
-    return smooth_points(laplacian, fairing(time, order), None, strength, mask, keep, dirichlet, progress, base)
+    return smooth_points(
+        laplacian,
+        fairing(time, order),
+        strength=strength,
+        mask=mask,
+        keep=keep,
+        dirichlet=dirichlet,
+        progress=progress,
+        base=base,
+    )
 
 
-def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
+def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
     """Move the points along their normals by a vibration mode (Figure 9 of the paper).
 
     Parameters
@@ -176,6 +235,25 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
         A mode that does not fit the points.
     PointCloudError
         A mode that is zero, or an amplitude or phase that is not finite.
+
+    See Also
+    --------
+    LaplaceBeltrami.eigenpairs : Computes modes.
+    nodal_domains : Where a mode keeps its sign.
+
+    Examples
+    --------
+    The height is a mode of the unit sphere. It moves both poles up by 0.2, one of them outwards and the other inwards:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> moved = core.displace_by_mode(laplacian, z, 0.2)
+    >>> print(moved[:, 2].min().round(1), moved[:, 2].max().round(1))
+    -0.8 1.2
     """
     points = laplacian.points
     mode = check_values(mode, len(points), columns=False)
@@ -189,7 +267,7 @@ def displace_by_mode(laplacian, mode, amplitude=None, phase=0.0):
     return points + (amplitude * np.cos(phase) / largest) * mode[:, None] * laplacian.normals
 
 
-def smoothing_base(laplacian, dirichlet=False, progress=None):
+def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     """Return the part of the points' places that filters leave alone.
 
     Parameters
@@ -204,16 +282,23 @@ def smoothing_base(laplacian, dirichlet=False, progress=None):
     -------
     ndarray, (n, 3)
         The centre of each component or, with a fixed boundary, the harmonic surface that spans it [L].
+
+    Raises
+    ------
+    PointCloudError
+        A fixed boundary without points of its own.
+    SolverError
+        The solver did not converge.
     """
-    points, part = laplacian.points, laplacian.component
+    points, component = laplacian.points, laplacian.component
     base = points.copy()
-    known = part >= 0
-    base[known] = _centers(laplacian, laplacian.areas)[part[known]]
+    known = component >= 0
+    base[known] = _centers(laplacian, laplacian.areas)[component[known]]
     if dirichlet:
         boundary = boundary_places(laplacian)
         pull = laplacian.dirichlet[1]
         order, root, multiply = corrected_operator(laplacian, dirichlet=True, raw=True)
-        # In terms of the distance from the centre: parts without a boundary, whose equations are singular, stay there.
+        # As distances from the centre: where there is no boundary the equations are singular, and all stays in place.
         force = (pull @ np.where(laplacian.near_boundary[:, None], boundary - base, 0.0))[order] * root[:, None]
         operator = LinearOperator((len(order),) * 2, matvec=multiply, dtype=np.float64)
         base[order] += root[:, None] * np.column_stack(
@@ -223,12 +308,12 @@ def smoothing_base(laplacian, dirichlet=False, progress=None):
 
 
 def _centers(laplacian, weights):
-    """Return the weighted mean of the points of each component, (parts, 3); that of weight zero is not used."""
+    """Return the weighted mean of the points of each component, (components, 3); that of weight zero is not used."""
     known = laplacian.component >= 0
-    part, weights = laplacian.component[known], weights[known]
-    total = np.bincount(part, weights)
+    component, weights = laplacian.component[known], weights[known]
+    total = np.bincount(component, weights)
     total[total == 0.0] = 1.0
-    sums = [np.bincount(part, weights * column) for column in laplacian.points[known].T]
+    sums = [np.bincount(component, weights * column) for column in laplacian.points[known].T]
     return np.column_stack(sums) / total[:, None]
 
 
@@ -279,13 +364,18 @@ class PointBlend:
     laplacian, strength, mask, keep, dirichlet
         As in `smooth_points`, whose results without these are filtered places.
 
+    Attributes
+    ----------
+    mask, weights : ndarray, (n,)
+        Weight of each point, zero where it stays, and the same times the strength.
+
     Raises
     ------
     PointCloudError
         A mask, strength or choice that makes no sense.
     """
 
-    def __init__(self, laplacian, strength=1.0, mask=None, keep=None, dirichlet=False):
+    def __init__(self, laplacian, *, strength=1.0, mask=None, keep=None, dirichlet=False):
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         if not np.isfinite(strength):
@@ -308,23 +398,39 @@ class PointBlend:
         if keep is not None and dirichlet:
             raise PointCloudError("A boundary that stays fixes the size already: keep neither area nor volume with it.")
         if keep == "volume" and laplacian.boundary.any():
-            parts = len(np.unique(laplacian.component[laplacian.boundary]))
+            components = len(np.unique(laplacian.component[laplacian.boundary]))
             raise PointCloudError(
-                f"Components that have a boundary and enclose no volume: {parts}. Keep the area instead."
+                f"Components that have a boundary and enclose no volume: {components}. Keep the area instead."
             )
 
     def __call__(self, filtered):
-        """Return the result for filtered places, (n, 3)."""
+        """Return the result for filtered places.
+
+        Parameters
+        ----------
+        filtered : ndarray, (n, 3)
+            Where the filter at full strength puts the points [L].
+
+        Returns
+        -------
+        ndarray, (n, 3)
+            New places for ``laplacian.points`` [L].
+
+        Raises
+        ------
+        SolverError
+            A scale is not found.
+        """
         points = self.laplacian.points
         if self.keep is None or not self.weights.any():
             return points + self.weights[:, None] * (filtered - points)
         known = self.laplacian.component >= 0
-        part = np.where(known, self.laplacian.component, 0)
-        center = _centers(self.laplacian, self.laplacian.areas * self.mask)[part]
+        component = np.where(known, self.laplacian.component, 0)
+        center = _centers(self.laplacian, self.laplacian.areas * self.mask)[component]
 
         def result(scale):
-            return points + self.weights[:, None] * (center + scale[part][:, None] * (filtered - center) - points)
+            return points + self.weights[:, None] * (center + scale[component][:, None] * (filtered - center) - points)
 
         measure = SurfaceSize(self.laplacian, self.keep)
-        touched = np.bincount(part, self.weights) != 0.0
+        touched = np.bincount(component, self.weights) != 0.0
         return result(match_size(lambda scale: measure(result(scale)), measure.before, touched))

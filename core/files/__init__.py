@@ -4,14 +4,3 @@ from .formats import READABLE, WRITABLE, read_points, write_points
 from .origin import choose_origin, is_coarse
 from .table import PointTable
 from .whole import replacing
-
-__all__ = [
-    "READABLE",
-    "WRITABLE",
-    "PointTable",
-    "choose_origin",
-    "is_coarse",
-    "read_points",
-    "replacing",
-    "write_points",
-]

@@ -20,7 +20,7 @@ _NOISE = 0.10  # changes of log d100 that may be chance
 _SLOW, _FAST, _SMOOTH, _LAST = 160, 10, 12, 2  # rounds of averaging over the 40 nearest neighbours
 
 
-def smoothing_lengths(nearest, options, label=None, max_abs_curvature=None, inside=None, deepest=None):
+def smoothing_lengths(nearest, options, component=None, max_abs_curvature=None, inside=None, deepest=None):
     """Choose h for every point.
 
     Parameters
@@ -29,8 +29,8 @@ def smoothing_lengths(nearest, options, label=None, max_abs_curvature=None, insi
         Of m points.
     options : LaplacianOptions
         Its bandwidth, neighbors and bandwidth_factor.
-    label : ndarray, (m,) int, optional
-        Parts of the cloud; neighbours are counted within a part.
+    component : ndarray, (m,) int, optional
+        Component of each point; neighbours are counted within one.
     max_abs_curvature : ndarray, (m,), optional
         The larger principal curvature of every point; for "adaptive".
     inside : ndarray, (m, 2), optional
@@ -43,14 +43,14 @@ def smoothing_lengths(nearest, options, label=None, max_abs_curvature=None, insi
     ndarray, (m,)
         Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
         twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: the same distance
-        without what may be chance, and without changes over the part that one h serves as well, times a factor between
-        0.3 and 0.58 that is as large as the irregularity of the spacing demands and the curvature permits. Where the
-        surface bends most, as on a bead of few points, the kernel reaches no further than half a turn; where it is
-        narrow h stays below 0.4 of the depth, the distance of its middle from the boundary; but not below 1.2 spacings.
-        Where there is room, up to 0.76 of the distance, it is widened so that it grows by no more than 0.02 of the way
-        along the surface, and smoothed.
+        without what may be chance, and without changes over the component that one h serves as well, times a factor
+        between 0.3 and 0.58 that is as large as the irregularity of the spacing demands and the curvature permits.
+        Where the surface bends most, as on a bead of few points, the kernel reaches no further than half a turn; where
+        it is narrow h stays below 0.4 of the depth, the distance of its middle from the boundary; but not below 1.2
+        spacings. Where there is room, up to 0.76 of the distance, it is widened so that it grows by no more than 0.02
+        of the way along the surface, and smoothed.
     """
-    distance = _neighbor_distance(nearest.tree, options.neighbors, label)
+    distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
         return np.full(len(distance), options.bandwidth_factor * distance.mean())
     averaging = nearest.averaging()
@@ -62,7 +62,7 @@ def smoothing_lengths(nearest, options, label=None, max_abs_curvature=None, insi
         own = own + 0.5 * np.log(_share_inside(inside / distance[:, None])).sum(axis=1)
     fast = _repeat(averaging, own, _FAST)
     slow = _repeat(averaging, fast, _SLOW)
-    typical = _typical(slow, label)
+    typical = _typical(slow, component)
     reach = typical + _all_beyond(slow - typical, _EVEN) + _beyond(fast - slow, _NOISE)
     irregular = irregularity(nearest, averaging)
     least, most = (np.log(np.interp(irregular, _IRREGULARITY, factors)) for factors in (_NARROWEST, _WIDEST))
@@ -96,14 +96,14 @@ def _lipschitz_limit(nearest, length, widest):
         length = np.maximum(length, wider)
 
 
-def _typical(values, label):
-    """Return the median of the part that a point belongs to, (m,)."""
-    if label is None:
+def _typical(values, component):
+    """Return the median of the component that a point belongs to, (m,)."""
+    if component is None:
         return np.median(values)
-    order = np.lexsort((values, label))
-    size = np.bincount(label)
+    order = np.lexsort((values, component))
+    size = np.bincount(component)
     first = np.cumsum(size) - size
-    return values[order[first + size // 2]][label]
+    return values[order[first + size // 2]][component]
 
 
 def _beyond(values, least):
@@ -131,14 +131,14 @@ def _counted(nearest):
     return nearest.weight > 1e-12  # zero but for rounding
 
 
-def _neighbor_distance(tree, neighbors, label):
+def _neighbor_distance(tree, neighbors, component):
     # The tree counts a point as its own first neighbour.
     distance = tree.query(tree.data, k=[min(neighbors + 1, tree.n)], workers=-1)[0][:, 0]
-    if label is not None:
-        size = np.bincount(label)
-        for part in np.flatnonzero(size <= neighbors):
-            few = size[part] - 1
-            rows = np.flatnonzero(label == part)
+    if component is not None:
+        size = np.bincount(component)
+        for small in np.flatnonzero(size <= neighbors):
+            few = size[small] - 1
+            rows = np.flatnonzero(component == small)
             reach = tree.query(tree.data[rows], k=[few + 1], workers=-1)[0][:, 0]
             distance[rows] = reach * np.sqrt(neighbors / few)
     return distance

@@ -7,7 +7,9 @@ from scipy.spatial import cKDTree
 
 from ..kernel import SUPPORT
 from .components import label_connected
+from .distances import arc_squared
 from .nearest import fading_weights
+from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
 
@@ -19,7 +21,8 @@ _PROBE, _EMPTY = 6.0, 0.6  # no point within 0.6 of 6 spacings of the place 6 sp
 _FOLDED = 2  # neighbours on another sheet that a boundary point may have
 _LINK = 4.0  # spacings between candidates of the same boundary
 _SHORTEST = 16  # candidates of a boundary that is found
-FEWEST = 5  # points of a boundary that is given
+_REACH = 20.0  # spacings from a boundary at which no kernel sees it
+_SAME = 0.5  # spacings between the measured and the given distance to a boundary, near a corner
 _CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at least, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
@@ -58,6 +61,17 @@ class Boundary:
     def reached(self, lengths):
         """Tell from which points a kernel of these smoothing lengths reaches beyond the boundary, (m,) bool."""
         return self.distance[:, 0] < SUPPORT * lengths
+
+    def with_nearest(self, distance, spacing):
+        """Return the same with given distances to the nearest boundary, (m,), but for measured ones next to corners."""
+        nearer = np.argmin(self.distance, axis=1)[:, None]
+        measured = np.take_along_axis(self.distance, nearer, axis=1)[:, 0]
+        # Around a corner that the surface fills, the nearest place is the corner, which mirrors nothing.
+        low, high = (measured + side * _SAME * spacing for side in (-1.0, 1.0))
+        same = np.isinf(self.distance[:, 1]) | ((low < distance) & (distance < high))
+        result = self.distance.copy()
+        np.put_along_axis(result, nearer, np.where(same, distance, measured)[:, None], axis=1)
+        return replace(self, distance=result)
 
 
 def no_boundary(count):
@@ -137,7 +151,7 @@ def _tangents(directions, normals):
     return flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
 
 
-def measure_boundary(nearest, normals, at_boundary, reach):
+def measure_boundary(nearest, normals, at_boundary):
     """Measure how far the points are from the boundary.
 
     Around every boundary point the boundary's course is a parabola through the boundary points next to it, on one side
@@ -152,14 +166,12 @@ def measure_boundary(nearest, normals, at_boundary, reach):
         Unit normals.
     at_boundary : ndarray, (m,) bool
         Points at the boundary.
-    reach : ndarray, (m,)
-        Distance at which a boundary matters no more.
 
     Returns
     -------
     Boundary
     """
-    boundary = no_boundary(len(normals))
+    boundary, reach = no_boundary(len(normals)), _REACH * nearest.spacing
     rows = np.flatnonzero(at_boundary)
     if len(rows) < FEWEST:
         return boundary
@@ -226,7 +238,7 @@ class _Course:
         side = np.sign(np.einsum("ic,ikc->ik", normals[block], other))[:, :, None]
         turn = np.einsum("ikc,ikc->ik", chord, side * normals[block, None] - other)
         squared = np.maximum(np.einsum("ikc,ikc->ik", chord, chord), 1e-300)
-        stretch = np.sqrt(1.0 + turn**2 / (12.0 * squared))
+        stretch = np.sqrt(arc_squared(squared, turn) / squared)
         t = np.einsum("ikc,ikc->ik", chord, self.along[seen])
         e = np.einsum("ikc,ikc->ik", chord, self.across[seen])
         height = np.einsum("ikc,ikc->ik", chord, other)
@@ -321,9 +333,8 @@ def given_boundary(nearest, normals, distance):
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
         weighted = np.swapaxes(basis * nearest.weight[block][:, :, None], 1, 2)
         fit = np.linalg.solve(weighted @ basis + 1e-9 * np.eye(6), weighted @ distance[index][:, :, None])[:, :, 0]
-        bend = (
-            -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
-        )  # of the line at this distance; the boundary's own is this below
+        # Of the line at this distance; the boundary's own is the next.
+        bend = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
         curvature[block] = bend / np.maximum(1.0 + bend * distance[block], 0.5)
     boundary = no_boundary(len(distance))
     boundary.distance[:, 0], boundary.curvature[:, 0] = distance, curvature

@@ -1,26 +1,56 @@
-"""From coordinates to neighbourhoods: everything that the operator needs to know of a cloud."""
+"""From coordinates to pairs: the stages of the walk, each a function from one typed value to the next."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import ComponentError, InvalidPointsError
+from ..errors import ComponentError
 from ..options import LaplacianOptions
 from .bandwidth import depth, smoothing_lengths
-from .boundary import FEWEST, Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
+from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
 from .components import label_components, move_apart
-from .distances import roughness
-from .nearest import find_nearest
+from .distances import measure_roughness
+from .nearest import Nearest, find_nearest
 from .noise import LEAST, STRONG, noise_level, project_points
 from .normals import covariance_normals, orient_normals, unit_normals
 from .pairs import Pairs, find_pairs
-from .points import ScaledPoints, as_mask, check_distances, check_points, scale_points
-from .quadrics import fit_quadrics
-from .sheets import fit_sheets, label_sheets, last_pairs, pairs_on_one_sheet, unsure_orientation
+from .points import ScaledPoints, check_boundary, check_distances, check_points, scale_points
+from .quadrics import Quadrics, fit_quadrics
+from .sheets import fit_sheets, label_sheets, separate_sheets
 
-_SAME_BOUNDARY = 0.5  # spacings between the measured and the given distance to a boundary, near a corner
-_BOUNDARY_REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The points that take part, by component, in scaled coordinates.
+
+    Attributes
+    ----------
+    scaled : ScaledPoints
+        The m distinct points, and the way back to the caller's.
+    component : ndarray, (m,) int
+        Of each point, the largest 0.
+    nearest : Nearest
+        Neighbours of each point; components stand far apart there, and noisy points are where they were moved to.
+    """
+
+    scaled: ScaledPoints
+    component: np.ndarray
+    nearest: Nearest
+
+    @property
+    def moved(self):
+        """How far the points were moved to smooth noise, (m, 3)."""
+        return self.nearest.points - move_apart(self.scaled.points, self.component)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A sample, and a quadric through the neighbours of each point on its own sheet; others weigh nothing there."""
+
+    sample: Sample
+    quadrics: Quadrics
 
 
 @dataclass(frozen=True)
@@ -31,14 +61,14 @@ class Cloud:
     ----------
     scaled : ScaledPoints
         The m distinct points that take part, and the way back to the caller's.
-    label : ndarray, (m,) int
+    component : ndarray, (m,) int
         Component of each point.
     normals : ndarray, (m, 3)
         Unit normals.
     moved : ndarray, (m, 3)
         How far the points were moved to smooth noise.
-    mean_curvature, gaussian : ndarray, (m,)
-        Mean and Gaussian curvature of local quadrics; the latter is zero where the options do not ask for it.
+    mean_curvature, gaussian_curvature : ndarray, (m,)
+        Of local quadrics; the latter is zero where the options do not ask for it.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
     roughness : ndarray, (m,)
@@ -54,11 +84,11 @@ class Cloud:
     """
 
     scaled: ScaledPoints
-    label: np.ndarray
+    component: np.ndarray
     normals: np.ndarray
     moved: np.ndarray
     mean_curvature: np.ndarray
-    gaussian: np.ndarray
+    gaussian_curvature: np.ndarray
     spacing: np.ndarray
     roughness: np.ndarray
     boundary: Boundary
@@ -68,7 +98,7 @@ class Cloud:
 
 
 def read_cloud(points, options, normals=None, boundary=None, boundary_distance=None, progress=None):
-    """Go from coordinates to neighbourhoods.
+    """Go from coordinates to pairs.
 
     Parameters
     ----------
@@ -91,129 +121,210 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     report = progress or (lambda stage, fraction: None)
     report("Normals", 0.0)
     points = check_points(points)
-    scaled = scale_points(points, options.neighbors + 1)
-    notices = []
-    if scaled.duplicates:
-        notices.append(f"Points that lie exactly on another one: {scaled.duplicates}. They share one area.")
-    nearest = find_nearest(scaled.points)
-    label = label_components(nearest)
-    lone = np.count_nonzero(label < 0)
-    if lone:
-        scaled, label = _leave_out(scaled, label, options)
-    if lone or label.max() > 0:
-        nearest = find_nearest(move_apart(scaled.points, label))
-    surface, nearest = _fit(nearest, options)
-    noise = noise_level(nearest.tree, np.median(surface.misfit / nearest.spacing))
-    if options.projection == "auto":
-        if noise >= LEAST:
-            notices.append(f"Noise of {noise:.2f} of the spacing was smoothed within the operator.")
-            for _ in range(2 if noise > STRONG else 1):
-                nearest = find_nearest(project_points(nearest.points, "quadric", label))
-            surface, nearest = _fit(nearest, options)
-    elif options.projection != "off":
-        surface, nearest = _fit(find_nearest(project_points(nearest.points, options.projection, label)), options)
-    moved = nearest.points - move_apart(scaled.points, label)
+    needed = options.neighbors + 1
+    scaled = scale_points(points, needed)
+    sample = divide_components(scaled, needed)
+    surface = fit_surface(sample, options.sheets)
+    noise = measure_noise(surface)
+    surface = remove_noise(surface, noise, options)
     if options.sheets:
-        sheets = label_sheets(nearest, surface.normals, label)
-        off = np.count_nonzero(sheets < 0)
-        if off or sheets.max() > label.max():
-            lone, moved = lone + off, moved[sheets >= 0]
-            scaled, label = _leave_out(scaled, sheets, options)
-            surface, nearest = _fit(find_nearest(move_apart(scaled.points, label) + moved), options)
-    if lone:
-        notices.append(f"Points that lie apart from the rest, left out of the operator: {lone}.")
+        surface = divide_sheets(surface, needed)
+    sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
 
-    own = surface.normals if normals is None else unit_normals(normals, len(points))[scaled.first]
-    oriented = orient_normals(nearest, own)
-    boundary = _boundary(nearest, oriented, options, scaled, boundary, boundary_distance)
+    given = None if normals is None else unit_normals(normals, len(points))[sample.scaled.first]
+    oriented = orient_normals(nearest, quadrics.normals if given is None else given)
+    boundary = locate_boundary(sample, oriented, options.boundary == "auto", boundary, boundary_distance)
 
     report("Neighbors", 0.2)
     deepest = depth(nearest, boundary.distance)
-    lengths = smoothing_lengths(nearest, options, label, surface.max_abs_curvature, boundary.distance, deepest)
-    if np.mean(lengths > _NARROW * deepest) > _MANY:
-        notices.append(
-            "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be"
-            " off by 10 % and more. Add points."
-        )
-    found = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3))
-    pairs = Pairs(nearest.points, lengths, *found)
-    if normals is None and options.normals != "quadric":
-        own = covariance_normals(pairs, weighted=options.normals == "wpca")
-        own = orient_normals(nearest, own) if options.orient else own
-    elif normals is None:
-        own = oriented
-    flipped = np.sign(np.einsum("ij,ij->i", own, surface.normals))
-    definite = noise == 0.0 and not np.isfinite(boundary.distance).any()
+    lengths = smoothing_lengths(
+        nearest, options, sample.component, quadrics.max_abs_curvature, boundary.distance, deepest
+    )
+    pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
+    own = final_normals(nearest, pairs, given, oriented, options)
+
     report("Neighbors", 0.4)
-    if options.sheets:
-        same_side = np.sign(np.einsum("ij,ij->i", oriented, surface.normals))
-        shape_operator = same_side[:, None, None] * surface.shape_operator
-        unsure = unsure_orientation(nearest, oriented)
-        same = pairs_on_one_sheet(pairs, oriented, unsure, shape_operator, nearest.spacing)
-        if not same.all():
-            definite, pairs = False, pairs.keep(same | last_pairs(pairs, same))
+    separated = separate_sheets(pairs, nearest, oriented, quadrics) if options.sheets else pairs
+    side = np.sign(np.einsum("ij,ij->i", own, quadrics.normals))
+    count = len(own)
     return Cloud(
-        scaled=scaled,
-        label=label,
+        scaled=sample.scaled,
+        component=sample.component,
         normals=own,
-        moved=moved,
-        mean_curvature=0.5 * flipped * np.trace(surface.shape_operator, axis1=1, axis2=2),
-        gaussian=surface.gaussian if options.curvature_correction else np.zeros(len(own)),
+        moved=sample.moved,
+        mean_curvature=0.5 * side * np.trace(quadrics.shape_operator, axis1=1, axis2=2),
+        gaussian_curvature=quadrics.gaussian_curvature if options.curvature_correction else np.zeros(count),
         spacing=nearest.spacing,
-        roughness=np.zeros(len(own))
+        # What sticks out is noise where there is any, and shape where not.
+        roughness=np.zeros(count)
         if noise > 0.0 and options.projection == "auto"
-        else roughness(nearest, surface.normals),
+        else measure_roughness(nearest, quadrics.normals),
         boundary=boundary,
-        pairs=pairs,
-        definite=definite,
-        notices=notices,
+        pairs=separated,
+        definite=noise == 0.0 and separated is pairs and not np.isfinite(boundary.distance).any(),
+        notices=_notices(
+            duplicates=len(points) - len(scaled.points),
+            left_out=len(scaled.points) - len(own),
+            noise=noise if options.projection == "auto" else 0.0,
+            narrow=np.mean(lengths > _NARROW * deepest) > _MANY,
+        ),
     )
 
 
-def _fit(nearest, options):
-    if options.sheets:
-        return fit_sheets(nearest)
-    return fit_quadrics(nearest.points, nearest.index, nearest.weight), nearest
+def divide_components(scaled, needed):
+    """Divide distinct points into components that gaps separate, and leave out those of too few points.
+
+    Parameters
+    ----------
+    scaled : ScaledPoints
+    needed : int
+        How many points must be left.
+
+    Returns
+    -------
+    Sample
+
+    Raises
+    ------
+    ComponentError
+        Too few are left.
+    """
+    whole = Sample(scaled, np.zeros(len(scaled.points), dtype=int), find_nearest(scaled.points))
+    return _regroup(whole, label_components(whole.nearest), needed)
 
 
-def _boundary(nearest, normals, options, scaled, boundary, boundary_distance):
+def fit_surface(sample, sheets):
+    """Fit a quadric around every point, to the neighbours of its own sheet if close sheets are to be kept apart.
+
+    Returns
+    -------
+    Surface
+    """
+    nearest = sample.nearest
+    if not sheets:
+        return Surface(sample, fit_quadrics(nearest.points, nearest.index, nearest.weight))
+    quadrics, nearest = fit_sheets(nearest)
+    return Surface(replace(sample, nearest=nearest), quadrics)
+
+
+def measure_noise(surface):
+    """Return the noise of a surface as a share of the spacing; see `noise_level`."""
+    nearest = surface.sample.nearest
+    return noise_level(nearest.tree, np.median(surface.quadrics.misfit / nearest.spacing))
+
+
+def remove_noise(surface, noise, options):
+    """Move the points onto the surface that their neighbours describe, where the options or the noise ask for it.
+
+    Returns
+    -------
+    Surface
+        The same one where nothing is to be done.
+    """
+    method, rounds = options.projection, 1
+    if method == "auto":
+        method, rounds = "quadric", 0 if noise < LEAST else 1 if noise <= STRONG else 2
+    if method == "off" or not rounds:
+        return surface
+    sample, nearest = surface.sample, surface.sample.nearest
+    for _ in range(rounds):
+        nearest = find_nearest(project_points(nearest.points, method, sample.component))
+    return fit_surface(replace(sample, nearest=nearest), options.sheets)
+
+
+def divide_sheets(surface, needed):
+    """Divide components into sheets that nowhere meet, and leave out points that lie off all of them.
+
+    Returns
+    -------
+    Surface
+        The same one where there is nothing to divide.
+
+    Raises
+    ------
+    ComponentError
+        Too few points are left.
+    """
+    sample = surface.sample
+    sheets = label_sheets(sample.nearest, surface.quadrics.normals, sample.component)
+    divided = _regroup(sample, sheets, needed)
+    return surface if divided is sample else fit_surface(divided, True)
+
+
+def _regroup(sample, component, needed):
+    """Give points to other components, and leave out those of component -1; the same sample if nothing changes."""
+    out = component < 0
+    if not out.any() and component.max() == sample.component.max():
+        return sample
+    count, left = np.count_nonzero(out), np.count_nonzero(~out)
+    if left < max(needed, count):
+        raise ComponentError(
+            f"{count} of {len(out)} points lie apart from each other, in components of too few points. Use points of a"
+            " surface, or delete the lone ones."
+        )
+    scaled, component = sample.scaled.leave_out(out), component[~out]
+    return Sample(scaled, component, find_nearest(move_apart(scaled.points, component) + sample.moved[~out]))
+
+
+def locate_boundary(sample, oriented, search, boundary=None, boundary_distance=None):
+    """Find where the surface ends, or take what the caller knows of it.
+
+    Parameters
+    ----------
+    sample : Sample
+        Of m points.
+    oriented : ndarray, (m, 3)
+        Unit normals whose signs agree.
+    search : bool
+        Look for the boundary where neither of the others is given.
+    boundary, boundary_distance
+        The caller's, see `build_laplacian`.
+
+    Returns
+    -------
+    Boundary
+
+    Raises
+    ------
+    InvalidPointsError
+        What is given does not fit the points, or names too few of them.
+    """
+    scaled, nearest = sample.scaled, sample.nearest
     distance = None
     if boundary_distance is not None:
         distance = check_distances(boundary_distance, len(scaled.inverse))[scaled.first] / scaled.scale
         if boundary is None:
-            return given_boundary(nearest, normals, distance)
+            return given_boundary(nearest, oriented, distance)
     if boundary is not None:
-        at_boundary = as_mask(boundary, len(scaled.inverse))[scaled.first]
-        if 0 < np.count_nonzero(at_boundary) < FEWEST:
-            raise InvalidPointsError(
-                f"The boundary is given by {np.count_nonzero(at_boundary)} different points. Give at least {FEWEST}, or"
-                " none."
-            )
-    elif options.boundary == "auto":
-        at_boundary = find_boundary(nearest, normals)
+        at_boundary = check_boundary(boundary, len(scaled.inverse), scaled.first)
+    elif search:
+        at_boundary = find_boundary(nearest, oriented)
     else:
-        return no_boundary(len(normals))
-    boundary = measure_boundary(nearest, normals, at_boundary, _BOUNDARY_REACH * nearest.spacing)
-    if distance is not None:
-        nearer = np.argmin(boundary.distance, axis=1)[:, None]
-        measured = np.take_along_axis(boundary.distance, nearer, axis=1)[:, 0]
-        # Around a corner that the surface fills, the nearest place is the corner, which mirrors nothing.
-        low, high = (measured + side * _SAME_BOUNDARY * nearest.spacing for side in (-1.0, 1.0))
-        same = np.isinf(boundary.distance[:, 1]) | ((low < distance) & (distance < high))
-        np.put_along_axis(boundary.distance, nearer, np.where(same, distance, measured)[:, None], axis=1)
-    return boundary
+        return no_boundary(len(oriented))
+    measured = measure_boundary(nearest, oriented, at_boundary)
+    return measured if distance is None else measured.with_nearest(distance, nearest.spacing)
 
 
-def _leave_out(scaled, label, options):
-    """Leave out the points of no part, or raise if too little is left."""
-    out = label < 0
-    count, left = np.count_nonzero(out), np.count_nonzero(~out)
-    if left < max(options.neighbors + 1, count):
-        raise ComponentError(
-            f"{count} of {len(label)} points lie apart from each other, in components of too few points. Use points"
-            " of a surface, or delete the lone ones."
-        )
-    return scaled.leave_out(out), label[~out]
+def final_normals(nearest, pairs, given, oriented, options):
+    """Return the normals that the options ask for, (m, 3): given ones, those of quadrics, or from the covariance."""
+    if given is not None:
+        return given
+    if options.normals == "quadric":
+        return oriented
+    normals = covariance_normals(pairs, weighted=options.normals == "wpca")
+    return orient_normals(nearest, normals) if options.orient else normals
+
+
+def _notices(duplicates, left_out, noise, narrow):
+    """Say what a user should know of the walk, where there is something to say."""
+    texts = {
+        f"Points that lie exactly on another one: {duplicates}. They share one area.": duplicates,
+        f"Noise of {noise:.2f} of the spacing was smoothed within the operator.": noise >= LEAST,
+        f"Points that lie apart from the rest, left out of the operator: {left_out}.": left_out,
+        "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"
+        " 10 % and more. Add points.": narrow,
+    }
+    return [text for text, holds in texts.items() if holds]
 
 
 def estimate_normals(points, options=LaplacianOptions()):
@@ -229,12 +340,30 @@ def estimate_normals(points, options=LaplacianOptions()):
     Returns
     -------
     ndarray, (n, 3)
-        Those from the covariance are of arbitrary sign unless ``options.orient``. Points left out get the z axis.
+        Unit normals. Those from quadrics agree in sign, outwards on closed surfaces; those from the covariance are of
+        arbitrary sign unless ``options.orient``. Points left out get the z axis.
 
     Raises
     ------
     PointCloudError
         The points have no tangent planes; see `build_laplacian`.
+
+    See Also
+    --------
+    build_laplacian : The operator, whose ``normals`` these are.
+    mean_curvature : How the surface bends.
+
+    Examples
+    --------
+    On the unit sphere they are the points themselves:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> print(np.abs(core.estimate_normals(points) - points).max().round(2))
+    0.0
     """
     cloud = read_cloud(points, options)
     return cloud.scaled.scatter(cloud.normals, (0.0, 0.0, 1.0))

@@ -10,23 +10,23 @@ _REACH = 8
 
 
 def label_components(nearest):
-    """Number the parts of the cloud that lie apart from each other.
+    """Number the components of the cloud, which gaps separate.
 
-    Points are joined to their nearest neighbours, except over gaps far wider than the spacing at the nearer end; parts
-    of some size are joined over gaps that are no wider than the spacing of the sparser one would let expect.
+    Points are joined to their nearest neighbours, except over gaps far wider than the spacing at the nearer end;
+    components of some size are joined over gaps that are no wider than the spacing of the sparser one would let expect.
 
     Returns
     -------
     ndarray, (m,) int
-        The largest part is 0. Parts of fewer than 50 points, which get no operator, are -1.
+        The largest component is 0. Those of fewer than 50 points, which get no operator, are -1.
     """
     index, distance = nearest.index[:, 1 : _REACH + 1], nearest.distance[:, 1 : _REACH + 1]
     reach = _GAP * distance[:, -1]
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
-    part = number_by_size(label_connected(index, strict))
-    large = part >= 0
+    close = number_by_size(label_connected(index, strict))
+    large = close >= 0
     loose = large[:, None] & large[index] & (distance <= np.maximum(reach[:, None], reach[index]))
-    result = np.full(len(part), -1)
+    result = np.full(len(close), -1)
     result[large] = number_by_size(label_connected(index, strict | loose)[large])
     return result
 
@@ -47,10 +47,10 @@ def number_by_size(label, smallest=SMALLEST):
     return number[label]
 
 
-def move_apart(points, label):
-    """Move parts so far from each other that no search finds neighbours in another one; nothing else changes."""
-    if label.max() == 0:
+def move_apart(points, component):
+    """Move components so far from each other that no search finds neighbours in another one; nothing else changes."""
+    if component.max() == 0:
         return points
     moved = points.copy()
-    moved[:, 0] += 4.0 * np.ptp(points, axis=0).max() * label
+    moved[:, 0] += 4.0 * np.ptp(points, axis=0).max() * component
     return moved

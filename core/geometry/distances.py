@@ -9,6 +9,29 @@ _STEPS = 8  # nearest neighbours whose chords tell of roughness
 _EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
 
 
+def arc_squared(squared, turn, change=0.0):
+    """Return the squared length of circular arcs over chords.
+
+    ``s^2 = r^2 + t^2 (1 / 12 + c / 45)``, exact on spheres and cylinders to fourth order of the arc's angle, and to
+    sixth order with the change of the normals.
+
+    Parameters
+    ----------
+    squared : ndarray
+        r^2, of the chord d.
+    turn : ndarray
+        t = d . (n_j - n_i), of the unit normals at both ends, on one side.
+    change : ndarray, optional
+        c = |n_j - n_i|^2 / 2, which is one minus the cosine between them.
+    """
+    return squared + turn**2 * (1.0 / 12.0 + change / 45.0)
+
+
+def circle_arc(chord, bend):
+    """Return the length of circular arcs over chords, to all orders, by the sine of half their angle, |t| / (2 r)."""
+    return chord * np.where(bend > 1e-4, np.arcsin(bend) / np.maximum(bend, 1e-4), 1.0)
+
+
 def projected_distance(pairs, normals):
     """Return the length of each pair's difference in the plane orthogonal to its mean normal, eq. (10).
 
@@ -24,7 +47,7 @@ def projected_distance(pairs, normals):
     ndarray, (p,)
     """
     result = np.empty(len(pairs.first))
-    for block, left, right, cosine in pair_heights(pairs, normals):
+    for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, normals):
         side = np.where(cosine < 0.0, -1.0, 1.0)
         # The mean of two unit normals has the squared length (1 + cos) / 2.
         height = (left + side * right) ** 2 / (2.0 + 2.0 * np.abs(cosine))
@@ -37,7 +60,7 @@ def arc_length(cloud):
 
     ``s^2 = r^2 + (d . (n_j - n_i))^2 (1 / 12 + |n_j - n_i|^2 / 90) + g max(r^2 - a^2, 0)``. The second term is exact to
     sixth order on spheres and cylinders, to fourth order elsewhere and where normals turn by more than 32 degrees. The
-    third one is the way up and down over roughness of mean squared slope g, the mean of both ends' `roughness`: finer
+    third one is the way up and down over roughness of mean squared slope g, the mean of both ends' roughness: finer
     than the normals tell, but shape. Between points one spacing a apart the chord is that way.
 
     Parameters
@@ -52,17 +75,16 @@ def arc_length(cloud):
     """
     pairs = cloud.pairs
     result = np.empty(len(pairs.first))
-    for block, left, right, cosine in pair_heights(pairs, cloud.normals):
+    for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, cloud.normals):
         turn = np.where(cosine < 0.0, -right, right) - left
-        further = np.minimum(1.0 - np.abs(cosine), _ARC) / 45.0
-        result[block] = pairs.distance[block] ** 2 + turn**2 * (1.0 / 12.0 + further)
+        result[block] = arc_squared(pairs.distance[block] ** 2, turn, np.minimum(1.0 - np.abs(cosine), _ARC))
     if cloud.roughness.any():
         least = pairs.mean(cloud.spacing) ** 2
         result += pairs.mean(cloud.roughness) * np.maximum(pairs.distance**2 - least, 0.0)
     return np.sqrt(result)
 
 
-def roughness(nearest, normals):
+def measure_roughness(nearest, normals):
     """Measure what rises and falls between neighbouring points faster than the normals, fitted to many, can tell.
 
     Parameters
@@ -91,17 +113,23 @@ def roughness(nearest, normals):
     return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
 
 
-def pair_heights(pairs, normals):
-    """Yield blocks of pairs: the chord along the first normal, along the second, and the cosine of both."""
-    first, second, points = pairs.first, pairs.second, pairs.points
+def pair_heights(points, first, second, normals):
+    """Yield blocks of pairs: their rows, the chord, its height along the first normal and along the second, the cosine.
+
+    Parameters
+    ----------
+    points, normals : ndarray, (m, 3)
+    first, second : ndarray, (p,) int
+        The ends of the pairs.
+    """
     for start in range(0, len(first), _BLOCK):
         block = slice(start, start + _BLOCK)
         i, j = first[block], second[block]
         left, right = normals[i], normals[j]
         chord = points[j] - points[i]
-        yield block, row_products(chord, left), row_products(chord, right), row_products(left, right)
+        yield block, chord, _dot(chord, left), _dot(chord, right), _dot(left, right)
 
 
-def row_products(left, right):
+def _dot(left, right):
     """Return the inner products of the rows of two arrays, (p,)."""
     return np.einsum("ij,ij->i", left, right)

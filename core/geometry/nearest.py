@@ -16,7 +16,7 @@ class Nearest:
     Attributes
     ----------
     tree : cKDTree
-        Of m points; parts that are not connected stand far apart in it.
+        Of m points; components stand far apart in it.
     index : ndarray, (m, 41) int
         Neighbours by distance, the point itself first.
     distance : ndarray, (m, 41)

@@ -44,23 +44,23 @@ def noise_level(tree, misfit):
     return float(min(few, misfit)) if many < _GROWTH * few else 0.0
 
 
-def project_points(points, method, label=None):
+def project_points(points, method, component=None):
     """Move points onto the surface that their neighbours describe.
 
     Parameters
     ----------
     points : ndarray, (m, 3)
-        Parts that are not connected stand far apart.
+        Components stand far apart.
     method : {"quadric", "plane"}
         Onto a quadric through 90 neighbours, or onto the plane through their mean, as the paper does.
-    label : ndarray, (m,) int, optional
-        Part of each point.
+    component : ndarray, (m,) int, optional
+        Component of each point.
 
     Returns
     -------
     ndarray, (m, 3)
     """
-    smallest = len(points) if label is None else np.bincount(label).min()
+    smallest = len(points) if component is None else np.bincount(component).min()
     distance, index = cKDTree(points).query(points, k=min(_NEIGHBORS + 1, smallest), workers=-1)
     weight = fading_weights(distance)
     if method == "quadric":

@@ -104,10 +104,10 @@ def orient_normals(nearest, normals):
     )  # zero would be no edge
     graph = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
     graph = graph + graph.T
-    parts, part = connected_components(graph, directed=False)
+    count, component = connected_components(graph, directed=False)
 
     parent = np.arange(n)
-    for root in np.unique(part, return_index=True)[1]:
+    for root in np.unique(component, return_index=True)[1]:
         order, before = breadth_first_order(graph, root, directed=False)
         parent[order[1:]] = before[order[1:]]
     child = np.flatnonzero(parent != np.arange(n))
@@ -118,10 +118,10 @@ def orient_normals(nearest, normals):
         parent = parent[parent]
     normals = normals * sign[:, None]
 
-    size = np.bincount(part, minlength=parts)
-    centroid = np.column_stack([np.bincount(part, points[:, axis], parts) for axis in range(3)]) / size[:, None]
-    outward = np.bincount(part, np.einsum("ij,ij->i", points - centroid[part], normals), parts)
-    return normals * np.where(outward < 0.0, -1.0, 1.0)[part, None]
+    size = np.bincount(component, minlength=count)
+    centroid = np.column_stack([np.bincount(component, points[:, axis], count) for axis in range(3)]) / size[:, None]
+    outward = np.bincount(component, np.einsum("ij,ij->i", points - centroid[component], normals), count)
+    return normals * np.where(outward < 0.0, -1.0, 1.0)[component, None]
 
 
 def near_edges(nearest):

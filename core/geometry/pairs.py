@@ -17,7 +17,7 @@ class Pairs:
     Attributes
     ----------
     points : ndarray, (m, 3)
-        In scaled coordinates; parts that are not connected stand far apart.
+        In scaled coordinates; components stand far apart.
     lengths : ndarray, (m,)
         Smoothing lengths h; h_ij is the mean of both ends.
     first, second : ndarray, (pairs,) int32

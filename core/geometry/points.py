@@ -7,6 +7,8 @@ from scipy.spatial import cKDTree
 
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
 
+FEWEST = 5  # points of a boundary that is given
+
 
 def check_points(points):
     """Check coordinates and return them in double precision.
@@ -90,10 +92,6 @@ class ScaledPoints:
         result = quantity[self.inverse]
         result[self.inverse < 0] = neutral
         return result
-
-    def share(self, quantity, neutral):
-        """Hand a quantity out in equal parts where several of the caller's points lie at one place."""
-        return self.scatter(quantity / self.copies, neutral)
 
     def leave_out(self, dropped):
         """Return the same without some of the distinct points, (m,) bool."""
@@ -186,6 +184,21 @@ def as_indices(chosen, count, name):
             f"{twice} of the {len(index)} {name} are named more than once. Name every point a single time."
         )
     return index
+
+
+def check_boundary(chosen, count, first):
+    """Check a set of points at the boundary, (k,) indices or a (count,) mask, and return the mask of some, (m,).
+
+    Raises
+    ------
+    InvalidPointsError
+        No set of points, or too few different ones.
+    """
+    mask = as_mask(chosen, count)[first]
+    found = np.count_nonzero(mask)
+    if 0 < found < FEWEST:
+        raise InvalidPointsError(f"The boundary is given by {found} different points. Give at least {FEWEST}, or none.")
+    return mask
 
 
 def check_distances(distances, count):

@@ -18,7 +18,7 @@ class Quadrics:
     ----------
     normals : ndarray, (m, 3)
         Unit normals.
-    gaussian : ndarray, (m,)
+    gaussian_curvature : ndarray, (m,)
         Gaussian curvature [1 / L^2].
     max_abs_curvature : ndarray, (m,)
         The larger of the two principal curvatures, without its sign [1 / L].
@@ -32,7 +32,7 @@ class Quadrics:
     """
 
     normals: np.ndarray
-    gaussian: np.ndarray
+    gaussian_curvature: np.ndarray
     max_abs_curvature: np.ndarray
     height: np.ndarray
     shape_operator: np.ndarray
@@ -91,7 +91,7 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
         local = np.stack([np.ones_like(slope), -fit[:, 2], -fit[:, 1]], axis=1) / np.sqrt(slope)[:, None]
         mean, turn = fit[:, 3] + fit[:, 5], np.hypot(fit[:, 3] - fit[:, 5], fit[:, 4])
         fitted.normals[block] = np.einsum("iab,ib->ia", frame, local)
-        fitted.gaussian[block] = (4.0 * fit[:, 3] * fit[:, 5] - fit[:, 4] ** 2) / (slope * unit) ** 2
+        fitted.gaussian_curvature[block] = (4.0 * fit[:, 3] * fit[:, 5] - fit[:, 4] ** 2) / (slope * unit) ** 2
         fitted.max_abs_curvature[block] = (np.abs(mean) + turn) / unit
         form = np.empty((len(fit), 2, 2))
         form[:, 0, 0], form[:, 1, 1] = -2.0 * fit[:, 3], -2.0 * fit[:, 5]

@@ -142,8 +142,8 @@ def _own_plane(offset, weight, spacing):
     return normal
 
 
-def label_sheets(nearest, normals, label):
-    """Divide parts into sheets that are close to each other but nowhere meet.
+def label_sheets(nearest, normals, component):
+    """Divide components into sheets that are close to each other but nowhere meet.
 
     Parameters
     ----------
@@ -151,13 +151,13 @@ def label_sheets(nearest, normals, label):
         Of m points.
     normals : ndarray, (m, 3)
         Unit normals of any sign.
-    label : ndarray, (m,) int
-        Parts that gaps divide, none negative.
+    component : ndarray, (m,) int
+        Components that gaps divide, none negative.
 
     Returns
     -------
     ndarray, (m,) int
-        The largest part is 0; points off the surface are -1.
+        The largest component is 0; points off the surface are -1.
     """
     index, distance = nearest.index[:, 1 : _EDGES + 1], nearest.distance[:, 1 : _EDGES + 1]
     offset = nearest.points[index] - nearest.points[:, None]
@@ -165,7 +165,7 @@ def label_sheets(nearest, normals, label):
     side = np.where(np.einsum("ikc,ic->ik", other, normals) < 0.0, -1.0, 1.0)
     rise = np.einsum("ikc,ikc->ik", offset, normals[:, None] + side[:, :, None] * other)
     sheet = number_by_size(label_connected(index, np.abs(rise) <= 2.0 * _STEEP * distance))
-    # Small parts, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
+    # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
     touching = nearest.distance <= _TOUCH * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
     while len(lost):
@@ -176,7 +176,7 @@ def label_sheets(nearest, normals, label):
         lost = left
     result = np.full(len(sheet), -1)
     known = sheet >= 0
-    result[known] = number_by_size(sheet[known] + (sheet.max() + 1) * label[known], smallest=0)
+    result[known] = number_by_size(sheet[known] + (sheet.max() + 1) * component[known], smallest=0)
     return result
 
 
@@ -194,6 +194,31 @@ def unsure_orientation(nearest, normals):
     for _ in range(2):
         result |= result[nearest.index[:, 1 : NEIGHBORS + 1]].any(axis=1)
     return result
+
+
+def separate_sheets(pairs, nearest, oriented, quadrics):
+    """Leave out the pairs whose ends lie on different sheets, but for the last ones of a few points.
+
+    Parameters
+    ----------
+    pairs : Pairs
+        Of m points.
+    nearest : Nearest
+        Of the m points.
+    oriented : ndarray, (m, 3)
+        Unit normals whose signs agree.
+    quadrics : Quadrics
+        Of the m points.
+
+    Returns
+    -------
+    Pairs
+        The same ones where all lie on one sheet.
+    """
+    side = np.sign(np.einsum("ij,ij->i", oriented, quadrics.normals))
+    shape_operator = side[:, None, None] * quadrics.shape_operator
+    same = pairs_on_one_sheet(pairs, oriented, unsure_orientation(nearest, oriented), shape_operator, nearest.spacing)
+    return pairs if same.all() else pairs.keep(same | last_pairs(pairs, same))
 
 
 def pairs_on_one_sheet(pairs, normals, unsure, shape_operator, spacing):
@@ -217,7 +242,7 @@ def pairs_on_one_sheet(pairs, normals, unsure, shape_operator, spacing):
     ndarray, (p,) bool
     """
     result = np.empty(len(pairs.first), dtype=bool)
-    for block, left, right, cosine in pair_heights(pairs, normals):
+    for block, chord, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, normals):
         mean = 0.5 * (spacing[pairs.first[block]] + spacing[pairs.second[block]])
         same = same_sheet(left, right, cosine, pairs.distance[block], mean, _LEANING)
         doubt = unsure[pairs.first[block]] | unsure[pairs.second[block]]
@@ -225,8 +250,7 @@ def pairs_on_one_sheet(pairs, normals, unsure, shape_operator, spacing):
         # Where normals turn against the way the surface bends at both ends, two sheets face each other across a gap.
         turn = (right - left) / pairs.distance[block]
         doubtful = np.flatnonzero(same & (turn < -_AGAINST))
-        i, j = pairs.first[block][doubtful], pairs.second[block][doubtful]
-        chord = pairs.points[j] - pairs.points[i]
+        i, j, chord = pairs.first[block][doubtful], pairs.second[block][doubtful], chord[doubtful]
         bend = 0.5 * sum(np.einsum("pa,pab,pb->p", chord, shape_operator[k], chord) for k in (i, j))
         same[doubtful[bend > _BENT * pairs.distance[block][doubtful]]] = False
         result[block] = same

@@ -44,7 +44,7 @@ class AreaSolution:
     converged: bool
 
 
-def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=None, boundary_distance=None):
+def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary=None, boundary_distance=None):
     """Estimate the area element of every point, the operator's own, without the operator.
 
     Parameters
@@ -52,7 +52,7 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=No
     points : array_like, (n, 3)
         Coordinates [L].
     normals, options, boundary, boundary_distance
-        See `build_laplacian`.
+        As in `build_laplacian`.
 
     Returns
     -------
@@ -63,11 +63,28 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), boundary=No
     ------
     PointCloudError
         The points have no sound areas; see `build_laplacian`.
+
+    See Also
+    --------
+    build_laplacian : The operator, whose ``areas`` these are.
+
+    Examples
+    --------
+    The area of the unit sphere is 4 pi:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> areas = core.estimate_areas(points)
+    >>> print(areas.shape, areas.sum().round(1))
+    (800,) 12.6
     """
     cloud = read_cloud(points, options, normals, boundary, boundary_distance)
     distance = arc_length(cloud) if options.curvature_correction else cloud.pairs.distance
-    areas = solve_areas(cloud, distance, options).areas * cloud.scaled.scale**2
-    return cloud.scaled.share(areas, NO_AREA)
+    scaled, solution = cloud.scaled, solve_areas(cloud, distance, options)
+    return scaled.scatter(solution.areas * scaled.scale**2 / scaled.copies, NO_AREA)
 
 
 def solve_areas(cloud, distance, options, report=lambda: None):
@@ -94,7 +111,7 @@ def solve_areas(cloud, distance, options, report=lambda: None):
         Eq. (7), which has no bound, gave areas that are not positive.
     """
     lengths = cloud.pairs.lengths
-    target = kernel_integral(lengths, cloud.gaussian) + image_excess(lengths, cloud.boundary)
+    target = kernel_integral(lengths, cloud.gaussian_curvature) + image_excess(lengths, cloud.boundary)
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
     if options.curvature_correction:
         target += _gain(matrix, lengths)

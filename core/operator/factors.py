@@ -101,7 +101,7 @@ def factorize(matrix):
     Raises
     ------
     SolverError
-        The matrix is singular: some part of the surface has nothing that holds it.
+        The matrix is singular: some component of the surface has nothing that holds it.
 
     Notes
     -----
@@ -131,7 +131,7 @@ def sparsify(stiffness, share=1e-2):
     Returns
     -------
     csr_array, (n, n)
-        With the same properties; the given one where parts would lose their connection.
+        With the same properties; the given one where components would lose their connection.
     """
     pairs, diagonal = stiffness.tocoo(), stiffness.diagonal()
     kept = -pairs.data > share * np.minimum(diagonal[pairs.row], diagonal[pairs.col])  # not the diagonal

@@ -10,7 +10,10 @@ from .curvature import weight_factor
 from .images import mirror, own_images
 from .weights import balance_weights
 
-_NATURAL, _FIXED = 2.0, 2.0 / 3.0  # growth of the images' weights over that of their areas next to a curved boundary
+_NEUMANN, _DIRICHLET = (
+    2.0,
+    2.0 / 3.0,
+)  # growth of the images' weights over that of their areas next to a curved boundary
 
 
 def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: None):
@@ -49,7 +52,7 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     discs.
     """
     pairs = cloud.pairs
-    factor = weight_factor(pairs.lengths, cloud.gaussian)
+    factor = weight_factor(pairs.lengths, cloud.gaussian_curvature)
     lengths = pairs.mean(pairs.lengths)
     scale = pairs.mean(factor) / lengths**4 * areas[pairs.first] * areas[pairs.second]
     own_scale = factor / pairs.lengths**4 * areas**2
@@ -57,7 +60,7 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     plain = pair_kernel(distance / lengths) * scale, pair_kernel(0.0) * own_scale
     if balanced:
         plain = plain[0] * balance_weights(cloud, distance, plain[0], areas, report), plain[1]
-    natural, fixed = (tuple(np.zeros_like(part) for part in plain) for _ in range(2))
+    neumann, dirichlet = (tuple(np.zeros_like(part) for part in plain) for _ in range(2))
     for part, images, h, units in (
         (0, mirror(pairs, distance, cloud.boundary), lengths, scale),
         (1, own_images(pairs, cloud.boundary), pairs.lengths, own_scale),
@@ -65,17 +68,17 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
         nearest, second, across = images
         for rows, image, larger in (nearest, second):
             weight = pair_kernel(image / h[rows]) * units[rows]
-            natural[part][rows] += (1.0 + _NATURAL * (larger - 1.0)) * weight
-            fixed[part][rows] += (1.0 + _FIXED * (larger - 1.0)) * weight
+            neumann[part][rows] += (1.0 + _NEUMANN * (larger - 1.0)) * weight
+            dirichlet[part][rows] += (1.0 + _DIRICHLET * (larger - 1.0)) * weight
         rows, image, larger = across
-        plain[part][rows] += (1.0 + _NATURAL * (larger - 1.0)) * pair_kernel(image / h[rows]) * units[rows]
-    weights = _for_callers_points(cloud, plain[0] + natural[0], plain[1] + natural[1])
+        plain[part][rows] += (1.0 + _NEUMANN * (larger - 1.0)) * pair_kernel(image / h[rows]) * units[rows]
+    weights = _for_callers_points(cloud, plain[0] + neumann[0], plain[1] + neumann[1])
     stiffness = (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
-    if not natural[1].any():
+    if not neumann[1].any():
         return stiffness, sparse.csr_array(stiffness.shape), sparse.csr_array(stiffness.shape)
-    known = natural[0] > 0.0
+    known = neumann[0] > 0.0
     cloud = replace(cloud, pairs=pairs.keep(known))
-    return stiffness, *(_for_callers_points(cloud, images[0][known], images[1]) for images in (natural, fixed))
+    return stiffness, *(_for_callers_points(cloud, images[0][known], images[1]) for images in (neumann, dirichlet))
 
 
 def _for_callers_points(cloud, weights, own):

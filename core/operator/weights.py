@@ -75,7 +75,7 @@ def _trace(cloud, weights, areas):
     squared = lengths**2
     gain = pairs.half(weights * (squared[pairs.second] - squared[pairs.first]))
     gain = (gain.sum(axis=1) - gain.sum(axis=0)) * (SECOND_MOMENT / 8.0) / areas
-    return second_moment(lengths, cloud.gaussian) * (1.0 + uneven(gain))
+    return second_moment(lengths, cloud.gaussian_curvature) * (1.0 + uneven(gain))
 
 
 def _bounded(terms):

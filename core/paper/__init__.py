@@ -3,12 +3,3 @@
 from .areas import algorithm_1, constrained_areas, regularized_areas  # which makes them choices of the operator
 from .operator import unsymmetrized_operator
 from .stability import Stability, check_stability
-
-__all__ = [
-    "Stability",
-    "algorithm_1",
-    "check_stability",
-    "constrained_areas",
-    "regularized_areas",
-    "unsymmetrized_operator",
-]

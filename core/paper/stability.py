@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Stability:
     """What Theorem 1 asks of a cloud, and what it promises of the operator.
 
@@ -24,7 +24,7 @@ class Stability:
     row_sum, column_sum : float
         Largest entry of L e and of areas . L, relative to the largest diagonal entry: both vanish, for e spans the
         kernel of L and the areas that of its transpose.
-    parts : int
+    components : int
         Dimension of the kernel: components of the operator's graph.
     """
 
@@ -34,7 +34,7 @@ class Stability:
     least_bandwidth: float
     row_sum: float
     column_sum: float
-    parts: int
+    components: int
 
     def concerns(self):
         """Return a sentence for each assumption that does not hold comfortably; none for a sound operator."""
@@ -48,8 +48,8 @@ class Stability:
             )
         if self.most_neighbors > 5000:
             found.append(f"(A3) One support holds {self.most_neighbors} points.")
-        if self.parts > 1:
-            found.append(f"The operator falls into {self.parts} parts, each with its own constant.")
+        if self.components > 1:
+            found.append(f"The operator falls into {self.components} components, each with its own constant.")
         return found
 
 
@@ -65,6 +65,25 @@ def check_stability(laplacian):
     Stability
         Of the points that take part. (A5) holds for the kernel by construction; (A6) concerns boundaries, not measured
         here.
+
+    See Also
+    --------
+    build_laplacian : Builds operators.
+    LaplacianOptions.paper : The setting of the paper.
+
+    Examples
+    --------
+    A closed surface in one piece, where only constants have no Laplacian:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> stability = core.check_stability(laplacian)
+    >>> print(stability.components, stability.row_sum < 1e-12, stability.concerns())
+    1 True []
     """
     known = np.flatnonzero(laplacian.component >= 0)
     distinct, first = np.unique(laplacian.points[known], axis=0, return_index=True)
@@ -72,11 +91,11 @@ def check_stability(laplacian):
     stiffness, areas = laplacian.stiffness[known][:, known], laplacian.areas[known]
     largest = stiffness.diagonal().max()
     return Stability(
-        float(areas.max() / areas.min()),
-        float(reach.max()),
-        int(np.diff(stiffness.indptr).max()),
-        float((laplacian.smoothing_lengths[known[first]] / reach).min()),
-        float(np.abs(stiffness.sum(axis=1)).max() / largest),
-        float(np.abs(stiffness.sum(axis=0)).max() / largest),
-        int(connected_components(stiffness, directed=False, return_labels=False)),
+        area_ratio=float(areas.max() / areas.min()),
+        fill_distance=float(reach.max()),
+        most_neighbors=int(np.diff(stiffness.indptr).max()),
+        least_bandwidth=float((laplacian.smoothing_lengths[known[first]] / reach).min()),
+        row_sum=float(np.abs(stiffness.sum(axis=1)).max() / largest),
+        column_sum=float(np.abs(stiffness.sum(axis=0)).max() / largest),
+        components=int(connected_components(stiffness, directed=False, return_labels=False)),
     )

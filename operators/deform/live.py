@@ -128,7 +128,14 @@ def plan_factors(obj, rest, matrix, constraints):
 
     def make(progress):
         laplacian = cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress).laplacian
-        deformer = Deformer(laplacian, constraints.moved, constraints.kept, aware, weights, progress=progress)
+        deformer = Deformer(
+            laplacian,
+            constraints.moved,
+            constraints.kept,
+            rotation_aware=aware,
+            weights=weights,
+            progress=progress,
+        )
         return Live(constraints, rest, matrix, deformer)
 
     return make
@@ -138,7 +145,7 @@ def displaced(live, goal, steps, start=None, progress=None):
     """Solve for handles in local space, (h, 3); return the points, as `Live.matrix` places them, and displacements."""
     if np.allclose(goal, live.rest[live.constraints.moved], rtol=0.0, atol=1e-6 * np.ptp(live.rest, axis=0).max()):
         return live.deformer.points, np.zeros_like(live.deformer.points)
-    points = live.deformer.solve(goal @ live.matrix.T, steps, start=start, progress=progress)
+    points = live.deformer.solve(goal @ live.matrix.T, steps=steps, start=start, progress=progress)
     return points, (points - live.deformer.points) @ np.linalg.inv(live.matrix).T
 
 

@@ -93,7 +93,15 @@ def _shrink(points, boundary, tolerance, steps, options, progress):
     def report(stage, fraction):
         progress("Steps", min(1.0, (count + fraction) / steps))
 
-    film = minimal_surface(points, boundary, tolerance, steps, options, callback=stepped, progress=report)
+    film = minimal_surface(
+        points,
+        boundary,
+        epsilon=tolerance,
+        max_steps=steps,
+        options=options,
+        callback=stepped,
+        progress=report,
+    )
     if film.reason == "cancelled":  # nobody waits for it, and it must not be kept
         raise Cancelled
     return film

@@ -90,7 +90,7 @@ def _by_shape(laplacian, parts, progress):
     count, spectrum = modes_needed(laplacian, parts), None
     if cache.known_modes(laplacian) >= count:
         spectrum = resolved_modes(laplacian, count, progress)[0]
-    return segment(laplacian, parts, spectrum, progress)
+    return segment(laplacian, parts, spectrum=spectrum, progress=progress)
 
 
 def _is_numbered(name):

@@ -150,7 +150,9 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
 
 def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
     """Return the places of the points, (n, 3), that a method gives at full strength."""
-    base = cache.result(laplacian, "base", dirichlet, compute=lambda: smoothing_base(laplacian, dirichlet, progress))
+    base = cache.result(
+        laplacian, "base", dirichlet, compute=lambda: smoothing_base(laplacian, dirichlet=dirichlet, progress=progress)
+    )
     settings = {"dirichlet": dirichlet, "progress": progress, "base": base}
     length = np.median(laplacian.smoothing_lengths)
     if method == "NOISE":
@@ -215,7 +217,7 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
                 several = max(mode, min(_READY, len(reading.points) // 3))
                 cache.lowest_modes(laplacian, several, progress, raw=True)
             vector = cache.lowest_modes(laplacian, number, progress).eigenvectors[:, number - 1]
-            return reading, displace_by_mode(laplacian, vector, amplitude, phase), number
+            return reading, displace_by_mode(laplacian, vector, amplitude, phase=phase), number
 
         return compute
 

@@ -47,15 +47,14 @@ def test_surface_can_be_taken_as_closed():
     assert obj.meshfree.total_area > 1.05 * area
 
 
-@pytest.mark.parametrize("boundary", ["AUTO", "OFF"])
+@pytest.mark.parametrize("boundaries", ["AUTO", "OFF"])
 def test_vertex_group_names_the_boundary(core, boundaries):
     obj, outermost = sheet()
     outermost &= local_points(obj)[:, 0] < 1.0
     add_group(obj, "Other", ~outermost)
     add_group(obj, "Boundary", outermost, weight=0.25)
-    obj.vertex_groups["Boundary"].add(
-        np.flatnonzero(~outermost)[:50].tolist(), 0.0, "REPLACE"
-    )  # weight 0 does not count
+    uncounted = np.flatnonzero(~outermost)[:50].tolist()  # of weight 0
+    obj.vertex_groups["Boundary"].add(uncounted, 0.0, "REPLACE")
     obj.meshfree.boundary_group, obj.meshfree.boundary = "Boundary", boundaries
     bpy.ops.meshfree.analyze()
     assert (attribute(obj, "lb_boundary") == outermost).all()

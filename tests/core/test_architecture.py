@@ -1,4 +1,4 @@
-"""The arrows of the house: ui -> operators -> core, and no bpy in core."""
+"""The arrows of the house: ui -> operators -> core, the wings of core among themselves, and no bpy in core."""
 
 import ast
 import subprocess
@@ -34,6 +34,67 @@ def test_imports_point_one_way(package, forbidden):
     assert files
     wrong = [f"{file.name}: {name}" for file in files for name in imported(file) if name.startswith(forbidden)]
     assert wrong == []
+
+
+GROUND = {"kernel", "options", "errors"}
+BELOW = {  # what each wing of core may use
+    "geometry": GROUND,
+    "operator": GROUND | {"geometry"},
+    "applications": GROUND | {"geometry", "operator"},
+    "paper": GROUND | {"geometry", "operator"},
+    "files": GROUND,
+}
+SIDEWAYS = {  # applications that build on others
+    ("deformation", "rotations"),
+    ("fields", "graph"),
+    ("geodesics", "graph"),
+    ("minimal_surface", "boundary_curve"),
+    ("segmentation", "graph"),
+    ("selection", "graph"),
+    ("smoothing", "filters"),
+    ("smoothing", "sizes"),
+}
+
+
+def modules_of(wing):
+    return sorted(path for path in (ROOT / "core" / wing).glob("*.py") if path.name != "__init__.py")
+
+
+@pytest.mark.parametrize("wing", BELOW)
+def test_wings_of_core_use_what_is_below_them_by_its_face(wing):
+    """``..geometry`` gives what `core/geometry/__init__.py` lists; its modules are its own."""
+    assert len(modules_of(wing)) > 2
+    names = [(path, name[2:]) for path in modules_of(wing) for name in imported(path) if name.startswith("..")]
+    wrong = [
+        f"{path.name}: {name}"
+        for path, name in names
+        if name.split(".")[0] not in BELOW[wing] or (name.split(".")[0] in BELOW and name.count(".") != 1)
+    ]
+    assert wrong == []
+
+
+def test_the_ground_uses_nothing_above():
+    names = [name for stem in GROUND for name in imported(ROOT / "core" / f"{stem}.py") if name.startswith(".")]
+    assert {name.split(".")[1] for name in names} <= GROUND
+
+
+def test_applications_use_each_other_only_where_they_build_on_them():
+    found = {
+        (path.stem, name.split(".")[1])
+        for path in modules_of("applications")
+        for name in imported(path)
+        if name.startswith(".") and not name.startswith("..")
+    }
+    assert found == SIDEWAYS
+
+
+def test_a_wing_lists_only_what_others_use():
+    """The names in a wing's face are those that another wing, or the public calls, take from it."""
+    for wing in ("geometry", "operator"):
+        listed = {name.rpartition(".")[2] for name in imported(ROOT / "core" / wing / "__init__.py")}
+        above = [ROOT / "core" / "__init__.py", *(path for other in BELOW for path in modules_of(other))]
+        used = {name.rpartition(".")[2] for path in above for name in imported(path) if f".{wing}." in name}
+        assert listed == used
 
 
 def test_core_needs_numpy_and_scipy_only():

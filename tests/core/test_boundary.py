@@ -49,7 +49,7 @@ def flat_boundary(points):
     """Find and measure the boundary of points in the plane z = 0."""
     nearest, normals = find_nearest(points), np.tile(UP, (len(points), 1))
     at_boundary = find_boundary(nearest, normals)
-    return measure_boundary(nearest, normals, at_boundary, 20.0 * nearest.spacing)
+    return measure_boundary(nearest, normals, at_boundary)
 
 
 def side_distances(points, width, height):
@@ -193,7 +193,7 @@ class TestMeasuring:
     def test_few_points_have_no_boundary(self):
         points = np.random.default_rng(0).random((200, 3)) * (1.0, 1.0, 0.0)
         nearest, normals = find_nearest(points), np.tile(UP, (200, 1))
-        boundary = measure_boundary(nearest, normals, np.arange(200) < 3, 20.0 * nearest.spacing)
+        boundary = measure_boundary(nearest, normals, np.arange(200) < 3)
         assert not np.any(boundary.at_boundary)
         assert np.all(np.isinf(boundary.distance))
 

@@ -226,7 +226,7 @@ class TestLonePoints:
 
     def test_stability_passes_them_by(self, parts):
         stability = core.check_stability(parts)
-        assert stability.parts == 2
+        assert stability.components == 2
         assert stability.area_ratio < 1e4
         assert stability.fill_distance < 0.5
 

@@ -261,7 +261,7 @@ class TestRefusals:
     def test_a_part_without_fixed_points(self, coarse):
         points, fixed, _ = coarse
         both = np.concatenate([points, fibonacci_sphere(500) + [9.0, 0.0, 0.0]])
-        with pytest.raises(core.InvalidPointsError, match="500 of 1220 points are in parts"):
+        with pytest.raises(core.InvalidPointsError, match="500 of 1220 points are in components"):
             core.minimal_surface(both, np.flatnonzero(fixed))
 
     @pytest.mark.parametrize(

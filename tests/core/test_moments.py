@@ -137,7 +137,7 @@ class TestLengthsThatVary:
         # h = a (1 + c z^2), Laplacian(z^2) = 2 - 6 z^2 and |grad z^2|^2 = 4 z^2 (1 - z^2).
         laplacian, slope = 0.1 * 0.15 * (2.0 - 6.0 * z**2), (0.1 * 0.15) ** 2 * 4.0 * z**2 * (1.0 - z**2)
         expected = SECOND_MOMENT * (lengths * laplacian / 4.0 + slope / 8.0)
-        gain = sums - kernel_integral(lengths, cloud.gaussian)
+        gain = sums - kernel_integral(lengths, cloud.gaussian_curvature)
         inner = np.abs(z) < 0.95  # a Fibonacci sphere is uneven at its poles
         assert norm((gain - expected)[inner]) < 0.15 * norm(expected[inner])
 

@@ -79,7 +79,7 @@ def test_a_small_component_is_left_out_with_a_notice(sphere):
 def test_two_large_parts_are_no_components():
     sphere = fibonacci_sphere(1500)
     laplacian = core.build_laplacian(np.concatenate([sphere, sphere + [5.0, 0.0, 0.0]]))
-    assert core.check_stability(laplacian).parts == 2
+    assert core.check_stability(laplacian).components == 2
     assert laplacian.areas.sum() == pytest.approx(8.0 * np.pi, rel=2e-3)
     assert np.all(laplacian.eigenpairs(3).eigenvalues[:2] < 1e-9)
 
@@ -109,7 +109,7 @@ def test_an_abrupt_change_of_spacing_is_no_component():
 @pytest.mark.xfail(reason="adaptive lengths next to the fine grid are too short to reach the coarse one's points")
 def test_the_operator_falls_into_as_many_parts_as_it_has_components():
     laplacian = core.build_laplacian(abrupt_change())
-    assert core.check_stability(laplacian).parts == laplacian.component.max() + 1
+    assert core.check_stability(laplacian).components == laplacian.component.max() + 1
 
 
 def test_float32_far_from_the_origin_is_refused(sphere):

@@ -135,7 +135,7 @@ class TestTheorem1:
     def test_assumptions_hold_on_a_good_cloud(self, laplacian):
         stability = core.check_stability(laplacian)
         assert stability.concerns() == []
-        assert stability.parts == 1
+        assert stability.components == 1
         assert stability.row_sum < 1e-12
         assert stability.column_sum < 1e-12
         assert stability.area_ratio == pytest.approx(laplacian.areas.max() / laplacian.areas.min())
@@ -146,5 +146,5 @@ class TestTheorem1:
         options = LaplacianOptions(bandwidth="local", neighbors=12, bandwidth_factor=0.4)
         laplacian = core.build_laplacian(np.concatenate([sphere, sphere + [9.0, 0.0, 0.0]]), options=options)
         concerns = " ".join(core.check_stability(laplacian).concerns())
-        assert "2 parts" in concerns
+        assert "2 components" in concerns
         assert "A4" in concerns

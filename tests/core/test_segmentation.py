@@ -254,10 +254,10 @@ class TestSegment:
 
     def test_signs_and_bases_do_not_matter(self, body):
         spectrum = body.laplacian.eigenpairs(core.modes_needed(body.laplacian, 5))
-        np.testing.assert_array_equal(core.segment(body.laplacian, 5, spectrum), body.labels)
+        np.testing.assert_array_equal(core.segment(body.laplacian, 5, spectrum=spectrum), body.labels)
         signs = np.where(np.arange(len(spectrum.eigenvalues)) % 2, 1.0, -1.0)
         turned = core.Spectrum(spectrum.eigenvalues, spectrum.eigenvectors * signs)
-        np.testing.assert_array_equal(core.segment(body.laplacian, 5, turned), body.labels)
+        np.testing.assert_array_equal(core.segment(body.laplacian, 5, spectrum=turned), body.labels)
 
     def test_a_basis_of_modes_of_one_eigenvalue_does_not_matter(self, body):
         count = core.modes_needed(body.laplacian, 5)
@@ -265,16 +265,21 @@ class TestSegment:
         values, vectors = spectrum.eigenvalues.copy(), spectrum.eigenvectors.copy()
         values[1:4] = values[1:4].mean()
         values[-3:] = values[-1]  # the last ones are cut off in the middle of their space
-        plain = core.segment(body.laplacian, 5, core.Spectrum(values, vectors))
+        plain = core.segment(body.laplacian, 5, spectrum=core.Spectrum(values, vectors))
         vectors[:, 1:4] = vectors[:, 1:4] @ TURN
         vectors[:, -3:] = vectors[:, -3:] @ TURN
         # The longest axis of all points is ambiguous then, so k-means may start elsewhere and end a border point apart.
-        assert agreement(core.segment(body.laplacian, 5, core.Spectrum(values, vectors)), plain) > 0.998
+        assert agreement(core.segment(body.laplacian, 5, spectrum=core.Spectrum(values, vectors)), plain) > 0.998
 
     def test_a_longer_spectrum_gives_the_same_and_a_shorter_one_is_not_used(self, body):
         count = core.modes_needed(body.laplacian, 5)
-        assert agreement(core.segment(body.laplacian, 5, body.laplacian.eigenpairs(count + 9)), body.labels) > 0.999
-        np.testing.assert_array_equal(core.segment(body.laplacian, 5, body.laplacian.eigenpairs(4)), body.labels)
+        assert (
+            agreement(core.segment(body.laplacian, 5, spectrum=body.laplacian.eigenpairs(count + 9)), body.labels)
+            > 0.999
+        )
+        np.testing.assert_array_equal(
+            core.segment(body.laplacian, 5, spectrum=body.laplacian.eigenpairs(4)), body.labels
+        )
 
     @pytest.mark.parametrize("parts", [2, 5, 12])
     def test_the_modes_of_a_sphere_do_not_make_it_fail(self, operators, parts):
@@ -327,7 +332,7 @@ class TestSegment:
 
     def test_a_spectrum_of_other_points(self, body, two_spheres):
         with pytest.raises(core.InvalidPointsError, match="same operator"):
-            core.segment(body.laplacian, 3, two_spheres.eigenpairs(3))
+            core.segment(body.laplacian, 3, spectrum=two_spheres.eigenpairs(3))
 
     def test_progress_can_cancel(self, body):
         stages = []

@@ -74,7 +74,7 @@ class TestFitSheets:
     def test_its_normals_and_curvatures_are_those_of_planes(self, parallel):
         surface = parallel[1]
         np.testing.assert_allclose(np.abs(surface.normals[:, 2]), 1.0, atol=1e-9)
-        np.testing.assert_allclose(surface.gaussian, 0.0, atol=1e-9)
+        np.testing.assert_allclose(surface.gaussian_curvature, 0.0, atol=1e-9)
         np.testing.assert_allclose(surface.height, 0.0, atol=1e-9)
 
     def test_random_sheets(self):

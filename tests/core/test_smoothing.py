@@ -316,7 +316,7 @@ class TestMode:
         np.testing.assert_allclose(np.einsum("ic,ic->i", full, ellipsoid.normals), 0.2 * mode / np.abs(mode).max())
         assert np.linalg.norm(full, axis=1).max() == pytest.approx(0.2)
         for phase in (0.0, 1.0, np.pi):
-            moved = core.displace_by_mode(ellipsoid, mode, 0.2, phase) - ellipsoid.points
+            moved = core.displace_by_mode(ellipsoid, mode, 0.2, phase=phase) - ellipsoid.points
             np.testing.assert_allclose(moved, np.cos(phase) * full, atol=1e-12)
 
     def test_default_amplitude_follows_the_size(self, ellipsoid):

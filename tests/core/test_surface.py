@@ -41,7 +41,7 @@ def test_sphere(sphere, radius):
     points = sphere(4000)
     surface = fit(radius * points)
     assert degrees_off(surface.normals, points).max() < 0.1
-    np.testing.assert_allclose(surface.gaussian, 1.0 / radius**2, rtol=0.06)
+    np.testing.assert_allclose(surface.gaussian_curvature, 1.0 / radius**2, rtol=0.06)
     np.testing.assert_allclose(surface.max_abs_curvature, 1.0 / radius, rtol=0.06)
     assert surface.misfit.max() < 2e-3 * radius * np.sqrt(4.0 * np.pi / 4000)
     assert np.linalg.norm(surface.height, axis=1).max() < 3e-4 * radius
@@ -55,7 +55,7 @@ def test_torus(sample):
     off = degrees_off(surface.normals, normals)
     assert np.sqrt(np.mean(off**2)) < 0.7
     assert off.max() < 3.0
-    assert np.sqrt(np.mean((surface.gaussian - gaussian) ** 2)) < 0.1 * np.abs(gaussian).max()
+    assert np.sqrt(np.mean((surface.gaussian_curvature - gaussian) ** 2)) < 0.1 * np.abs(gaussian).max()
     np.testing.assert_allclose(surface.max_abs_curvature, max_abs_curvature, rtol=0.15)
 
 
@@ -63,14 +63,14 @@ def test_cylinder():
     points = open_cylinder()
     surface = fit(points)
     assert degrees_off(surface.normals, points * [0.5, 0.5, 0.0]).max() < 1e-3
-    assert np.abs(surface.gaussian).max() < 1e-3
+    assert np.abs(surface.gaussian_curvature).max() < 1e-3
     np.testing.assert_allclose(surface.max_abs_curvature, 0.5, rtol=0.01)
 
 
 def test_plane():
     surface = fit(square_random(1000))
     np.testing.assert_allclose(np.abs(surface.normals[:, 2]), 1.0, atol=1e-12)
-    for values in (surface.gaussian, surface.max_abs_curvature, surface.misfit, surface.height):
+    for values in (surface.gaussian_curvature, surface.max_abs_curvature, surface.misfit, surface.height):
         np.testing.assert_allclose(values, 0.0, atol=1e-9)
 
 
@@ -82,7 +82,7 @@ def test_a_quadric_is_met_exactly():
     slope = np.column_stack([-(1.6 * u - 0.5 * v + 0.1), -(-0.5 * u + 0.6 * v), np.ones(1500)])
     squared = np.einsum("ij,ij->i", slope, slope)
     assert degrees_off(surface.normals, slope / np.sqrt(squared)[:, None]).max() < 1e-3
-    np.testing.assert_allclose(surface.gaussian, (1.6 * 0.6 - 0.25) / squared**2, rtol=1e-4)
+    np.testing.assert_allclose(surface.gaussian_curvature, (1.6 * 0.6 - 0.25) / squared**2, rtol=1e-4)
     assert surface.misfit.max() < 1e-6
     assert np.abs(surface.height).max() < 1e-6
 
@@ -92,7 +92,7 @@ def test_some_rows_only():
     nearest, rows = find_nearest(points), np.arange(0, 1500, 7)
     every = fit(points)
     some = fit_quadrics(points, nearest.index[rows], nearest.weight[rows], rows)
-    np.testing.assert_allclose(some.gaussian, every.gaussian[rows], rtol=1e-9)
+    np.testing.assert_allclose(some.gaussian_curvature, every.gaussian_curvature[rows], rtol=1e-9)
     np.testing.assert_allclose(np.abs(np.einsum("ij,ij->i", some.normals, every.normals[rows])), 1.0, rtol=1e-9)
 
 
