@@ -3,9 +3,9 @@
 import bpy
 
 from ..operators.deform import live
-from ..operators.deform.binding import copied_from, handle_names, handled_object, is_bound, stale_reason
+from ..operators.deform.binding import copied_from, handled_object, is_bound, stale_reason
 from ..operators.deform.nodes import find_deform, is_baked
-from ..operators.objects.groups import search_group
+from ..operators.objects.groups import handle_names, search_group
 from ..operators.objects.modifiers import input_property
 from ..operators.objects.reading import obstacle
 from .panel import SidebarPanel

@@ -7,7 +7,7 @@ from mathutils import Matrix, Vector
 
 from ...core import PointCloudError
 from ..objects.attributes import REST, own_positions, point_count, read_attribute, write_own_positions
-from ..objects.groups import HANDLE, assign, check_assignable, has_group
+from ..objects.groups import HANDLE, assign, check_assignable, handle_names, has_group
 from ..objects.modifiers import get_input
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
@@ -23,7 +23,6 @@ from .binding import (
     copied_from,
     edited_rows,
     forget,
-    handle_names,
     handled_object,
     is_bound,
     is_there,

@@ -18,6 +18,7 @@ from ..objects.attributes import (
     type_of,
     write_attribute,
 )
+from ..objects.handlers import tell
 from ..objects.reading import TYPES, seen_positions
 
 OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
@@ -235,7 +236,7 @@ def save(path, obj, arrays):
             other.select_set(other == obj)
         names = [name for name in (*APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
         if names:
-            bpy.ops.meshfree.colormap(attribute=names[0])
+            tell("result_written", obj, names[0])
         path.parent.mkdir(parents=True, exist_ok=True)
         bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))
 

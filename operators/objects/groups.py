@@ -1,5 +1,7 @@
 """Groups of points: vertex groups of meshes; on point clouds, which have none, attributes of truth or weight."""
 
+import re
+
 import numpy as np
 
 from ...core import PointCloudError
@@ -37,6 +39,14 @@ def search_group(layout, settings, name: str, obj):
     layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
     if awaited:
         layout.label(text=("No points assigned yet"), icon="INFO")
+
+
+def handle_names(obj) -> list:
+    """Names of the groups that are handles: the one that the settings name, and the same with a number."""
+    base = obj.meshfree.deform.handles
+    pattern = re.compile(re.escape(base) + r"(\.\d+)?")
+    groups = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
+    return sorted(group.name for group in groups if pattern.fullmatch(group.name) and has_group(obj, group.name))
 
 
 def group_weights(obj, name: str, outside=0.0):

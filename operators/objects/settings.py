@@ -12,35 +12,32 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...ui import show
-from ..running.stages import redraw_views
 from . import deform_settings
 from .color_choices import color_choice
+from .handlers import tell
 from .options import DEFAULTS
 
 
 def _recolor(settings, context):
-    show.recolor(settings.id_data)
+    tell("colors_changed", settings.id_data)
 
 
 def _recolor_locked(settings, context):
     """Follow bounds that somebody sets; in other modes they only tell what the range came to."""
     if settings.range_mode == "LOCKED":
-        show.recolor(settings.id_data)
+        tell("colors_changed", settings.id_data)
 
 
 def _resize(settings, context):
-    show.resize(settings.id_data)
+    tell("size_changed", settings.id_data)
 
 
 def _show_groups(settings, context):
-    show.show_groups(settings.id_data)
-    if settings.show_groups:
-        show.use_material_preview(context)
+    tell("groups_changed", settings.id_data)
 
 
 def _redraw(settings, context):
-    redraw_views(context.window_manager)
+    tell("views_changed")
 
 
 class MESHFREE_PG_stage(bpy.types.PropertyGroup):

@@ -3,10 +3,10 @@
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-import bpy
 from bpy.props import BoolProperty
 
 from ...core import PointCloudError
+from ..objects.handlers import tell
 from ..objects.options import laplacian_options
 from ..objects.reading import TYPES, obstacle, read_points, sharing_objects
 from ..objects.result import check_writable
@@ -125,8 +125,7 @@ class ShownOperator(ApplicationOperator):
         sharing = [other for obj in objects for other in sharing_objects(obj) if other in context.selected_objects]
         if self.show:
             for obj in [*objects, *sharing]:
-                with context.temp_override(object=obj):
-                    bpy.ops.meshfree.colormap(attribute=self.shown if self.shown in obj.data.attributes else "")
+                tell("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
 
 
 def compute_all(plans, progress):

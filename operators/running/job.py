@@ -7,12 +7,12 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core import Cancelled, PointCloudError
+from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import settings_values
 from ..objects.reading import find_object, fingerprint, metric, obstacle, read_points
 from ..objects.result import same_lengths
-from .handlers import add_handlers, remove_handlers
 from .ready import ReadyOperator
-from .stages import StageTimes, redraw_panels
+from .stages import StageTimes
 
 STOPPED = "Stopped: nothing was changed"  # by somebody
 _FIRST = 0.01  # seconds to the first look, which comes after the first drawing
@@ -163,7 +163,7 @@ class Job(StageTimes):
         if text != self._shown:
             self._shown = text
             _set_status([window.workspace for window in windows], text)
-            redraw_panels(context.window_manager)
+            tell("panels_changed")
 
     def open(self, context):
         """Begin to show it; one that has not begun is looked at again and again in the window that it belongs to."""
@@ -182,7 +182,7 @@ class Job(StageTimes):
         if not bpy.app.background:
             # Later: a window that is being closed must not find another context than it had.
             bpy.app.timers.register(_clear_status, persistent=True)
-        redraw_panels(context.window_manager)
+        tell("panels_changed")
 
 
 class SteppedJob(Job):

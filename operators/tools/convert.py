@@ -7,10 +7,9 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core import PointCloudError
-from ..deform.binding import handle_names, is_bound
 from ..objects.attributes import SELECTION, point_count, write_attribute
 from ..objects.counting import renew_counts
-from ..objects.groups import ROLES, group_weights, has_group
+from ..objects.groups import ROLES, group_weights, handle_names, has_group
 from ..objects.modifiers import get_input, is_display, set_input
 from ..objects.result import check_writable
 from ..running.application import chosen_objects
@@ -72,7 +71,7 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
 def _check(obj):
     """Refuse an object that would lose something."""
     check_writable(obj, (), obj.meshfree.make_single_user)
-    if is_bound(obj):
+    if obj.meshfree.deform.is_bound:
         raise PointCloudError(f'"{obj.name}" is bound to handles, which would be lost. Apply or unbind it first.')
     if not obj.visible_get():
         raise PointCloudError(f'"{obj.name}" is hidden, and Blender converts what is seen. Show it first.')

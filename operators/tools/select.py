@@ -10,6 +10,7 @@ from ...core import PointCloudError, grow
 from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.counting import renew_counts
 from ..objects.groups import HANDLE, assign, check_assignable, chosen_members
+from ..objects.handlers import tell
 from ..objects.reading import obstacle
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
@@ -147,7 +148,7 @@ def select(context, obj, chosen) -> str:
 def groups_changed(obj):
     """Let the panel count the groups of an object again, and the display color them, if it does."""
     renew_counts(obj)
-    obj.meshfree.show_groups = obj.meshfree.show_groups
+    tell("groups_changed", obj)
 
 
 def analyzed(context, obj):
