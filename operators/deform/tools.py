@@ -79,7 +79,6 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
     bl_idname = "meshfree.deform_bind"
     bl_label = "Bind"
     only_active = True
-    asks = False
     writes = WRITES
 
     def plan(self, context, obj):
@@ -196,7 +195,6 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
     bl_idname = "meshfree.deform_update"
     bl_label = "Update"
     only_active = True
-    asks = False
     writes = WRITES
 
     @classmethod

@@ -69,6 +69,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_points"
     bl_label = "Export Points"
+    asks = ("format", "attributes", "colors")
 
     filter_glob: file_filter(".ply", ".xyz", ".csv")
     format: EnumProperty(
@@ -98,12 +99,6 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
     def filename_ext(self):
         """What `ExportHelper` adds to a name."""
         return f".{self.format.lower()}"
-
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        for name in ("format", "attributes", "colors"):
-            layout.prop(self, name)
 
     def plan(self, context, obj):
         table, name = point_table(context, obj, self.attributes, self.colors), obj.name

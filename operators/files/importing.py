@@ -33,6 +33,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
+    asks = ("up", "kind", "attributes", "frame")
 
     filepath: StringProperty(
         name="File Path",
@@ -84,12 +85,6 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def invoke(self, context, event):
         self._attended = True
         return self.invoke_popup(context)
-
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        for name in ("up", "kind", "attributes", "frame"):
-            layout.prop(self, name)
 
     def execute(self, context):
         attended = self.takes_window()

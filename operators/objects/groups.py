@@ -31,16 +31,6 @@ def has_group(obj, name: str) -> bool:
     return attribute is not None and attribute.data_type in _WEIGHTS and attribute.domain == "POINT"
 
 
-def search_group(layout, settings, name: str, obj):
-    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned."""
-    group = getattr(settings, name)
-    owner, groups = (obj, "vertex_groups") if obj.type == "MESH" else (obj.data, "attributes")
-    awaited = group in ROLES and not has_group(obj, group)
-    layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
-    if awaited:
-        layout.label(text=("No points assigned yet"), icon="INFO")
-
-
 def handle_names(obj) -> list:
     """Names of the groups that are handles: the one that the settings name, and the same with a number."""
     base = obj.meshfree.deform.handles

@@ -36,9 +36,9 @@ class ApplicationOperator(JobOperator):
     """
 
     only_active = False  # for what has one object by nature
-    asks = True  # whether a dialog comes before the work
+    asks = ()  # names of the settings that a dialog asks for before the work; without any there is none
     writes = ()  # names of the attributes that `write` makes
-    adjustable = ()  # names of the settings that change a result without computing anything again that takes time
+    adjustable = ()  # of those that Adjust Last Operation, which waits, offers: they compute nothing long again
 
     def invoke(self, context, event):
         self._attended = True
@@ -92,18 +92,6 @@ class ApplicationOperator(JobOperator):
         for notice in notices:
             self.report({"WARNING"}, notice)
         done.notices += notices
-
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        if not self.is_repeated(context):
-            self.draw_settings(context, layout)
-            return
-        for name in self.adjustable:
-            layout.prop(self, name)
-
-    def draw_settings(self, context, layout):
-        """Draw what the dialog asks for; in Adjust Last Operation, which waits, `adjustable` alone is drawn."""
 
     def is_repeated(self, context) -> bool:
         """Whether this has run before, and is run again by Adjust Last Operation."""

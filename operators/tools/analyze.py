@@ -82,7 +82,6 @@ def resolved_modes(laplacian, modes, progress):
 class AnalysisOperator(ShownOperator):
     """What the operators that analyze objects have in common; `wanted` is how many modes one computes."""
 
-    asks = False
     adjustable = ("write_limit", "show")
 
     write_limit: IntProperty(

@@ -5,7 +5,7 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ...core import Cancelled, PointCloudError
 from ...core.applications import minimal_surface
-from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen, search_group
+from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen
 from ..objects.options import laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.reading import read_points
@@ -21,6 +21,7 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.minimal_surface"
     bl_label = "Minimal Surface"
+    asks = ("group", "tolerance", "steps", "target")
     adjustable = ("target",)
 
     group: StringProperty(
@@ -75,11 +76,6 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
             f"{obj.name}: area from {area_text(film.initial_area)} to {area_text(float(area))} in {film.steps}"
             f" steps ({film.reason})"
         )
-
-    def draw_settings(self, context, layout):
-        search_group(layout, self, "group", context.object)
-        for name in ("tolerance", "steps", "target"):
-            layout.prop(self, name)
 
 
 def _shrink(points, boundary, tolerance, steps, options, progress):

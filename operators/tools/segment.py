@@ -51,6 +51,11 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         default=False,
     )
 
+    @property
+    def asks(self):
+        """Names of the settings that the method takes."""
+        return "method", "mode" if self.method == "NODAL" else "parts", "vertex_groups", "show"
+
     def plan(self, context, obj):
         if self.vertex_groups and obj.type == "MESH":
             _check_groups(obj)
@@ -72,10 +77,6 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
             _write_groups(obj, [result == label for label in range(count)])
         tag_changed(obj.data)
         return (f"{obj.name}: {count} parts") if count > 1 else (f"{obj.name}: {count} part")
-
-    def draw_settings(self, context, layout):
-        for name in ("method", "mode" if self.method == "NODAL" else "parts", "vertex_groups", "show"):
-            layout.prop(self, name)
 
 
 def _by_mode(laplacian, mode, progress):
@@ -131,7 +132,6 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.separate_by_segment"
     bl_label = "Separate by Segment"
-    asks = False
 
     @classmethod
     def obstacle(cls, context):
@@ -200,6 +200,7 @@ class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.signature"
     bl_label = "Signatures"
+    asks = ("kind", "count", "modes", "show")
     adjustable = ("kind", "count", "show")
 
     kind: EnumProperty(
@@ -231,10 +232,6 @@ class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
         signature = heat_kernel_signature if self.kind == "HEAT" else wave_kernel_signature
         count, modes = self.count, self.modes
         return lambda progress: signature(cache.lowest_modes(operator(progress), modes, progress), count=count)
-
-    def draw_settings(self, context, layout):
-        for name in ("kind", "count", "modes", "show"):
-            layout.prop(self, name)
 
     def write(self, context, obj, result):
         remove_numbered(obj.data, self._prefix(), beyond=self.count)

@@ -14,7 +14,7 @@ from ...core import (
     smooth_points,
     smoothing_base,
 )
-from ..objects.groups import chosen_weights, search_group
+from ..objects.groups import chosen_weights
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.result import length_text
 from ..running import cache
@@ -79,6 +79,12 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
     target: target_property()
 
     @property
+    def asks(self):
+        """Names of the settings that the method takes."""
+        names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
+        return ["method", *names, "strength", "group", "keep", "keep_boundary", "target"]
+
+    @property
     def adjustable(self):
         """Names of the settings that need no new solution: to keep a size, one looks for a scale."""
         return ("strength", "target") if self.keep == "NONE" else ("target",)
@@ -138,15 +144,6 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         moved = np.sqrt(np.mean(np.sum((points - reading.points) ** 2, axis=1)))
         return f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"
 
-    def draw_settings(self, context, layout):
-        layout.prop(self, "method")
-        names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
-        for name in [*names, "strength"]:
-            layout.prop(self, name)
-        search_group(layout, self, "group", context.object)
-        for name in ("keep", "keep_boundary", "target"):
-            layout.prop(self, name)
-
 
 def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
     """Return the places of the points, (n, 3), that a method gives at full strength."""
@@ -196,6 +193,11 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4, soft_max=250)
     target: target_property()
 
+    @property
+    def asks(self):
+        """Names of the settings: an animation takes a shape key."""
+        return "mode", "amplitude", "phase", "animate", "period" if self.animate else "target"
+
     def plan(self, context, obj):
         target = "SHAPE_KEY" if self.animate else self.target
         if self.animate and obj.type != "MESH":
@@ -235,11 +237,6 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
                 key.keyframe_insert("value", frame=scene.frame_start + index * quarter)
         largest = np.linalg.norm(points - reading.points, axis=1).max()
         return f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"
-
-    def draw_settings(self, context, layout):
-        for name in ("mode", "amplitude", "phase", "animate"):
-            layout.prop(self, name)
-        layout.prop(self, "period" if self.animate else "target")
 
 
 CLASSES = (MESHFREE_OT_smooth, MESHFREE_OT_mode_shape)
