@@ -14,6 +14,7 @@ from ..objects.reading import read_points
 from ..objects.result import EIGENVALUES
 from ..running import cache
 from ..running.job import JobOperator
+from ..running.ready import reporting
 from ..running.stages import Stages
 from .objects import analysis_arrays, file_filter, place_of, point_table, save_arrays
 
@@ -41,24 +42,21 @@ class ExportOperator(JobOperator, ExportHelper):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    @reporting
     def execute(self, context):
         attended = self.takes_window()
         path = Path(bpy.path.abspath(self.filepath))
-        try:
-            reason = self.obstacle(context)
-            if reason:  # since the file browser opened
-                raise PointCloudError(f"{reason}.")
-            write = self.plan(context, context.object)
-            if attended:
-                return self.start(context, [], lambda progress: write(path, progress))
-            with Stages(context.window_manager, self.bl_label) as stages:
-                result = write(path, stages)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self.finish(context, [], result, stages.seconds)
+        reason = self.obstacle(context)
+        if reason:  # since the file browser opened
+            raise PointCloudError(f"{reason}.")
+        write = self.plan(context, context.object)
+        if attended:
+            return self.start(context, [], lambda progress: write(path, progress))
+        with Stages(context.window_manager, self.bl_label) as stages:
+            result = write(path, stages)
+        return self.finish(context, [], result)
 
-    def finish(self, context, objects, results, seconds):
+    def finish(self, context, objects, results):
         """Tell what was written."""
         self.report({"INFO"}, results)
         return {"FINISHED"}

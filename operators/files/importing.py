@@ -12,6 +12,7 @@ from ...core import PointCloudError
 from ...core.files import READABLE, read_points
 from ..running import cache
 from ..running.job import JobOperator
+from ..running.ready import reporting
 from ..running.stages import Stages
 from .objects import OFFSET, add_object, file_filter, known_offset, offset_of
 
@@ -86,29 +87,25 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         self._attended = True
         return self.invoke_popup(context)
 
+    @reporting
     def execute(self, context):
         attended = self.takes_window()
         self._framed = False
         names = [item.name for item in self.files if item.name]
         folder = Path(bpy.path.abspath(self.directory))
         self._paths = paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
-        try:
-            if attended:
-                self._framed = self.frame
-                return self.start(context, [], lambda progress: _read_all(paths, progress))
-            with Stages(context.window_manager, self.bl_label) as stages:
-                tables = _read_all(paths, stages)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self.finish(context, [], tables, stages.seconds)
+        if attended:
+            self._framed = self.frame
+            return self.start(context, [], lambda progress: _read_all(paths, progress))
+        with Stages(context.window_manager, self.bl_label) as stages:
+            tables = _read_all(paths, stages)
+        return self.finish(context, [], tables)
 
-    def finish(self, context, objects, results, seconds):
+    def finish(self, context, objects, results):
         """Add an object for each table."""
         reason = self.obstacle(context)
         if reason:  # while the files were read
-            self.report({"ERROR"}, reason)
-            return {"CANCELLED"}
+            raise PointCloudError(reason)
         for other in context.selected_objects:
             other.select_set(False)
         shared = known_offset(context.scene)

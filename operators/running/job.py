@@ -11,7 +11,7 @@ from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import settings_values
 from ..objects.reading import find_object, fingerprint, metric, obstacle, read_points
 from ..objects.result import same_lengths
-from .ready import ReadyOperator
+from .ready import ReadyOperator, reporting
 from .stages import StageTimes
 
 STOPPED = "Stopped: nothing was changed"  # by somebody
@@ -58,7 +58,7 @@ class Snapshot:
             raise PointCloudError(f'"{self.name}" was deleted meanwhile')
         reason = obstacle(obj, modes)
         if reason:
-            raise PointCloudError(f"{reason}")
+            raise PointCloudError(reason)
         if _state(context, obj) != self._state or not same_lengths(self._metric, metric(obj)):
             raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile. Start it again')
         return obj
@@ -283,6 +283,7 @@ class JobOperator(ReadyOperator):
     def leave(self, context):
         """Put back what the work itself has changed in Blender: nothing."""
 
+    @reporting
     def complete(self, context, job):
         """Find the objects again, and let `finish` use what was computed for them, if they are as they were."""
         try:
@@ -290,16 +291,12 @@ class JobOperator(ReadyOperator):
         except Cancelled:
             self.report({"INFO"}, job.reason)
             return {"CANCELLED"}
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            text = f"{job.title} wrote nothing: {change}"
-            self.report({"WARNING"}, text)
+            self.report({"WARNING"}, f"{job.title} wrote nothing: {change}")
             return {"CANCELLED"}
-        return self.finish(context, objects, results, job.seconds)
+        return self.finish(context, objects, results)
 
 
 class MESHFREE_OT_stop(bpy.types.Operator):

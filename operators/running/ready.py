@@ -1,8 +1,25 @@
 """What all operators have in common: they run on objects that can be read and written, and can be undone."""
 
+from functools import wraps
+
 import bpy
 
+from ...core import PointCloudError
 from ..objects.reading import obstacle
+
+
+def reporting(method):
+    """Let an operator report what a method of it, such as `execute`, refuses."""
+
+    @wraps(method)
+    def guarded(self, context, *more):
+        try:
+            return method(self, context, *more)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    return guarded
 
 
 class ReadyOperator:

@@ -13,7 +13,7 @@ from ..objects.groups import ROLES, group_weights, handle_names, has_group
 from ..objects.modifiers import get_input, is_display, set_input
 from ..objects.result import check_writable
 from ..running.application import chosen_objects
-from ..running.ready import ReadyOperator
+from ..running.ready import ReadyOperator, reporting
 from .select import selection
 
 _SEGMENT = re.compile(r"Segment \d+")
@@ -41,21 +41,15 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
         old = bpy.app.version < cls.since
         return super().obstacle(context) or (("Meshes become point clouds from Blender 4.5 on") if old else "")
 
+    @reporting
     def execute(self, context):
         objects = chosen_objects(context, lambda obj: obj.meshfree.make_single_user)[0]
         objects = [obj for obj in objects if obj.type != self.target]
-        try:
-            if not objects:
-                raise PointCloudError(
-                    (f'"{context.object.name}" is a point cloud already.')
-                    if self.target == "POINTCLOUD"
-                    else (f'"{context.object.name}" is a mesh already.')
-                )
-            for obj in objects:
-                _check(obj)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        if not objects:
+            kind = "point cloud" if self.target == "POINTCLOUD" else "mesh"
+            raise PointCloudError(f'"{context.object.name}" is a {kind} already.')
+        for obj in objects:
+            _check(obj)
         active, chosen = context.view_layer.objects.active, context.selected_objects
         for obj in objects:
             if obj.meshfree.make_single_user and obj.data.users > 1:

@@ -54,8 +54,8 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
 
     def plan(self, context, obj):
         if self.values == "GROUPS":
-            low = chosen_members(obj, self.low_group, ("Low Group"))
-            high = chosen_members(obj, self.high_group, ("High Group"))
+            low = chosen_members(obj, self.low_group, "Low Group")
+            high = chosen_members(obj, self.high_group, "High Group")
             both = np.count_nonzero(low & high)
             if both:
                 raise PointCloudError(
@@ -110,7 +110,7 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
     def write(self, context, obj, result):
         write_attribute(obj.data, FIELD, result)
         tag_changed(obj.data)
-        return f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"
+        return [f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"]
 
 
 class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
@@ -155,11 +155,9 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
         reached = np.isfinite(result)
         write_attribute(obj.data, DISTANCE, np.where(reached, result, UNREACHED))
         tag_changed(obj.data)
-        missed = np.count_nonzero(~reached)
-        if missed:
-            far = f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."
-            self.warn([far])
-        return f"{obj.name}: distances up to {length_text(result[reached].max())}"
+        missed, line = np.count_nonzero(~reached), f"{obj.name}: distances up to {length_text(result[reached].max())}"
+        far = f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."
+        return [far, line] if missed else [line]
 
 
 CLASSES = (MESHFREE_OT_harmonic_field, MESHFREE_OT_geodesic_distance)

@@ -14,6 +14,7 @@ from ..objects.handlers import tell
 from ..objects.reading import obstacle
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
+from ..running.ready import reporting
 from ..running.stages import Stages
 
 
@@ -49,24 +50,21 @@ class SelectionOperator(JobOperator):
         with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):
             return super().complete(context, job)
 
-    def finish(self, context, objects, results, seconds):
+    def finish(self, context, objects, results):
         """Do it with the selection of now: the operators are kept."""
         return self.change(context, objects)
 
     def execute(self, context):
         return self.change(context, edited_objects(context))
 
+    @reporting
     def change(self, context, objects):
         """Compute for all objects, then change all."""
         with object_mode(context, context.object):
-            try:
-                objects, changes = self.with_points(objects), []
-                for obj in objects:
-                    with naming(obj.name):
-                        changes.append(self.prepare(context, obj))
-            except PointCloudError as error:
-                self.report({"ERROR"}, str(error))
-                return {"CANCELLED"}
+            objects, changes = self.with_points(objects), []
+            for obj in objects:
+                with naming(obj.name):
+                    changes.append(self.prepare(context, obj))
             messages = [change() for change in changes]
         for obj, message in zip(objects, messages, strict=True):
             self.report({"INFO"}, f"{obj.name}: {message}")
