@@ -75,14 +75,14 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
 def _draw_job(layout, job):
     """Draw what is computed, how far it is, and how to stop it."""
     column = layout.column(align=True)
-    column.label(text=f"{job.title} (Esc to Stop)")
+    column.label(text=f"{job.label} (Esc to Stop)")
     row = column.row(align=True)
     row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
     row.operator("meshfree.stop", text="", icon="X")
 
 
 def _draw_result(layout, result):
-    """Draw the total area, and of parts, boundaries and points left out what is worth telling."""
+    """Draw the total area, and of components, boundaries and points left out what is worth telling."""
     lines = [("Total Area", area_text(result.total_area))]
     if result.component_count > 1:
         lines.append(("Components", f"{result.component_count:,}"))

@@ -54,7 +54,7 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
     )
     rotation_aware: BoolProperty(
         name="Turn Details",
-        description="Let details turn with the surface, as shape_operator asks for",
+        description="Let details turn with the surface, as bending asks for",
         default=True,
         update=_follow,
     )

@@ -54,7 +54,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         name="Bandwidth",
         description="How far the kernel of each point reaches",
         items=(
-            ("ADAPTIVE", "Adaptive", "As far as uneven spacing demands and bends permit, point by point"),
+            ("ADAPTIVE", "Adaptive", "As far as uneven spacing demands and curvature permits, point by point"),
             ("LOCAL", "Local", "Follows the spacing of the points alone"),
             ("GLOBAL", "Global", "The same for all points, as in the paper: for even samples"),
         ),
@@ -259,7 +259,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     # Results of the last analysis, for the panel and for scripts.
     total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
     point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
-    component_count: IntProperty(name="Components", description="How many parts the surface falls into", min=0)
+    component_count: IntProperty(name="Components", description="How many components the surface falls into", min=0)
     boundary_count: IntProperty(
         name="Boundary Points", description="How many points lie at a boundary of the surface", min=0
     )

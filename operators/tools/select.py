@@ -182,13 +182,13 @@ class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
     """Select all points of the components that hold selected points"""
 
     bl_idname = "meshfree.select_component"
-    bl_label = "Select Connected Part"
+    bl_label = "Select Component"
 
     def prepare(self, context, obj):
         chosen = selected(obj)
         component = analyzed(context, obj)[1].component
-        parts = np.unique(component[chosen & (component >= 0)])  # points left out belong to none
-        return lambda: select(context, obj, chosen | np.isin(component, parts))
+        found = np.unique(component[chosen & (component >= 0)])  # points left out belong to none
+        return lambda: select(context, obj, chosen | np.isin(component, found))
 
 
 class FrontOnly:
