@@ -10,19 +10,7 @@ def _modules():
     from .operators.running import cache, job
     from .operators.tools import analyze, convert, fields, minimal, segment, smooth, spectrum
     from .operators.tools import select as selecting
-    from .ui import (
-        applications,
-        colormap,
-        legend,
-        menus,
-        overlay,
-        panel,
-        points,
-        presets,
-        range_selection,
-        show,
-        swatches,
-    )
+    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
     from .ui import deform as deform_panel
 
     return (
@@ -50,7 +38,6 @@ def _modules():
         range_selection,
         presets,
         panel,
-        swatches,
         points,
         applications,
         deform_panel,

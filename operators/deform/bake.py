@@ -105,8 +105,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
         show_baked(find_deform(obj), cache, self.first, len(results))
         size = np.prod([len(results), *results[0].shape]) * 4 / 2**20
-        text = f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file"
-        self.report({"INFO"}, text)
+        self.report({"INFO"}, f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file")
         return {"FINISHED"}
 
 
@@ -182,7 +181,7 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
     def obstacle(cls, context):
         reason = super().obstacle(context)
         obj = cls.subject(context)
-        return reason or ("" if is_baked(obj) else (f'Nothing of "{obj.name}" is baked'))
+        return reason or ("" if is_baked(obj) else f'Nothing of "{obj.name}" is baked')
 
     def change(self, context, obj):
         delete_bake(obj)

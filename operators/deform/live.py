@@ -338,7 +338,7 @@ def _take(obj, job, key, pose):
         live, points, displacement = job.work.result()
     except Cancelled:
         if job.prepares and job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
-            _troubles[obj.session_uid] = ("Binding was stopped. Press Update, or move a handle"), pose
+            _troubles[obj.session_uid] = "Binding was stopped. Press Update, or move a handle", pose
         return
     if job.key == key:
         keep(obj, live)

@@ -174,7 +174,7 @@ class BoundOperator(HandledOperator):
 
 def not_bound(obj) -> str:
     """Say that an object is not bound, and what to do; empty if it is."""
-    return "" if is_bound(obj) else (f'"{obj.name}" is not bound. Bind it to its handles first')
+    return "" if is_bound(obj) else f'"{obj.name}" is not bound. Bind it to its handles first'
 
 
 def check_fresh(obj):

@@ -15,7 +15,6 @@ from ..objects.result import EIGENVALUES
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
-from ..running.stages import Stages
 from .objects import analysis_arrays, file_filter, place_of, point_table, save_arrays
 
 
@@ -27,12 +26,6 @@ class ExportOperator(JobOperator, ExportHelper):
     """
 
     bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
-    suffix = ""  # of the name in the file browser
-
-    @property
-    def filename_ext(self):
-        """What `ExportHelper` adds to a name."""
-        return self.suffix
 
     def invoke(self, context, event):
         self._attended = True
@@ -44,17 +37,12 @@ class ExportOperator(JobOperator, ExportHelper):
 
     @reporting
     def execute(self, context):
-        attended = self.takes_window()
         path = Path(bpy.path.abspath(self.filepath))
         reason = self.obstacle(context)
         if reason:  # since the file browser opened
             raise PointCloudError(f"{reason}.")
         write = self.plan(context, context.object)
-        if attended:
-            return self.start(context, [], lambda progress: write(path, progress))
-        with Stages(context.window_manager, self.bl_label) as stages:
-            result = write(path, stages)
-        return self.finish(context, [], result)
+        return self.work(context, [], lambda progress: write(path, progress))
 
     def finish(self, context, objects, results):
         """Tell what was written."""
@@ -114,7 +102,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_operator"
     bl_label = "Export Laplacian"
-    suffix = ".npz"
+    filename_ext = ".npz"
 
     filter_glob: file_filter(".npz")
 
@@ -137,7 +125,7 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_eigenvalues"
     bl_label = "Export Eigenvalues"
-    suffix = ".csv"
+    filename_ext = ".csv"
 
     filter_glob: file_filter(".csv")
 

@@ -214,11 +214,8 @@ def _choose_object(path, name):
         chosen = meshes
     if len(chosen) != 1:
         names = ", ".join(obj.name for obj in meshes)
-        raise PointCloudError(
-            (f'{path} has no mesh object "{name}". Name one of its mesh objects with --object: {names}.')
-            if name
-            else (f"{path} has no active mesh object. Name one of its mesh objects with --object: {names}.")
-        )
+        what = f'mesh object "{name}"' if name else "active mesh object"
+        raise PointCloudError(f"{path} has no {what}. Name one of its mesh objects with --object: {names}.")
     bpy.context.view_layer.objects.active = chosen[0]
     return chosen[0]
 

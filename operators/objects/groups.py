@@ -20,7 +20,7 @@ _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a p
 
 def group_kind(obj) -> str:
     """What the groups of an object are called in Blender."""
-    return ("vertex group") if obj.type == "MESH" else "attribute"
+    return "vertex group" if obj.type == "MESH" else "attribute"
 
 
 def has_group(obj, name: str) -> bool:
@@ -113,7 +113,7 @@ def check_assignable(obj, name: str, must_exist: bool):
     if must_exist and not exists:
         raise PointCloudError(f'"{obj.name}" has no {kind} named "{name}" to remove points from. Choose another.')
     if name in obj.data.attributes and not (exists and obj.type != "MESH"):
-        reason = ("vertex groups share their names") if obj.type == "MESH" else ("it holds no weights")
+        reason = "vertex groups share their names" if obj.type == "MESH" else "it holds no weights"
         raise PointCloudError(
             f'"{obj.name}" has an attribute named "{name}", and {reason}. Choose another name, or rename the attribute.'
         )

@@ -12,7 +12,6 @@ from ..objects.result import check_writable
 from . import cache
 from .job import JobOperator
 from .ready import reporting
-from .stages import Stages
 
 
 class Tool:
@@ -66,18 +65,12 @@ class ApplicationOperator(Tool, JobOperator):
 
     @reporting
     def execute(self, context):
-        """Do all at once for scripts; beside the window for somebody there."""
-        attended = self.takes_window()
         context.view_layer.update()  # a script may have moved or scaled an object a line ago
         objects, self._left_out = [self.subject(context)], []
         if not self.only_active:
             objects, self._left_out = chosen_objects(context, self.becomes_single)
         plans = self.plan_all(context, objects, among=context.selected_objects)
-        if attended:
-            return self.start(context, objects, lambda progress: compute_all(plans, progress))
-        with Stages(context.window_manager, self.bl_label) as stages:
-            results = compute_all(plans, stages)
-        return self.finish(context, objects, results)
+        return self.work(context, objects, lambda progress: compute_all(plans, progress))
 
     def finish(self, context, objects, results):
         """Write what was computed, and report it."""

@@ -12,7 +12,7 @@ from ..objects.options import settings_values
 from ..objects.reading import find_object, fingerprint, metric, obstacle, read_points
 from ..objects.result import same_lengths
 from .ready import ReadyOperator, reporting
-from .stages import StageTimes
+from .stages import Stages, StageTimes
 
 STOPPED = "Stopped: nothing was changed"  # by somebody
 _FIRST = 0.01  # seconds to the first look, which comes after the first drawing
@@ -31,7 +31,7 @@ def busy() -> str:
     job = running()
     if job is None:
         return ""
-    return f"{job.title} is running. Wait for it, or press Esc to stop it"
+    return f"{job.label} is running. Wait for it, or press Esc to stop it"
 
 
 class Snapshot:
@@ -123,11 +123,6 @@ class Job(StageTimes):
         """Whether there is a result or an error, or it was stopped."""
         return bool(self.reason) or self._future.done()
 
-    @property
-    def title(self):
-        """The label in the language of the interface."""
-        return self.label
-
     def go_on(self, context):
         """Let the work begin, if it has not yet: once Blender has drawn that it does, from which it would take time."""
         if self._thread.ident is None:
@@ -159,7 +154,7 @@ class Job(StageTimes):
                 if all(operator.bl_idname != _ESCAPE for operator in window.modal_operators):
                     with bpy.context.temp_override(window=window):
                         bpy.ops.meshfree.escape("INVOKE_DEFAULT")
-        text = f"{self.title}: {self.stage}, {self.fraction:.0%}    Esc to stop"
+        text = f"{self.label}: {self.stage}, {self.fraction:.0%}    Esc to stop"
         if text != self._shown:
             self._shown = text
             _set_status([window.workspace for window in windows], text)
@@ -240,6 +235,7 @@ class JobOperator(ReadyOperator):
     """
 
     _job = None
+    _attended = False  # somebody at the window waits for it
 
     @classmethod
     def poll(cls, context):
@@ -247,6 +243,19 @@ class JobOperator(ReadyOperator):
             cls.poll_message_set(busy())
             return False
         return super().poll(context)
+
+    def takes_window(self):
+        """Tell whether to work beside the window, once for each time that somebody started it there."""
+        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
+        return attended and not bpy.app.background
+
+    def work(self, context, objects, compute):
+        """Compute for some objects beside the window, or at once for scripts, and let `finish` use the results."""
+        if self.takes_window():
+            return self.start(context, objects, compute)
+        with Stages(context.window_manager, self.bl_label) as stages:
+            results = compute(stages)
+        return self.finish(context, objects, results)
 
     def start(self, context, objects, compute, kind=Job):
         """Begin to work for some objects."""
@@ -294,7 +303,7 @@ class JobOperator(ReadyOperator):
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            self.report({"WARNING"}, f"{job.title} wrote nothing: {change}")
+            self.report({"WARNING"}, f"{job.label} wrote nothing: {change}")
             return {"CANCELLED"}
         return self.finish(context, objects, results)
 

@@ -2,8 +2,6 @@
 
 from functools import wraps
 
-import bpy
-
 from ...core import PointCloudError
 from ..objects.reading import obstacle
 
@@ -27,7 +25,6 @@ class ReadyOperator:
 
     bl_options = {"REGISTER", "UNDO"}
     works_in = ("OBJECT",)  # modes of the object
-    _attended = False  # somebody at the window waits for it
 
     @classmethod
     def subject(cls, context):
@@ -45,8 +42,3 @@ class ReadyOperator:
         if reason:
             cls.poll_message_set(reason)
         return not reason
-
-    def takes_window(self):
-        """Tell whether to work beside the window, once for each time that somebody started it there."""
-        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
-        return attended and not bpy.app.background

@@ -39,7 +39,7 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
     @classmethod
     def obstacle(cls, context):
         old = bpy.app.version < cls.since
-        return super().obstacle(context) or (("Meshes become point clouds from Blender 4.5 on") if old else "")
+        return super().obstacle(context) or ("Meshes become point clouds from Blender 4.5 on" if old else "")
 
     @reporting
     def execute(self, context):

@@ -298,7 +298,7 @@ def test_adjust_last_operation_offers_what_is_quick(name):
 def test_panel_while_something_runs(extension, monkeypatch):
     add_object(sphere_points())
     panel = importlib.import_module(f"{extension.__name__}.ui.panel")
-    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(title="Smooth Points", stage="Filter", fraction=0.25))
+    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(label="Smooth Points", stage="Filter", fraction=0.25))
     texts = draw()
     assert "Smooth Points (Esc to Stop)" in texts
     assert "Filter: 25%" in texts
