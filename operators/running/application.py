@@ -23,7 +23,7 @@ class Tool:
     """
 
     asks = ()  # names of the settings that a dialog asks for before the work; without any there is none
-    adjustable = ()  # of those that Adjust Last Operation, which waits, offers: they compute nothing long again
+    adjustable = ()  # names of those that Adjust Last Operation, which waits, offers: they compute nothing long again
     writes = ()  # names of the attributes that `write` makes
 
     def plan_all(self, context, objects, among=()):
