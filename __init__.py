@@ -18,7 +18,7 @@ def _modules():
     from .operators.running import cache, job
     from .operators.tools import analyze, convert, fields, minimal, segment, smooth, spectrum
     from .operators.tools import select as selecting
-    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, swatches
+    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
     from .ui import deform as deform_panel
 
     return (
@@ -41,12 +41,12 @@ def _modules():
         importing,
         exporting,
         command,
+        show,
         colormap,
         legend,
         range_selection,
         presets,
         panel,
-        swatches,
         points,
         applications,
         deform_panel,

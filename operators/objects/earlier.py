@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
-from ..running.handlers import add_handlers, remove_handlers
+from .handlers import add_handlers, remove_handlers
 
 _NEW = {
     "rims": "boundary",

@@ -289,7 +289,7 @@ def texts(picture):
 
 @pytest.mark.parametrize(
     ("name", "title"),
-    [("lb_area", "Area"), ("lb_normal", "Normal"), ("lb_boundary", "Boundary"), ("lb_component", "Connected Part")],
+    [("lb_area", "Area"), ("lb_normal", "Normal"), ("lb_boundary", "Boundary"), ("lb_component", "Component")],
 )
 def test_pictures_stay_on_their_plates(overlay, obj, name, title):
     obj.meshfree.histogram = obj.meshfree.plot_eigenvalues = True
