@@ -1,20 +1,29 @@
 """Mesh-Free Laplacian: areas, normals, curvature and vibration modes of point clouds, inside Blender."""
 
+_registered = []
+
 
 def _modules():
     """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
+    try:
+        import scipy.sparse  # noqa: F401
+    except ImportError:  # none of the wheels is for this Python
+        from .ui import missing
+
+        return (missing,)
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
-    from .operators.objects import counting, settings
+    from .operators.objects import counting, earlier, settings
     from .operators.running import cache, job
     from .operators.tools import analyze, convert, fields, minimal, segment, smooth, spectrum
     from .operators.tools import select as selecting
-    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, swatches
+    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
     from .ui import deform as deform_panel
 
     return (
         settings,
+        earlier,
         cache,
         counting,
         job,
@@ -32,12 +41,12 @@ def _modules():
         importing,
         exporting,
         command,
+        show,
         colormap,
         legend,
         range_selection,
         presets,
         panel,
-        swatches,
         points,
         applications,
         deform_panel,
@@ -55,13 +64,15 @@ def register():
             bpy.utils.register_class(cls)
         if hasattr(module, "attach"):
             module.attach()
+        _registered.append(module)
 
 
 def unregister():
     """Take everything out again, in reverse order."""
     import bpy
 
-    for module in reversed(_modules()):
+    while _registered:
+        module = _registered.pop()
         if hasattr(module, "detach"):
             module.detach()
         for cls in reversed(getattr(module, "CLASSES", ())):

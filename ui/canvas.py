@@ -7,6 +7,7 @@ import gpu
 from gpu_extras.batch import batch_for_shader
 
 FONT, FONT_SIZE = 0, 11  # Blender's own font, and its size in panels
+PLATE_CORNERS = 6  # the first places of a picture
 WHITE, DIM, PLATE = (1.0, 1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 0.45), (0.08, 0.08, 0.08, 0.75)
 
 
@@ -18,6 +19,7 @@ class Text(NamedTuple):
     y: float
     align: str  # "LEFT", "CENTER", "RIGHT"
     color: tuple
+    part: str = ""  # what it is, for a legend in renders
 
 
 class Picture:
@@ -49,9 +51,9 @@ class Picture:
         self.places += [left, bottom, right, left, right, top]
         self.colors += [color] * 6
 
-    def text(self, text, x, y, align="LEFT", color=WHITE):
+    def text(self, text, x, y, align="LEFT", color=WHITE, part=""):
         """Add a line of text."""
-        self.texts.append(Text(text, x, y, align, color))
+        self.texts.append(Text(text, x, y, align, color, part))
 
 
 def draw(picture, x, y, scale):
@@ -64,7 +66,7 @@ def draw(picture, x, y, scale):
     gpu.state.blend_set("NONE")
     blf.size(FONT, FONT_SIZE * scale)
     middle = 0.5 * blf.dimensions(FONT, "0")[1]
-    for text, px, py, align, color in picture.texts:
+    for text, px, py, align, color, _ in picture.texts:
         shift = {"LEFT": 0.0, "CENTER": 0.5, "RIGHT": 1.0}[align] * blf.dimensions(FONT, text)[0]
         blf.color(FONT, *color)
         blf.position(FONT, round(x + scale * px - shift), round(y + scale * py - middle), 0.0)

@@ -3,9 +3,8 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
-from ..core import PointCloudError
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
-from ..operators.running.ready import ReadyOperator
+from ..operators.running.ready import ReadyOperator, reporting
 from .show import show_attribute, use_material_preview
 
 
@@ -38,13 +37,10 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
         default=True,
     )
 
+    @reporting
     def execute(self, context):
         obj = context.object
-        try:
-            show_attribute(obj, self.attribute, self.radius)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        show_attribute(obj, self.attribute, self.radius)
         for name in COLOR_CHOICES:  # the settings of the object keep what they are unless given
             if not self.properties.is_property_set(name):
                 setattr(self, name, getattr(obj.meshfree, name))

@@ -58,9 +58,10 @@ def to_display(color):
     return (*(12.92 * v if v <= 0.0031308 else 1.055 * v ** (1.0 / 2.4) - 0.055 for v in color[:3]), color[3])
 
 
+def to_linear(color):
+    """Turn what screens take into a linear (r, g, b, 1)."""
+    return (*(v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in color[:3]), 1.0)
+
+
 def _color(code):
-    return (*(_linear(int(code[i : i + 2], 16) / 255.0) for i in (0, 2, 4)), 1.0)
-
-
-def _linear(value):
-    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+    return to_linear([int(code[i : i + 2], 16) / 255.0 for i in (0, 2, 4)])

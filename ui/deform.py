@@ -3,11 +3,12 @@
 import bpy
 
 from ..operators.deform import live
-from ..operators.deform.binding import copied_from, handle_names, handled_object, is_bound, stale_reason
+from ..operators.deform.binding import copied_from, handled_object, is_bound, stale_reason
 from ..operators.deform.nodes import find_deform, is_baked
-from ..operators.objects.groups import search_group
+from ..operators.objects.groups import handle_names
 from ..operators.objects.modifiers import input_property
 from ..operators.objects.reading import obstacle
+from .dialogs import search_group
 from .panel import SidebarPanel
 
 _WIDTH = 38  # letters in a line of the panel

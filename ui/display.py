@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from ..operators.objects.attributes import BOUNDARY, COMPONENT, DISPLACEMENT, DISTANCE, read_attribute
+from ..operators.objects.attributes import DISPLACEMENT, DISTANCE, read_attribute
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, is_display
 from .nodes import ATTRIBUTE, COLORS, RANGE
 from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"
-_TITLES = {BOUNDARY: "Boundary", COMPONENT: "Connected Part"}
 
 
 def find_display(obj):
@@ -108,7 +107,5 @@ def _find_node(obj, name):
 
 def label(name: str) -> str:
     """Title of an attribute for people: "Mode 3" for lb_eigenvector_003."""
-    if name in _TITLES:
-        return _TITLES[name]
     words = name.removeprefix("lb_").replace("eigenvector", "mode").split("_")
     return " ".join(word.lstrip("0").title() for word in words)

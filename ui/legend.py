@@ -5,19 +5,20 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..core import PointCloudError
 from ..operators.running.ready import ReadyOperator
+from .canvas import PLATE_CORNERS
+from .colormaps import to_linear
 from .display import shown_attribute
 from .nodes import add_node, new_tree
+from .plots import legend_picture
 from .scale import shown_scale
 
 NAME = "Mesh-Free Legend"  # of what is made; found by the marks below, whatever it is called since
 _OF = "meshfree_legend_of"  # custom property of the collection: the object whose colours it explains
 _TITLE = "meshfree_legend_title"  # another one: the name of the attribute, which is the title unless somebody wrote one
 _PART = "meshfree_legend_part"  # custom property of an object in it: what part of the legend it is
-_STEPS = 64  # of the bar's colours
-_FEWEST = 6  # boxes that fill the plate
 _COLOR = "legend_color"  # attribute of the parts
-_WHITE = (1.0, 1.0, 1.0, 1.0)
-_BLACK = (0.01, 0.01, 0.01, 1.0)
+_HEIGHT, _GAP = 0.7, 0.03  # of the plate, and to the right edge, as shares of the picture's shorter side
+_WIDTH, _EDGE, _FONT_SIZE = 100.0, 6.0, 13.8  # of the plate, beside its texts, and of these, in its own units
 
 
 def make_legend(scene, obj, camera, title: str = ""):
@@ -132,102 +133,66 @@ def _is_shared(legend, scene):
 
 
 def _fill(collection, scene, obj, camera, title):
-    """Write a legend anew, on the objects that it has."""
+    """Write a legend anew, as it is drawn over the view, on the objects that it has.
+
+    Those that are missing are made, and those left over removed.
+    """
     scale = shown_scale(obj, scene)
     collection[_TITLE] = scale.title
-    legend = _Legend(scene, camera)
-    legend.rectangle((0.0, 0.0, 1.0, 1.0), [_BLACK] * 2, depth=1.01)
-    legend.text("title", title or scale.title, 0.08, 0.94, width=0.84)
-    low, high, bottom, top = 0.1, 0.32, 0.05, 0.86
-    if scale.unit:
-        legend.text("unit", scale.unit, 0.08, 0.88, width=0.3)
-        top = 0.81
-    height = (top - bottom) / max(len(scale.boxes), _FEWEST)
-    for index, (name, color) in enumerate(scale.boxes.items()):
-        y = top - (index + 1) * height
-        if color[3]:
-            legend.rectangle((low, y, high, y + 0.85 * height), [color] * 2)
-        legend.text(f"box {index}", name, high + 0.1, y + 0.42 * height)
-    if not scale.boxes:
-        bar = [_between(scale.colors, step / _STEPS) for step in range(_STEPS + 1)]
-        legend.rectangle((low, bottom, high, top), bar)
-    for index, (share, text) in enumerate(scale.ticks):
-        y = bottom + share * (top - bottom)
-        legend.rectangle((high, y - 0.002, high + 0.05, y + 0.002), [_WHITE] * 2)
-        legend.text(f"tick {index}", text, high + 0.1, y)
-    legend.write(collection)
+    picture = legend_picture(scale._replace(title=title or scale.title), _WIDTH)
+    known = {}
+    for part in collection.objects:
+        if _PART in part and part.type == ("MESH" if part[_PART] == "colors" else "FONT"):
+            known.setdefault(part[_PART], part)
+    surplus = [part for part in collection.objects if _PART in part and part not in known.values()]
+    _remove(surplus + [known.pop(name) for name in known.keys() - {"colors", *(text.part for text in picture.texts)}])
+    unit, place = _frame(scene, camera, picture)
+    mesh = _part(collection, known, camera, "colors").data
+    mesh.clear_geometry()
+    corners = range(0, len(picture.places), 3)
+    mesh.from_pydata(
+        [place(x, y, depth=1.0 if index >= PLATE_CORNERS else 1.01) for index, (x, y) in enumerate(picture.places)],
+        [],
+        [(corner, corner + 1, corner + 2) for corner in corners],
+    )
+    colors = mesh.attributes.new(_COLOR, "FLOAT_COLOR", "POINT")
+    colors.data.foreach_set("color", [value for color in picture.colors for value in to_linear(color)])
+    mesh.update()
+    for text in picture.texts:
+        part = _part(collection, known, camera, text.part)
+        room = picture.width - _EDGE - text.x
+        size = min(_FONT_SIZE, room / (0.5 * len(text.text)))
+        part.data.body, part.data.size, part.location = text.text, unit * size, place(text.x, text.y)
 
 
-def _between(colors, share):
-    """Return the colour at a share of the way through even samples."""
-    place = share * (len(colors) - 1)
-    index = min(int(place), len(colors) - 2)
-    part = place - index
-    return tuple((1.0 - part) * a + part * b for a, b in zip(colors[index], colors[index + 1], strict=True))
+def _frame(scene, camera, picture):
+    """Find room at the right edge of what a camera sees; return a picture's unit there, and how its places get there.
+
+    These are close in front of the camera, where the depth is 1.
+    """
+    near = 1.5 * camera.data.clip_start
+    corners = camera.data.view_frame(scene=scene)
+    scale = 1.0 if camera.data.type == "ORTHO" else near / -corners[0].z
+    right, top = (scale * max(corner[axis] for corner in corners) for axis in (0, 1))
+    left, bottom = (scale * min(corner[axis] for corner in corners) for axis in (0, 1))
+    side = min(right - left, top - bottom)
+    unit = _HEIGHT * side / picture.height
+    first_x, first_y = right - _GAP * side - unit * picture.width, 0.5 * (bottom + top - unit * picture.height)
+
+    def place(x, y, depth=1.0):
+        return depth * (first_x + unit * x), depth * (first_y + unit * y), -depth * near
+
+    return unit, place
 
 
-class _Legend:
-    """A plate in front of a camera; places on it are given from 0 to 1, from the lower left corner."""
-
-    def __init__(self, scene, camera):
-        self._camera = camera
-        self._places, self._faces, self._colors, self._texts = [], [], [], {}
-        self._depth = 1.5 * camera.data.clip_start
-        corners = camera.data.view_frame(scene=scene)
-        scale = 1.0 if camera.data.type == "ORTHO" else self._depth / -corners[0].z
-        right, top = (scale * max(corner[axis] for corner in corners) for axis in (0, 1))
-        left, bottom = (scale * min(corner[axis] for corner in corners) for axis in (0, 1))
-        unit = min(right - left, top - bottom)
-        self._size = (0.3 * unit, 0.7 * unit)
-        self._corner = (right - 0.33 * unit, 0.5 * (bottom + top) - 0.35 * unit)
-
-    def rectangle(self, box, colors, depth=1.0):
-        """Add a rectangle (left, bottom, right, top) with colours from its bottom to its top."""
-        left, bottom, right, top = box
-        steps, first = len(colors) - 1, len(self._places)
-        rows = [bottom + (top - bottom) * index / steps for index in range(len(colors))]
-        self._places += [self._place(x, y, depth) for y in rows for x in (left, right)]
-        self._colors += [color for color in colors for _ in (0, 1)]
-        corners = range(first, first + 2 * steps, 2)
-        self._faces += [(corner, corner + 1, corner + 3, corner + 2) for corner in corners]
-
-    def text(self, part, text, x, y, width=0.5):
-        """Add white text, centred in height, small enough to end within a width."""
-        size = min(0.06 * self._size[1], width * self._size[0] / (0.5 * len(text)))
-        self._texts[part] = text, size, self._place(x, y)
-
-    def write(self, collection):
-        """Give all of it to the objects in a collection; make those that are missing, and remove those left over."""
-        known = {}
-        for obj in collection.objects:
-            if _PART in obj and obj.type == ("MESH" if obj[_PART] == "colors" else "FONT"):
-                known.setdefault(obj[_PART], obj)
-        surplus = [obj for obj in collection.objects if _PART in obj and obj not in known.values()]
-        _remove(surplus + [known.pop(part) for part in known.keys() - {"colors", *self._texts}])
-        mesh = self._object(collection, known, "colors").data
-        mesh.clear_geometry()
-        mesh.from_pydata(self._places, [], self._faces)
-        colors = mesh.attributes.new(_COLOR, "FLOAT_COLOR", "POINT")
-        colors.data.foreach_set("color", [value for color in self._colors for value in color])
-        mesh.update()
-        for part, (text, size, place) in self._texts.items():
-            obj = self._object(collection, known, part)
-            obj.data.body, obj.data.size, obj.location = text, size, place
-
-    def _object(self, collection, known, part):
-        obj = known.get(part) or _new_part(collection, part)
-        if obj.data.users > 1:  # of a copy of the legend
-            obj.data = obj.data.copy()
-        if obj.parent != self._camera:
-            obj.parent = self._camera
-        return obj
-
-    def _place(self, x, y, depth=1.0):
-        return (
-            depth * (self._corner[0] + x * self._size[0]),
-            depth * (self._corner[1] + y * self._size[1]),
-            -depth * self._depth,
-        )
+def _part(collection, known, camera, name):
+    """Return the object that is a part of a legend, as a child of the camera."""
+    part = known.get(name) or _new_part(collection, name)
+    if part.data.users > 1:  # of a copy of the legend
+        part.data = part.data.copy()
+    if part.parent != camera:
+        part.parent = camera
+    return part
 
 
 def _new_part(collection, part):

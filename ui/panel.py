@@ -4,11 +4,11 @@ import bpy
 
 from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
-from ..operators.objects.groups import search_group
 from ..operators.objects.modifiers import is_own
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import EIGENVALUES, area_text, is_analyzed, is_stale
 from ..operators.running.job import running
+from .dialogs import draw_setting
 from .display import find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
 
@@ -75,14 +75,14 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
 def _draw_job(layout, job):
     """Draw what is computed, how far it is, and how to stop it."""
     column = layout.column(align=True)
-    column.label(text=f"{job.title} (Esc to Stop)")
+    column.label(text=f"{job.label} (Esc to Stop)")
     row = column.row(align=True)
     row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
     row.operator("meshfree.stop", text="", icon="X")
 
 
 def _draw_result(layout, result):
-    """Draw the total area, and of parts, boundaries and points left out what is worth telling."""
+    """Draw the total area, and of components, boundaries and points left out what is worth telling."""
     lines = [("Total Area", area_text(result.total_area))]
     if result.component_count > 1:
         lines.append(("Components", f"{result.component_count:,}"))
@@ -137,13 +137,8 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
             column = layout.column(align=True)
             for name in group:
                 row = column.row(align=True)
-                if name == "boundary_group":
-                    search_group(row, obj.meshfree, name, obj)
-                else:
-                    row.active = (
-                        name != "boundary" or not obj.meshfree.boundary_group
-                    )  # a named boundary is not looked for
-                    row.prop(obj.meshfree, name)
+                row.active = name != "boundary" or not obj.meshfree.boundary_group  # a named one is not looked for
+                draw_setting(row, obj.meshfree, name, obj)
 
 
 class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):

@@ -14,27 +14,28 @@ _MARK = (1.0, 0.75, 0.2, 1.0)
 _FEWEST = 6  # boxes that fill a legend
 
 
-def legend_picture(scale) -> Picture:
-    """Draw the colours of a scale with their numbers."""
-    picture = Picture(150.0, _HEIGHT)
+def legend_picture(scale, width: float = 150.0) -> Picture:
+    """Draw the colours of a scale with their numbers, for the view and for renders."""
+    picture = Picture(width, _HEIGHT)
     top = _title(picture, scale.title, scale.unit)
     left, right, bottom = _EDGE, _EDGE + 20.0, _EDGE
     if scale.boxes:
         height = (top - bottom) / max(len(scale.boxes), _FEWEST)
         for index, (name, color) in enumerate(scale.boxes.items()):
             y = top - (index + 1) * height
-            picture.rectangle(left, y + 0.1 * height, right, y + 0.9 * height, to_display(color))
-            picture.text(name, right + 8.0, y + 0.5 * height)
+            if color[3]:
+                picture.rectangle(left, y + 0.1 * height, right, y + 0.9 * height, to_display(color))
+            picture.text(name, right + 8.0, y + 0.5 * height, part=f"box {index}")
         return picture
     bottom, top = bottom + 0.4 * _LINE, top - 0.4 * _LINE  # half a number stands out at each end
     colors = [to_display(color) for color in scale.colors]
     rows = np.linspace(bottom, top, len(colors))
     for index in range(len(colors) - 1):
         picture.rectangle(left, rows[index], right, rows[index + 1], colors[index], colors[index + 1])
-    for share, text in scale.ticks:
+    for index, (share, text) in enumerate(scale.ticks):
         y = bottom + share * (top - bottom)
         picture.line((right, y), (right + 5.0, y), WHITE)
-        picture.text(text, right + 10.0, y)
+        picture.text(text, right + 10.0, y, part=f"tick {index}")
     return picture
 
 
@@ -138,10 +139,10 @@ def spectrum_picture(eigenvalues, shown_mode: int, unit: str, factor: float, are
 def _title(picture, title, unit):
     """Write a title and below it a unit, if there is one; return where the room below them begins."""
     y = picture.height - _EDGE - 0.3 * _LINE
-    picture.text(title, _EDGE, y)
+    picture.text(title, _EDGE, y, part="title")
     if unit:
         y -= _LINE
-        picture.text(unit, _EDGE, y, color=(1.0, 1.0, 1.0, 0.7))
+        picture.text(unit, _EDGE, y, color=(1.0, 1.0, 1.0, 0.7), part="unit")
     return y - 0.9 * _LINE
 
 

@@ -1,13 +1,23 @@
 """The panel about points: selecting them, and the groups that the tools take."""
 
-import bpy
+import bpy.utils.previews
 
 from ..operators.objects.counting import members
-from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, FIXED, HANDLE, SOURCE, VALUE, has_group
+from ..operators.objects.groups import (
+    ANCHOR,
+    BOUNDARY_GROUP,
+    FIXED,
+    HANDLE,
+    ROLES,
+    SOURCE,
+    VALUE,
+    has_group,
+    role_group,
+)
 from ..operators.objects.reading import TYPES
 from ..operators.tools.convert import MESHFREE_OT_convert
+from . import colormaps
 from .panel import SidebarPanel
-from .swatches import swatch
 
 _TITLES = {
     HANDLE: "Handles",
@@ -17,6 +27,8 @@ _TITLES = {
     VALUE: "Values",
     BOUNDARY_GROUP: "Boundary",
 }
+_SIZE, _EDGE = 16, 2  # pixels of a swatch, the picture of a group's color, and empty ones around it
+_swatches = []  # the collection of Blender that holds them
 
 
 class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
@@ -39,17 +51,41 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         for role, title in _TITLES.items():
             row = column.split(factor=0.66, align=True)
-            icon = {"icon_value": swatch(role)} if obj.meshfree.show_groups else {}
+            icon = {"icon_value": _swatches[0][role].icon_id} if obj.meshfree.show_groups else {}
             row.operator("meshfree.group_from_selection", text=f"Assign to {title}", **icon).role = role.upper()
-            found = members(obj, role, glance=True)
+            group = role_group(obj, role)
+            found = members(obj, group, glance=True)
             text = "..." if found is None else f"{found.count:,}"
             selecting = row.row(align=True)
-            selecting.enabled = has_group(obj, role)
-            selecting.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = role
+            selecting.enabled = has_group(obj, group)
+            selecting.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = group
         if bpy.app.version >= MESHFREE_OT_convert.since:
             to_mesh = obj.type != "MESH"
             text = "Convert to Mesh" if to_mesh else "Convert to Point Cloud"
             layout.operator("meshfree.convert", text=text).target = "MESH" if to_mesh else "POINTCLOUD"
+
+
+def attach():
+    """Make the swatches of groups."""
+    pictures = bpy.utils.previews.new()
+    for role in ROLES:
+        picture = pictures.new(role)
+        picture.icon_size = (_SIZE, _SIZE)
+        inside = range(_EDGE, _SIZE - _EDGE)
+        color, nothing = colormaps.to_display(colormaps.group_color(role)), (0.0, 0.0, 0.0, 0.0)
+        picture.icon_pixels_float = [
+            value
+            for row in range(_SIZE)
+            for column in range(_SIZE)
+            for value in (color if row in inside and column in inside else nothing)
+        ]
+    _swatches.append(pictures)
+
+
+def detach():
+    """Give the swatches back."""
+    while _swatches:
+        bpy.utils.previews.remove(_swatches.pop())
 
 
 CLASSES = (MESHFREE_PT_points,)

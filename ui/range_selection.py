@@ -53,17 +53,8 @@ class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
         if self.extend:
             chosen |= selection(obj)
         if not chosen.any():
-            raise PointCloudError(
-                (
-                    f"No value of {label(shown_attribute(obj))} lies outside {self.low:g} to {self.high:g}. Widen"
-                    " the range."
-                )
-                if self.invert
-                else (
-                    f"No value of {label(shown_attribute(obj))} lies from {self.low:g} to {self.high:g}. Widen the"
-                    " range."
-                )
-            )
+            bounds = f"{'outside' if self.invert else 'from'} {self.low:g} to {self.high:g}"
+            raise PointCloudError(f"No value of {label(shown_attribute(obj))} lies {bounds}. Widen the range.")
         return lambda: select(context, obj, chosen)
 
 

@@ -4,12 +4,12 @@ import math
 
 import bpy
 
-from ..operators.deform.binding import handle_names, positions_now
+from ..operators.deform.binding import positions_now
 from ..operators.objects.attributes import MEAN_CURVATURE, read_attribute
-from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES
+from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
+from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
-from ..operators.running.stages import redraw_views
 from . import colormaps, legend
 from .display import NAME, component, find_display, find_material, numbers, shown_attribute, without_unreached
 from .nodes import color_by_direction, color_by_number, color_plain, display_group, is_plain
@@ -88,6 +88,14 @@ def show_groups(obj):
         color_plain(_own_material(obj), _group_colors(obj))
         obj.update_tag()
     recolor(obj)
+    if obj.meshfree.show_groups:
+        use_material_preview(bpy.context)
+
+
+def show_result(obj, name):
+    """Show an attribute that was written just now; see `show_attribute`."""
+    show_attribute(obj, name)
+    use_material_preview(bpy.context)
 
 
 def use_material_preview(context):
@@ -139,7 +147,7 @@ def _color(obj, name, values):
         color_by_number(material, name, component_shown, color_map, low, high, settings, groups)
     obj.update_tag()
     legend.renew(obj)
-    redraw_views(bpy.context.window_manager)
+    redraw_views()
 
 
 def _own_material(obj):
@@ -160,10 +168,47 @@ def _group_colors(obj) -> dict:
     settings = obj.meshfree
     if not settings.show_groups:
         return {}
-    names = {role: role for role in ROLES}
+    names = {role_group(obj, role): role for role in ROLES}
     if settings.boundary_group:
         names[settings.boundary_group] = BOUNDARY_GROUP
     names[settings.deform.anchors or ANCHOR] = ANCHOR
     for name in handle_names(obj)[:_MOST_HANDLES]:
         names[name] = HANDLE
     return {name: colormaps.group_color(role) for name, role in names.items()}
+
+
+def redraw_views():
+    """Draw all 3D views again, for what is drawn over them."""
+    for area in _views():
+        area.tag_redraw()
+
+
+def redraw_panels():
+    """Draw the sidebars of all 3D views again."""
+    for area in _views():
+        next(region for region in area.regions if region.type == "UI").tag_redraw()
+
+
+def _views():
+    areas = (area for window in bpy.context.window_manager.windows for area in window.screen.areas)
+    return (area for area in areas if area.type == "VIEW_3D")
+
+
+_HANDLERS = {
+    "colors_changed": recolor,
+    "size_changed": resize,
+    "groups_changed": show_groups,
+    "result_written": show_result,
+    "views_changed": redraw_views,
+    "panels_changed": redraw_panels,
+}
+
+
+def attach():
+    """Begin to show what settings and tools tell of."""
+    add_handlers(_HANDLERS)
+
+
+def detach():
+    """Show nothing more."""
+    remove_handlers(_HANDLERS)

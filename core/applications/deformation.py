@@ -63,7 +63,14 @@ class Deformer:
     PointCloudError
         No handles, points that are handles and anchors, weights that are negative or of a wrong number.
     InvalidPointsError
-        Sets of points that are none.
+        Sets of points that are neither indices nor truth values, or name a point twice.
+    SolverError
+        The equations cannot be factorised.
+
+    See Also
+    --------
+    grow : Chooses the points around others.
+    smooth_points : Filters the shape.
 
     Notes
     -----
@@ -80,6 +87,21 @@ class Deformer:
     Petronetto, Paiva, Helou, Stewart, Nonato. Mesh-free discrete Laplace-Beltrami operator. 2013. Figure 13.
     Sorkine. Differential representations for mesh processing. Computer Graphics Forum 25, 2006.
     Sorkine, Alexa. As-rigid-as-possible surface modeling. SGP 2007.
+
+    Examples
+    --------
+    The cap at one pole is lifted by one, that at the other stays, and all follow, by a half on average:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> deformer = core.Deformer(laplacian, z > 0.8, z < -0.8)
+    >>> moved = deformer.solve(points[deformer.handles] + [0, 0, 1])
+    >>> print((moved - points)[[0, 799], 2].round(2), (moved - points)[:, 2].mean().round(2))
+    [1. 0.] 0.5
     """
 
     def __init__(

@@ -23,6 +23,16 @@ def exponential(time):
     ----------
     time : float
         [L^2], not negative. Details of a wavelength below about ``6 sqrt(time)`` fade.
+
+    Returns
+    -------
+    callable
+        From an array of eigenvalues [1 / L^2] to an array of factors of the same shape, as of all responses.
+
+    Raises
+    ------
+    PointCloudError
+        A time that is negative or not finite.
     """
     if not 0.0 <= time < np.inf:
         raise PointCloudError(f"The time of an exponential response is {time!r}. Use a number that is not negative.")
@@ -38,6 +48,16 @@ def fairing(time, order=3):
         [L^2], not negative. What has a wavelength of ``2 pi sqrt(time)`` is halved.
     order : int
         1 for the flow of heat, 2 or 3 for a sharper line between what stays and what goes.
+
+    Returns
+    -------
+    callable
+        From eigenvalues [1 / L^2] to factors.
+
+    Raises
+    ------
+    PointCloudError
+        A time that is negative or not finite, or another order.
     """
     if not 0.0 <= time < np.inf:
         raise PointCloudError(f"The time of the fairing is {time!r}. Use a number that is not negative.")
@@ -57,6 +77,16 @@ def band(low, high=np.inf, *, softness=0.1):
     softness : float
         Relative width of the fade in frequency, the root of the eigenvalue. A small one asks `chebyshev_filter` for
         many products.
+
+    Returns
+    -------
+    callable
+        From eigenvalues [1 / L^2] to factors.
+
+    Raises
+    ------
+    PointCloudError
+        Edges out of order or negative, or a softness that is not above zero.
     """
     if not (0.0 <= low < high and softness > 0.0):
         raise PointCloudError(
@@ -84,6 +114,16 @@ def boost(gain, low, high=np.inf, *, softness=0.25):
         Above 1 for stronger details, below for weaker ones.
     low, high, softness : float
         As for `band`. With an infinite high, noise grows as well.
+
+    Returns
+    -------
+    callable
+        From eigenvalues [1 / L^2] to factors.
+
+    Raises
+    ------
+    PointCloudError
+        A gain that is not finite, or an empty band.
     """
     if not np.isfinite(gain):
         raise PointCloudError(f"The gain of the details is {gain!r}. Use a finite number.")
@@ -121,9 +161,31 @@ def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
         More modes than the spectrum holds, fewer than there are constant ones, or a response that is not a number for
         each eigenvalue.
 
+    See Also
+    --------
+    LaplaceBeltrami.eigenpairs : Computes the spectrum.
+    chebyshev_filter : The same without a spectrum.
+    smooth_points : Filters the points themselves.
+    exponential, fairing, band, boost : Responses.
+
     References
     ----------
     Vallet, Levy. Spectral geometry processing with manifold harmonics. 2008. Section 4 and Figure 12 of the paper.
+
+    Examples
+    --------
+    On the unit sphere z is a mode of eigenvalue 2, and x y of eigenvalue 6, which the first four modes do not hold:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> values = z + points[:, 0] * points[:, 1]
+    >>> smooth = core.spectral_filter(values, laplacian.eigenpairs(9), laplacian.areas, 4)
+    >>> print(np.abs(smooth - z).max().round(2))
+    0.0
     """
     n, count = spectrum.eigenvectors.shape
     values = check_values(values, n)
@@ -159,7 +221,7 @@ def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False,
         Maps an array of eigenvalues [1 / L^2] to factors. It should be smooth: the more abrupt, the more products with
         the operator.
     dirichlet : bool
-        Take the functions to vanish at the boundary, instead of meeting it level.
+        Take the functions to vanish at the boundary (Dirichlet), instead of meeting it level (Neumann).
     raw : bool
         Leave out the symbol correction.
     tolerance : float

@@ -94,12 +94,18 @@ def minimal_surface(
     Raises
     ------
     InvalidPointsError
-        Too few fixed points, or nothing but fixed points; a component without any, or an edge that is not fixed; a
+        Too few fixed points, or nothing but fixed points; a component without any, or a boundary that is not fixed; a
         tolerance or a number of steps out of range.
     PointCloudError
         No operator can be built on the given points.
     Cancelled
         Raised by `progress` before there is an operator of the given points.
+
+    See Also
+    --------
+    MinimalSurface : The result.
+    mean_curvature : Zero on it, but at fixed points.
+    fair_points : Takes noise away.
 
     Notes
     -----
@@ -129,6 +135,18 @@ def minimal_surface(
     ----------
     Petronetto et al. 2013, section 5, Figure 14. Pinkall, Polthier. Computing discrete minimal surfaces and their
     conjugates. 1993.
+
+    Examples
+    --------
+    A cushion over a square of area four becomes flat while its boundary is fixed:
+
+    >>> import numpy as np
+    >>> import core
+    >>> x, y = np.mgrid[-1:1:21j, -1:1:21j].reshape(2, -1)
+    >>> points = np.column_stack([x, y, 0.5 * (1 - x**2) * (1 - y**2)])
+    >>> film = core.minimal_surface(points, np.maximum(np.abs(x), np.abs(y)) == 1)
+    >>> print(film.converged, round(film.initial_area, 1), film.areas.sum().round(1))
+    True 4.6 4.0
     """
     points = check_points(points)
     fixed = as_mask(fixed, len(points))

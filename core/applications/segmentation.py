@@ -55,9 +55,29 @@ def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
     PointCloudError
         A threshold or bridge outside of [0, 1), or a smallest size below 1.
 
+    See Also
+    --------
+    LaplaceBeltrami.eigenpairs : Computes modes.
+    segment : Parts by many modes at once.
+
     References
     ----------
     Figures 10, 11 and 16 of the paper. Counted as there, from 1, mode k is column k - 1; mode 1 is constant.
+
+    Examples
+    --------
+    On a sphere the height changes its sign at the equator, and x y has a domain in each quarter:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> print(np.bincount(core.nodal_domains(z, laplacian)))
+    [400 400]
+    >>> print(core.nodal_domains(points[:, 0] * points[:, 1], laplacian).max() + 1)
+    4
     """
     n = len(laplacian.points)
     values = check_values(values, n, columns=False)
@@ -80,7 +100,7 @@ def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
 
 
 def segment(laplacian, parts, *, spectrum=None, progress=None):
-    """Divide the surface into a number of components, such as the limbs of a figure.
+    """Divide the surface into a number of parts, such as the limbs of a figure.
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
     factor that fades to zero at the last mode used, so that their distances depend neither on the signs of modes nor on
@@ -94,7 +114,7 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
     parts : int
         How many parts; at least one for each component of the cloud. The others are dealt out by area.
     spectrum : Spectrum, optional
-        Its natural modes, to save time; used if there are enough of them, which is ``modes_needed``.
+        Its Neumann modes, to save time; used if there are enough of them, which is ``modes_needed``.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -113,10 +133,32 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
         Fewer parts than components.
     InvalidPointsError
         A spectrum of other points.
+    SolverError
+        The eigenvalue solver did not converge.
+
+    See Also
+    --------
+    modes_needed : How many modes it works with.
+    nodal_domains : Parts by the sign of one function.
+    heat_kernel_signature : Points told apart by modes.
 
     References
     ----------
     Rustamov. Laplace-Beltrami eigenfunctions for deformation invariant shape representation. 2007.
+
+    Examples
+    --------
+    A dumbbell comes apart at its waist, where z is zero:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> dumbbell = points * (0.4 + np.abs(z))[:, None]
+    >>> labels = core.segment(core.build_laplacian(dumbbell), 2)
+    >>> print(labels.max() + 1, np.ptp(labels[z > 0.1]), np.ptp(labels[z < -0.1]))
+    2 0 0
     """
     n = len(laplacian.points)
     if isinstance(parts, bool) or not isinstance(parts, (int, np.integer)) or parts < 1:
@@ -158,6 +200,7 @@ def modes_needed(laplacian, parts):
     ----------
     laplacian : LaplaceBeltrami
     parts : int
+        How many parts are to be asked for.
 
     Returns
     -------

@@ -36,6 +36,24 @@ def grow(laplacian, chosen, distance):
         Neither whole numbers below n nor n truth values.
     PointCloudError
         A distance that is negative or not a number.
+
+    See Also
+    --------
+    geodesic_distance : The distances themselves.
+    segment : Sets of points found by shape.
+
+    Examples
+    --------
+    A cap of the unit sphere that ends pi / 3 from its pole is a quarter of it:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> print(core.grow(laplacian, [0], np.pi / 3).mean().round(2))
+    0.25
     """
     mask = as_mask(chosen, len(laplacian.points))
     try:

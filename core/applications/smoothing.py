@@ -52,7 +52,7 @@ def smooth_points(
         its area, or enclosed volume, before. The volume needs a closed surface and normals that point outwards.
     dirichlet : bool
         Boundary points stay where they are: what is filtered is the distance from the surface that spans the boundary
-        like a soap film. Otherwise a boundary shrinks like all else, as the modes meet it level.
+        like a soap film. Otherwise a boundary shrinks like all else, as Neumann modes meet it level.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
     base : ndarray, (n, 3), optional
@@ -66,13 +66,39 @@ def smooth_points(
     Raises
     ------
     PointCloudError
-        A response, mask, strength or choice that makes no sense, or modes that are constants alone.
-    UnresolvedModesError, TooFewPointsError, SolverError
-        From the spectrum, where it is computed here, or a scale that is not found.
+        A response, mask, strength or choice that makes no sense, modes that are constants alone, or a volume to keep
+        of a surface that encloses none.
+    TooFewPointsError, SolverError
+        From the spectrum, where it is computed here; a scale that is not found.
+
+    See Also
+    --------
+    fair_points : An implicit step against noise.
+    spectral_filter : Filters any function by modes.
+    chebyshev_filter : Filters any function without modes.
+    exponential, fairing, band, boost : Responses.
 
     References
     ----------
     Vallet, Levy. Spectral geometry processing with manifold harmonics. 2008. Section 4 and Figure 12 of the paper.
+
+    Examples
+    --------
+    Coordinates of the unit sphere are modes of eigenvalue 2, so that the flow of heat for the time 0.1 shrinks it by
+    exp(-0.2), unless its area is kept:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> smaller = core.smooth_points(laplacian, core.exponential(0.1))
+    >>> print(np.linalg.norm(smaller, axis=1).mean().round(2))
+    0.82
+    >>> same = core.smooth_points(laplacian, core.exponential(0.1), keep="area")
+    >>> print(np.linalg.norm(same, axis=1).mean().round(2))
+    1.0
     """
     if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
@@ -136,18 +162,38 @@ def fair_points(
     Raises
     ------
     PointCloudError
-        A time, order, mask, strength or choice that makes no sense.
+        A time, order, mask, strength or choice that makes no sense, or a volume to keep of a surface that encloses
+        none.
     SolverError
         A scale is not found.
 
-    References
-    ----------
-    Desbrun, Meyer, Schroder, Barr. Implicit fairing of irregular meshes using diffusion and curvature flow. 1999.
+    See Also
+    --------
+    smooth_points : Filters by any response, or by modes.
+    fairing : The response.
 
     Notes
     -----
     The operator's spectrum is bounded by its wide kernel. A polynomial of it then inverts the equations in fewer
     products than conjugate gradients, whose steps grow with the power ``order / 2`` of the time, not with its root.
+
+    References
+    ----------
+    Desbrun, Meyer, Schroder, Barr. Implicit fairing of irregular meshes using diffusion and curvature flow. 1999.
+
+    Examples
+    --------
+    Radii that scatter by 0.02 scatter by a fifth of that afterwards:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
+    >>> smooth = core.fair_points(core.build_laplacian(noisy))
+    >>> print(np.linalg.norm(noisy, axis=1).std().round(3), np.linalg.norm(smooth, axis=1).std().round(3))
+    0.02 0.004
     """
     if time is None:
         known = laplacian.component >= 0
@@ -189,6 +235,25 @@ def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
         A mode that does not fit the points.
     PointCloudError
         A mode that is zero, or an amplitude or phase that is not finite.
+
+    See Also
+    --------
+    LaplaceBeltrami.eigenpairs : Computes modes.
+    nodal_domains : Where a mode keeps its sign.
+
+    Examples
+    --------
+    The height is a mode of the unit sphere. It moves both poles up by 0.2, one of them outwards and the other inwards:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> moved = core.displace_by_mode(laplacian, z, 0.2)
+    >>> print(moved[:, 2].min().round(1), moved[:, 2].max().round(1))
+    -0.8 1.2
     """
     points = laplacian.points
     mode = check_values(mode, len(points), columns=False)
@@ -217,6 +282,13 @@ def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     -------
     ndarray, (n, 3)
         The centre of each component or, with a fixed boundary, the harmonic surface that spans it [L].
+
+    Raises
+    ------
+    PointCloudError
+        A fixed boundary without points of its own.
+    SolverError
+        The solver did not converge.
     """
     points, component = laplacian.points, laplacian.component
     base = points.copy()
@@ -292,6 +364,11 @@ class PointBlend:
     laplacian, strength, mask, keep, dirichlet
         As in `smooth_points`, whose results without these are filtered places.
 
+    Attributes
+    ----------
+    mask, weights : ndarray, (n,)
+        Weight of each point, zero where it stays, and the same times the strength.
+
     Raises
     ------
     PointCloudError
@@ -327,7 +404,23 @@ class PointBlend:
             )
 
     def __call__(self, filtered):
-        """Return the result for filtered places, (n, 3)."""
+        """Return the result for filtered places.
+
+        Parameters
+        ----------
+        filtered : ndarray, (n, 3)
+            Where the filter at full strength puts the points [L].
+
+        Returns
+        -------
+        ndarray, (n, 3)
+            New places for ``laplacian.points`` [L].
+
+        Raises
+        ------
+        SolverError
+            A scale is not found.
+        """
         points = self.laplacian.points
         if self.keep is None or not self.weights.any():
             return points + self.weights[:, None] * (filtered - points)

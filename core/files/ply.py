@@ -1,5 +1,6 @@
 """PLY, the Stanford polygon format: the vertices and their properties, in text or binary."""
 
+import os
 from itertools import islice
 from typing import NamedTuple
 
@@ -8,20 +9,13 @@ import numpy as np
 from ..errors import InvalidPointsError
 from .table import PointTable, from_columns, to_columns
 
-_NAMES = {
-    "i1": "char",
-    "u1": "uchar",
-    "i2": "short",
-    "u2": "ushort",
-    "i4": "int",
-    "u4": "uint",
-    "f4": "float",
-    "f8": "double",
-}
+_CODES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
+_NAMES = dict(zip(_CODES, ("char", "uchar", "short", "ushort", "int", "uint", "float", "double"), strict=True))
 _TYPES = {name: code for code, name in _NAMES.items()}
 _TYPES |= {np.dtype(code).name: code for code in _NAMES}  # int8, ..., float64
 _ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
 _LONGEST = 1000  # characters of a line of the header, and lines
+_MOST_DIGITS = 15  # of a count
 
 
 class _Element(NamedTuple):
@@ -46,24 +40,16 @@ def read_ply(path) -> PointTable:
             raise InvalidPointsError(
                 f"{path} has no vertices, only {', '.join(names) or 'nothing'}. It holds no points."
             )
-        at = names.index("vertex")
-        for element in (elements[at], *elements[:at]):
-            if None in element.types and (element.count or element.name == "vertex"):
+        vertex = elements[names.index("vertex")]
+        before = [element for element in elements[: names.index("vertex")] if element.count]
+        for element in (vertex, *before):
+            if None in element.types:
                 raise InvalidPointsError(
                     f"{path} has lists in its element {element.name}, before or among its points. Save it again"
                     " with plain vertices first."
                 )
-        vertex = elements[at]
-        if order is None:
-            before = sum(element.count for element in elements[:at])
-            columns = _read_text(file, vertex, before, path)
-        else:
-            file.seek(sum(element.count * _record(element, order).itemsize for element in elements[:at]), 1)
-            rows = np.fromfile(file, _record(vertex, order), vertex.count)
-            if len(rows) < vertex.count:
-                raise _too_short(path, len(rows), vertex.count)
-            columns = [np.ascontiguousarray(rows[f"f{i}"]) for i in range(len(vertex.names))]
-            columns = [column.astype(column.dtype.newbyteorder("=")) for column in columns]
+        read = _read_text if order is None else _read_binary
+        columns = read(file, order, before, vertex, path)
     table = from_columns(dict(zip(vertex.names, columns, strict=True)), path)
     table.notices += [
         (f"{path.name}: left out {element.count} {element.name} elements. Only points are read.")
@@ -71,10 +57,6 @@ def read_ply(path) -> PointTable:
         if element is not vertex and element.count
     ]
     return table
-
-
-def _record(element, order):
-    return np.dtype([(f"f{index}", order + code) for index, code in enumerate(element.types)])
 
 
 def _read_header(file, path):
@@ -93,7 +75,7 @@ def _read_header(file, path):
                 order = _ORDERS[kind]
             case ["comment" | "obj_info", *_]:
                 pass
-            case ["element", name, count] if count.isdecimal():
+            case ["element", name, count] if count.isdecimal() and len(count) <= _MOST_DIGITS:
                 elements.append(_Element(name, int(count), [], []))
             case ["property", "list", length, item, name] if elements and length in _TYPES and item in _TYPES:
                 elements[-1].names.append(name)
@@ -108,16 +90,27 @@ def _read_header(file, path):
     raise InvalidPointsError(f"{path} has a header without an end. Export it again.")
 
 
-def _read_text(file, vertex, before, path):
-    rows = (line.decode("ascii", errors="replace") for line in file if line.strip())
-    for _ in islice(rows, before):
-        pass
-    lines = list(islice(rows, vertex.count))
+def _read_binary(file, order, before, vertex, path):
+    *skipped, record = (
+        np.dtype([(f"f{index}", order + code) for index, code in enumerate(element.types)])
+        for element in (*before, vertex)
+    )
+    begin = file.tell() + sum(element.count * kind.itemsize for element, kind in zip(before, skipped, strict=True))
+    found = max(os.fstat(file.fileno()).st_size - begin, 0) // max(record.itemsize, 1)
+    if found < vertex.count:  # before there is memory for so many
+        raise _too_short(path, found, vertex.count)
+    file.seek(begin)
+    rows = np.fromfile(file, record, vertex.count)
+    return [rows[f"f{index}"].astype(code) for index, code in enumerate(vertex.types)]
+
+
+def _read_text(file, order, before, vertex, path):
+    first, width = sum(element.count for element in before), len(vertex.names)
+    lines = list(islice(filter(bytes.strip, file), first, first + vertex.count))
     if len(lines) < vertex.count:
         raise _too_short(path, len(lines), vertex.count)
-    width = len(vertex.names)
     try:
-        values = np.loadtxt(lines, ndmin=2, comments=None) if lines else np.empty((0, width))
+        values = np.loadtxt(lines, ndmin=2, comments=None, encoding="ascii") if lines else np.empty((0, width))
     except ValueError:
         values = np.empty((0, 0))
     if values.shape != (vertex.count, width):
@@ -137,7 +130,7 @@ def _too_short(path, found, count):
 def _refuse_row(lines, width, path):
     """Say which of some lines does not hold so many numbers."""
     for number, line in enumerate(lines, start=1):
-        words = line.split()
+        words = line.decode("ascii", errors="replace").split()
         try:
             wrong = "" if len(words) == width else (f"{len(words)} numbers where the header names {width} properties")
             [float(word) for word in words]

@@ -52,7 +52,7 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
     points : array_like, (n, 3)
         Coordinates [L].
     normals, options, boundary, boundary_distance
-        See `build_laplacian`.
+        As in `build_laplacian`.
 
     Returns
     -------
@@ -63,6 +63,23 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
     ------
     PointCloudError
         The points have no sound areas; see `build_laplacian`.
+
+    See Also
+    --------
+    build_laplacian : The operator, whose ``areas`` these are.
+
+    Examples
+    --------
+    The area of the unit sphere is 4 pi:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> areas = core.estimate_areas(points)
+    >>> print(areas.shape, areas.sum().round(1))
+    (800,) 12.6
     """
     cloud = read_cloud(points, options, normals, boundary, boundary_distance)
     distance = arc_length(cloud) if options.curvature_correction else cloud.pairs.distance

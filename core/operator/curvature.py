@@ -55,6 +55,25 @@ def mean_curvature(laplacian):
     -------
     ndarray, (n,)
         Mean of the two principal curvatures [1 / L]; where the kernel reaches beyond a boundary, from local quadrics.
+
+    See Also
+    --------
+    LaplaceBeltrami.apply : What it is computed by.
+    estimate_normals : The normals alone.
+
+    Examples
+    --------
+    It is one everywhere on the unit sphere:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> curvature = core.mean_curvature(laplacian)
+    >>> print(curvature.min().round(2), curvature.max().round(2))
+    1.0 1.0
     """
     points = laplacian.surface_points
     centered = points - points.mean(axis=0)

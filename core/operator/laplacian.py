@@ -49,7 +49,7 @@ class LaplaceBeltrami:
     smoothing_lengths : ndarray, (n,)
         h of each point [L]; the kernel reaches 3 h.
     stiffness : csr_array, (n, n)
-        Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the natural one: no flow
+        Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the Neumann one: no flow
         across.
     neumann_images, dirichlet_images : csr_array, (n, n)
         Weights of the mirror images in the boundary that `stiffness` holds, and of those that `dirichlet` puts in their
@@ -116,6 +116,25 @@ class LaplaceBeltrami:
         ------
         InvalidPointsError
             Values of another length than the points.
+
+        See Also
+        --------
+        LaplaceBeltrami.eigenpairs : Functions that it only scales.
+        mean_curvature : What it makes of the coordinates.
+        solve_poisson : Its inverse.
+
+        Examples
+        --------
+        On the unit sphere the Laplacian of a coordinate is -2 times it:
+
+        >>> import numpy as np
+        >>> import core
+        >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+        >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+        >>> points = np.column_stack([ring.real, ring.imag, z])
+        >>> laplacian = core.build_laplacian(points)
+        >>> print(np.abs(laplacian.apply(z) + 2 * z).max().round(2))
+        0.0
         """
         values = np.asarray(values, dtype=np.float64)
         if values.ndim not in (1, 2) or len(values) != len(self.areas):
@@ -140,7 +159,7 @@ class LaplaceBeltrami:
         raw : bool
             Leave out the symbol correction of the eigenvalues.
         dirichlet : bool
-            Modes that vanish at the boundary, instead of those that meet it level.
+            Dirichlet modes, which vanish at the boundary, instead of Neumann modes, which meet it level.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -151,11 +170,31 @@ class LaplaceBeltrami:
         Raises
         ------
         TooFewPointsError
-            More modes than the points can have.
+            More modes than a third of the points, or a count below 1.
         UnresolvedModesError
-            Modes asked for that vary faster than the smoothing length resolves, unless `raw`.
+            Modes asked for that vary faster than the smoothing length resolves; never with `raw`.
         SolverError
             The eigenvalue solver did not converge.
+
+        See Also
+        --------
+        LaplaceBeltrami.corrected : The symbol correction alone.
+        spectral_filter : Filters functions by modes.
+        heat_kernel_signature : Tells points apart by modes.
+        segment : Finds parts by modes.
+
+        Examples
+        --------
+        On the unit sphere ``l (l + 1)`` is an eigenvalue 2 l + 1 times:
+
+        >>> import numpy as np
+        >>> import core
+        >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+        >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+        >>> points = np.column_stack([ring.real, ring.imag, z])
+        >>> laplacian = core.build_laplacian(points)
+        >>> print(laplacian.eigenpairs(9).eigenvalues.round(1))
+        [0. 2. 2. 2. 6. 6. 6. 6. 6.]
         """
         stiffness = self.dirichlet[0] if dirichlet else self.stiffness
         spectrum = solve_spectrum(self, stiffness, count, progress)
@@ -213,11 +252,36 @@ def build_laplacian(
     Raises
     ------
     PointCloudError
-        The input has no sound answer; the text says why and what to do.
+        The input has no sound answer; the text says why and what to do. Its children tell what it is: points, normals
+        or a boundary of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighbourhoods need
+        (`TooFewPointsError`), points along a curve (`NotASurfaceError`), components of too few points alone
+        (`ComponentError`), areas of eq. (7) that are not positive (`AreaError`).
+
+    See Also
+    --------
+    LaplacianOptions : All settings.
+    estimate_areas : Areas alone.
+    estimate_normals : Normals alone.
+    check_stability : Judges the operator.
 
     References
     ----------
     Petronetto, Paiva, Helou, Stewart, Nonato. Mesh-free discrete Laplace-Beltrami operator. 2013.
+
+    Examples
+    --------
+    The unit sphere has the area 4 pi and no boundary, and its modes after the constant one the eigenvalue 2:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> print(laplacian.areas.sum().round(1), laplacian.boundary.any(), laplacian.notices)
+    12.6 False []
+    >>> print(laplacian.eigenpairs(4).eigenvalues.round(1))
+    [0. 2. 2. 2.]
     """
     report = progress or (lambda stage, fraction: None)
     points = check_points(points)

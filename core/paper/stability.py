@@ -65,6 +65,25 @@ def check_stability(laplacian):
     Stability
         Of the points that take part. (A5) holds for the kernel by construction; (A6) concerns boundaries, not measured
         here.
+
+    See Also
+    --------
+    build_laplacian : Builds operators.
+    LaplacianOptions.paper : The setting of the paper.
+
+    Examples
+    --------
+    A closed surface in one piece, where only constants have no Laplacian:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> stability = core.check_stability(laplacian)
+    >>> print(stability.components, stability.row_sum < 1e-12, stability.concerns())
+    1 True []
     """
     known = np.flatnonzero(laplacian.component >= 0)
     distinct, first = np.unique(laplacian.points[known], axis=0, return_index=True)

@@ -8,6 +8,7 @@ from ...core import PointCloudError
 from ..objects.attributes import DISPLACEMENT, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.reading import find_object
 from ..running.job import Job, JobOperator, SteppedJob, all_steps
+from ..running.ready import reporting
 from ..running.stages import Stages
 from . import live
 from .binding import POSE, stale_reason
@@ -38,28 +39,23 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         self.first, self.last = context.scene.frame_start, context.scene.frame_end
         return context.window_manager.invoke_props_dialog(self)
 
+    @reporting
     def execute(self, context):
         obj, scene, attended = self.subject(context), context.scene, self.takes_window()
         if not self.first and not self.last:
             self.first, self.last = scene.frame_start, scene.frame_end
+        check_fresh(obj)
+        if self.last < self.first:
+            raise PointCloudError(f"The last frame, {self.last}, comes before the first one, {self.first}. Swap them.")
+        self._kept = _Kept(scene, obj)
+        if attended:
+            return self.start(context, [obj], self._prepared_frames, SteppedJob)
         try:
-            check_fresh(obj)
-            if self.last < self.first:
-                raise PointCloudError(
-                    f"The last frame, {self.last}, comes before the first one, {self.first}. Swap them."
-                )
-            self._kept = _Kept(scene, obj)
-            if attended:
-                return self.start(context, [obj], self._prepared_frames, SteppedJob)
-            try:
-                with Stages(context.window_manager, self.bl_label) as stages:
-                    frames = all_steps(self._frames(stages))
-            finally:
-                self.leave(context)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self.finish(context, [obj], frames, stages.seconds)
+            with Stages(context.window_manager, self.bl_label) as stages:
+                frames = all_steps(self._frames(stages))
+        finally:
+            self.leave(context)
+        return self.finish(context, [obj], frames)
 
     def _prepared_frames(self, progress):
         """Make the factors in a thread first, if there are none; see `_frames`."""
@@ -99,7 +95,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         """Go back to the frame and the handles that were shown."""
         self._kept.put_back()
 
-    def finish(self, context, objects, results, seconds):
+    def finish(self, context, objects, results):
         """Write what was baked."""
         (obj,) = objects
         mesh = bpy.data.meshes.new(f"{obj.name} Bake")
@@ -109,8 +105,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
         show_baked(find_deform(obj), cache, self.first, len(results))
         size = np.prod([len(results), *results[0].shape]) * 4 / 2**20
-        text = f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file"
-        self.report({"INFO"}, text)
+        self.report({"INFO"}, f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file")
         return {"FINISHED"}
 
 
@@ -186,7 +181,7 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
     def obstacle(cls, context):
         reason = super().obstacle(context)
         obj = cls.subject(context)
-        return reason or ("" if is_baked(obj) else (f'Nothing of "{obj.name}" is baked'))
+        return reason or ("" if is_baked(obj) else f'Nothing of "{obj.name}" is baked')
 
     def change(self, context, obj):
         delete_bake(obj)

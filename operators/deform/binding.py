@@ -4,7 +4,6 @@ The points at rest are the attribute `lb_rest`, their displacements `lb_displace
 empties move which groups is in `Object.meshfree.deform`.
 """
 
-import re
 import zlib
 from dataclasses import dataclass
 from uuid import uuid4
@@ -24,7 +23,7 @@ from ..objects.attributes import (
     write_attribute,
 )
 from ..objects.counting import members, summarize
-from ..objects.groups import ANCHOR, chosen_weights, has_group, is_chosen
+from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
 from ..objects.options import settings_values
 from ..objects.reading import TYPES, fingerprint, sharing_objects
 from .nodes import find_deform, is_baked
@@ -58,14 +57,6 @@ class Constraints:
     kept: np.ndarray
     strength: np.ndarray
     checksum: str
-
-
-def handle_names(obj) -> list:
-    """Names of the groups that are handles: the one that the settings name, and the same with a number."""
-    base = obj.meshfree.deform.handles
-    pattern = re.compile(re.escape(base) + r"(\.\d+)?")
-    groups = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
-    return sorted(group.name for group in groups if pattern.fullmatch(group.name) and has_group(obj, group.name))
 
 
 def read_constraints(obj) -> Constraints:
@@ -111,7 +102,7 @@ def _groups_now(obj, glance, trusting):
     return _groups_checksum(names, found), np.concatenate(edited) if edited else np.empty(0, int)
 
 
-def forget_bound(settings=None, context=None):
+def forget_bound():
     """Look for the bound objects again when they are needed."""
     global _bound
     _bound = b"", ()

@@ -16,12 +16,11 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core import Cancelled, Deformer, PointCloudError
+from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import laplacian_options
 from ..objects.reading import boundary_points
 from ..running import cache
-from ..running.handlers import add_handlers, remove_handlers
 from ..running.job import STOPPED, Job, running
-from ..running.stages import redraw_panels
 from . import binding
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
@@ -245,9 +244,8 @@ def _guarded():
             _owner = None
 
 
-def settings_changed(settings, context):
+def _on_settings(obj):
     """Let an object follow by its new settings of the deformation, in a window; scripts update when they are done."""
-    obj = settings.id_data
     if binding.is_bound(obj):
         settle_later(obj)
 
@@ -277,7 +275,7 @@ def _tick():
     with _guarded():
         waiting = [_attend(obj, depsgraph) for obj, depsgraph in shown.values()]
     if any(waiting):
-        redraw_panels(bpy.context.window_manager)
+        tell("panels_changed")
     return _TICK if any(waiting) else None
 
 
@@ -340,7 +338,7 @@ def _take(obj, job, key, pose):
         live, points, displacement = job.work.result()
     except Cancelled:
         if job.prepares and job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
-            _troubles[obj.session_uid] = ("Binding was stopped. Press Update, or move a handle"), pose
+            _troubles[obj.session_uid] = "Binding was stopped. Press Update, or move a handle", pose
         return
     if job.key == key:
         keep(obj, live)
@@ -396,6 +394,8 @@ _HANDLERS = {
     "redo_post": _on_undo,
     "render_init": _on_render,
     "load_pre": _forget,
+    "deform_changed": _on_settings,
+    "bound_changed": binding.forget_bound,
 }
 
 

@@ -7,14 +7,14 @@ from mathutils import Matrix, Vector
 
 from ...core import PointCloudError
 from ..objects.attributes import REST, own_positions, point_count, read_attribute, write_own_positions
-from ..objects.groups import HANDLE, assign, check_assignable, has_group
+from ..objects.groups import HANDLE, assign, check_assignable, handle_names, has_group
 from ..objects.modifiers import get_input
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
 from ..objects.result import length_text
 from ..running.application import ApplicationOperator
 from ..running.job import busy
-from ..running.ready import ReadyOperator
+from ..running.ready import ReadyOperator, reporting
 from ..tools.select import SelectionOperator, groups_changed, selected
 from . import live
 from .binding import (
@@ -23,7 +23,6 @@ from .binding import (
     copied_from,
     edited_rows,
     forget,
-    handle_names,
     handled_object,
     is_bound,
     is_there,
@@ -80,7 +79,6 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
     bl_idname = "meshfree.deform_bind"
     bl_label = "Bind"
     only_active = True
-    asks = False
     writes = WRITES
 
     def plan(self, context, obj):
@@ -124,10 +122,9 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         obj.data.pop(POSE, None)
         write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False)
         live.update(obj)
-        self.warn(made.deformer.notices)
         moved, stay = len(made.constraints.moved), len(made.constraints.kept)
-        way = (f'Move "{empties[0][0].name}"') if empties[0] else ("Move the handles in Edit Mode")
-        return f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"
+        way = f'Move "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
+        return [*made.deformer.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
 
 
 def _add_empty(context, obj, name, rest, rows):
@@ -164,24 +161,20 @@ class BoundOperator(HandledOperator):
     def obstacle(cls, context):
         return busy() or super().obstacle(context) or not_bound(cls.subject(context))
 
+    @reporting
     def execute(self, context):
         obj = self.subject(context)
-        try:
-            if not self.works_stale:
-                check_fresh(obj)
-                context.view_layer.update()
-                live.update(obj)  # all steps, should only the first one have been taken
-            message = self.change(context, obj)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, message)
+        if not self.works_stale:
+            check_fresh(obj)
+            context.view_layer.update()
+            live.update(obj)  # all steps, should only the first one have been taken
+        self.report({"INFO"}, self.change(context, obj))
         return {"FINISHED"}
 
 
 def not_bound(obj) -> str:
     """Say that an object is not bound, and what to do; empty if it is."""
-    return "" if is_bound(obj) else (f'"{obj.name}" is not bound. Bind it to its handles first')
+    return "" if is_bound(obj) else f'"{obj.name}" is not bound. Bind it to its handles first'
 
 
 def check_fresh(obj):
@@ -197,7 +190,6 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
     bl_idname = "meshfree.deform_update"
     bl_label = "Update"
     only_active = True
-    asks = False
     writes = WRITES
 
     @classmethod
@@ -213,10 +205,9 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
         pose, made, points, displacement = result
         live.keep(obj, made)
         live.write(obj, made, points, displacement, pose)
-        if not made.deformer.converged:
-            self.warn([("The turns of details were still changing. Raise Steps.")])
         distance = np.linalg.norm(points - made.deformer.points, axis=1)
-        return f"{obj.name}: moved at most by {length_text(distance.max())}"
+        notices = [] if made.deformer.converged else ["The turns of details were still changing. Raise Steps."]
+        return [*notices, f"{obj.name}: moved at most by {length_text(distance.max())}"]
 
 
 class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):

@@ -12,12 +12,22 @@ from ..objects import options
 from ..objects.attributes import point_count
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.result import analysis_names, check_writable, write_result
-from ..running.application import done
-from ..tools.analyze import WRITE_LIMIT, analyze_object
+from ..running.application import compute_all
+from ..running.stages import Stages
+from ..tools.analyze import WRITE_LIMIT, plan_analysis
+from ..tools.minimal import MinimalSurface
+from ..tools.segment import Segment, Signature
+from ..tools.smooth import ModeShape, Smooth
 from . import objects as files
 
-# Operators that need nothing picked, beside the analysis.
-VERBS = ("smooth", "mode_shape", "segment", "signature", "minimal_surface")
+# Tools that need nothing picked, beside the analysis, by the names of their operators.
+VERBS = {
+    "smooth": Smooth,
+    "mode_shape": ModeShape,
+    "segment": Segment,
+    "signature": Signature,
+    "minimal_surface": MinimalSurface,
+}
 _SETTINGS = (*options.ALL_NAMES, "make_single_user")  # of the object
 _handles = []
 
@@ -78,7 +88,7 @@ def _parse(argv):
     _add_files(analyze)
     parsers = {"analyze": analyze}
     for verb in VERBS:
-        operator = _operator(verb).get_rna_type()
+        operator = _kind(verb)
         parsers[verb] = commands.add_parser(
             verb.replace("_", "-"),
             help=operator.description.lower(),
@@ -104,14 +114,14 @@ def _parse(argv):
     return arguments
 
 
-def _operator(verb):
-    return getattr(bpy.ops.meshfree, verb)
+def _kind(verb):
+    return getattr(bpy.ops.meshfree, verb).get_rna_type()
 
 
 def _choices(verb):
     """Properties of an operator that make sense on the command line; points are moved in place there."""
     left_out = {"rna_type", "show", "target", "animate", "period"}
-    return [item for item in _operator(verb).get_rna_type().properties if item.identifier not in left_out]
+    return [item for item in _kind(verb).properties if item.identifier not in left_out]
 
 
 def _add_files(parser):
@@ -177,7 +187,7 @@ def _process(path, arguments) -> dict:
     obj, notices = files.load(path, arguments.object)
     reason = obstacle(obj)
     if reason:
-        raise PointCloudError(f"{reason}")
+        raise PointCloudError(reason)
     for name in _SETTINGS:
         value = getattr(arguments, name)
         if value is not None:
@@ -189,7 +199,8 @@ def _process(path, arguments) -> dict:
 
 def _analyze(obj, arguments, output):
     check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
-    analysis = analyze_object(bpy.context, obj, arguments.modes)
+    with Stages(bpy.context.window_manager, _kind("analyze").name) as stages:
+        analysis = plan_analysis(bpy.context, obj, arguments.modes)(stages)
     if sharing_objects(obj):  # by choice, or it would not be writable
         obj.data = obj.data.copy()
     write_result(obj, analysis, arguments.write_limit)
@@ -209,21 +220,20 @@ def _analyze(obj, arguments, output):
 
 
 def _apply(obj, arguments, output):
-    """Run the operator of a verb on the object."""
-    given = {item.identifier: getattr(arguments, item.identifier) for item in _choices(arguments.command)}
-    properties = {name: value for name, value in given.items() if value is not None}
-    operator = _operator(arguments.command)
-    for name, value in (("show", False), ("target", "IN_PLACE")):
-        if name in operator.get_rna_type().properties:
-            properties[name] = value
-    for other in bpy.context.view_layer.objects:
-        other.select_set(other == obj)
-    operator(**properties)
+    """Run the tool of a verb on the object."""
+    kind, tool = _kind(arguments.command), VERBS[arguments.command]()
+    values = {item.identifier: item.default for item in kind.properties if item.type != "POINTER"}
+    values |= {name: value for name, value in vars(arguments).items() if name in values and value is not None}
+    vars(tool).update(values, target="IN_PLACE")
+    plans = tool.plan_all(bpy.context, [obj])
+    with Stages(bpy.context.window_manager, kind.name) as stages:
+        results = compute_all(plans, stages)
+    ((*notices, line),) = tool.write_all(bpy.context, [obj], results)
     if output is not None:
         files.save(output, obj, files.attribute_arrays(obj))
     return {
         "points": point_count(obj.data),
-        "done": done.messages[-1],
-        "seconds": {name: round(seconds, 3) for name, seconds in done.seconds.items()},
-        "notices": done.notices,
+        "done": line,
+        "seconds": {name: round(seconds, 3) for name, seconds in stages.seconds.items()},
+        "notices": notices,
     }

@@ -14,7 +14,7 @@ from ..objects.reading import read_points
 from ..objects.result import EIGENVALUES
 from ..running import cache
 from ..running.job import JobOperator
-from ..running.stages import Stages
+from ..running.ready import reporting
 from .objects import analysis_arrays, file_filter, place_of, point_table, save_arrays
 
 
@@ -26,12 +26,6 @@ class ExportOperator(JobOperator, ExportHelper):
     """
 
     bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
-    suffix = ""  # of the name in the file browser
-
-    @property
-    def filename_ext(self):
-        """What `ExportHelper` adds to a name."""
-        return self.suffix
 
     def invoke(self, context, event):
         self._attended = True
@@ -41,24 +35,16 @@ class ExportOperator(JobOperator, ExportHelper):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    @reporting
     def execute(self, context):
-        attended = self.takes_window()
         path = Path(bpy.path.abspath(self.filepath))
-        try:
-            reason = self.obstacle(context)
-            if reason:  # since the file browser opened
-                raise PointCloudError(f"{reason}.")
-            write = self.plan(context, context.object)
-            if attended:
-                return self.start(context, [], lambda progress: write(path, progress))
-            with Stages(context.window_manager, self.bl_label) as stages:
-                result = write(path, stages)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self.finish(context, [], result, stages.seconds)
+        reason = self.obstacle(context)
+        if reason:  # since the file browser opened
+            raise PointCloudError(f"{reason}.")
+        write = self.plan(context, context.object)
+        return self.work(context, [], lambda progress: write(path, progress))
 
-    def finish(self, context, objects, results, seconds):
+    def finish(self, context, objects, results):
         """Tell what was written."""
         self.report({"INFO"}, results)
         return {"FINISHED"}
@@ -69,6 +55,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_points"
     bl_label = "Export Points"
+    asks = ("format", "attributes", "colors")
 
     filter_glob: file_filter(".ply", ".xyz", ".csv")
     format: EnumProperty(
@@ -99,12 +86,6 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
         """What `ExportHelper` adds to a name."""
         return f".{self.format.lower()}"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        for name in ("format", "attributes", "colors"):
-            layout.prop(self, name)
-
     def plan(self, context, obj):
         table, name = point_table(context, obj, self.attributes, self.colors), obj.name
 
@@ -121,7 +102,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_operator"
     bl_label = "Export Laplacian"
-    suffix = ".npz"
+    filename_ext = ".npz"
 
     filter_glob: file_filter(".npz")
 
@@ -144,7 +125,7 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.export_eigenvalues"
     bl_label = "Export Eigenvalues"
-    suffix = ".csv"
+    filename_ext = ".csv"
 
     filter_glob: file_filter(".csv")
 

@@ -12,7 +12,7 @@ from ...core import PointCloudError
 from ...core.files import READABLE, read_points
 from ..running import cache
 from ..running.job import JobOperator
-from ..running.stages import Stages
+from ..running.ready import reporting
 from .objects import OFFSET, add_object, file_filter, known_offset, offset_of
 
 LASER = (".las", ".laz")  # listed, so that the error can say what to do with them
@@ -33,6 +33,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
+    asks = ("up", "kind", "attributes", "frame")
 
     filepath: StringProperty(
         name="File Path",
@@ -85,35 +86,19 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         self._attended = True
         return self.invoke_popup(context)
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        for name in ("up", "kind", "attributes", "frame"):
-            layout.prop(self, name)
-
+    @reporting
     def execute(self, context):
-        attended = self.takes_window()
-        self._framed = False
+        self._framed = self._attended and self.frame
         names = [item.name for item in self.files if item.name]
         folder = Path(bpy.path.abspath(self.directory))
         self._paths = paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
-        try:
-            if attended:
-                self._framed = self.frame
-                return self.start(context, [], lambda progress: _read_all(paths, progress))
-            with Stages(context.window_manager, self.bl_label) as stages:
-                tables = _read_all(paths, stages)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self.finish(context, [], tables, stages.seconds)
+        return self.work(context, [], lambda progress: _read_all(paths, progress))
 
-    def finish(self, context, objects, results, seconds):
+    def finish(self, context, objects, results):
         """Add an object for each table."""
         reason = self.obstacle(context)
         if reason:  # while the files were read
-            self.report({"ERROR"}, reason)
-            return {"CANCELLED"}
+            raise PointCloudError(reason)
         for other in context.selected_objects:
             other.select_set(False)
         shared = known_offset(context.scene)
@@ -138,15 +123,10 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         for notice in table.notices:
             self.report({"WARNING"}, notice)
         offset = offset_of(obj)
-        if offset.any():
-            shift = ", ".join(f"{-value:.10g}" for value in offset)
-            text = f"{obj.name}: {len(table.points):,} points, shifted by ({shift})"
-        else:
-            text = f"{obj.name}: {len(table.points):,} points"
-        self.report({"INFO"}, text)
+        shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
+        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
         if shared is not None and (offset != shared).any():
-            text = f"{obj.name} is too far from the points imported before to share their shift"
-            self.report({"WARNING"}, text)
+            self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
 
 
 def _frame_selected(context):

@@ -18,6 +18,7 @@ from ..objects.attributes import (
     type_of,
     write_attribute,
 )
+from ..objects.handlers import tell
 from ..objects.reading import TYPES, seen_positions
 
 OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
@@ -213,11 +214,8 @@ def _choose_object(path, name):
         chosen = meshes
     if len(chosen) != 1:
         names = ", ".join(obj.name for obj in meshes)
-        raise PointCloudError(
-            (f'{path} has no mesh object "{name}". Name one of its mesh objects with --object: {names}.')
-            if name
-            else (f"{path} has no active mesh object. Name one of its mesh objects with --object: {names}.")
-        )
+        what = f'mesh object "{name}"' if name else "active mesh object"
+        raise PointCloudError(f"{path} has no {what}. Name one of its mesh objects with --object: {names}.")
     bpy.context.view_layer.objects.active = chosen[0]
     return chosen[0]
 
@@ -235,7 +233,7 @@ def save(path, obj, arrays):
             other.select_set(other == obj)
         names = [name for name in (*APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
         if names:
-            bpy.ops.meshfree.colormap(attribute=names[0])
+            tell("result_written", obj, names[0])
         path.parent.mkdir(parents=True, exist_ok=True)
         bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))
 

@@ -1,5 +1,7 @@
 """What one can choose about colours, for the settings of objects and for the operator that shows them."""
 
+from functools import partial
+
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 _COLOR_MAPS = (
@@ -27,34 +29,31 @@ _RANGE_MODES = (
     ("LOCKED", "Locked", "The values below, whatever is shown"),
 )
 _CHOICES = {
-    "color_map": (
+    "color_map": partial(
         EnumProperty,
-        {"name": "Color Map", "description": "Colors from low to high values", "items": _COLOR_MAPS, "default": "AUTO"},
+        name="Color Map",
+        description="Colors from low to high values",
+        items=_COLOR_MAPS,
+        default="AUTO",
     ),
-    "reverse": (
-        BoolProperty,
-        {"name": "Reverse", "description": "Turn the colors round, from high to low values", "default": False},
+    "reverse": partial(
+        BoolProperty, name="Reverse", description="Turn the colors round, from high to low values", default=False
     ),
-    "range_mode": (
+    "range_mode": partial(
         EnumProperty,
-        {
-            "name": "Range",
-            "description": "Which values the colors stretch over",
-            "items": _RANGE_MODES,
-            "default": "AUTO",
-        },
+        name="Range",
+        description="Which values the colors stretch over",
+        items=_RANGE_MODES,
+        default="AUTO",
     ),
-    "coverage": (
+    "coverage": partial(
         FloatProperty,
-        {
-            "name": "Coverage",
-            "description": "Share of the values inside the color range, so that a few outliers do not wash the rest"
-            " out",
-            "default": 98.0,
-            "min": 50.0,
-            "max": 100.0,
-            "subtype": "PERCENTAGE",
-        },
+        name="Coverage",
+        description="Share of the values inside the color range, so that a few outliers do not wash the rest out",
+        default=98.0,
+        min=50.0,
+        max=100.0,
+        subtype="PERCENTAGE",
     ),
 }
 COLOR_CHOICES = tuple(_CHOICES)
@@ -62,5 +61,4 @@ COLOR_CHOICES = tuple(_CHOICES)
 
 def color_choice(name: str, **more):
     """Return the property of a choice, to annotate a class with; more of its arguments may be given."""
-    kind, arguments = _CHOICES[name]
-    return kind(**arguments, **more)
+    return _CHOICES[name](**more)

@@ -13,10 +13,9 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ..running.handlers import add_handlers, remove_handlers
-from ..running.stages import redraw_panels
 from .attributes import point_count
 from .groups import group_weights, has_group
+from .handlers import add_handlers, remove_handlers, tell
 
 _AT_ONCE = 5_000  # points of which all groups are read when a panel is drawn
 _PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
@@ -120,6 +119,7 @@ def renew_counts(obj):
     _passes.pop(obj.session_uid, None)
     if obj.session_uid in _known:
         _known[obj.session_uid].until.clear()
+    tell("panels_changed")
 
 
 def _recall(obj):
@@ -142,7 +142,7 @@ def _tick():
             _wanted.pop(uid), _passes.pop(uid, None)
     for uid, obj in objects.items():
         if uid in _wanted and _go_on(obj):
-            redraw_panels(bpy.context.window_manager)
+            tell("panels_changed")
     return _PAUSE if _wanted else None
 
 

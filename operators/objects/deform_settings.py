@@ -11,9 +11,16 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..deform import live
-from ..deform.binding import forget_bound
 from .groups import ANCHOR, HANDLE
+from .handlers import tell
+
+
+def _follow(settings, context):
+    tell("deform_changed", settings.id_data)
+
+
+def _find_bound(settings, context):
+    tell("bound_changed")
 
 
 class MESHFREE_PG_handle(bpy.types.PropertyGroup):
@@ -47,15 +54,15 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
     )
     rotation_aware: BoolProperty(
         name="Turn Details",
-        description="Let details turn with the surface, as shape_operator asks for",
+        description="Let details turn with the surface, as bending asks for",
         default=True,
-        update=live.settings_changed,
+        update=_follow,
     )
     soft: BoolProperty(
         name="Soft",
         description="Let handles and anchors give way to a smoother surface",
         default=False,
-        update=live.settings_changed,
+        update=_follow,
     )
     weight: FloatProperty(
         name="Weight",
@@ -64,7 +71,7 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
         default=1.0,
         min=0.0,
         soft_max=100.0,
-        update=live.settings_changed,
+        update=_follow,
     )
     steps: IntProperty(
         name="Steps",
@@ -72,11 +79,11 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
         default=30,
         min=1,
         soft_max=100,
-        update=live.settings_changed,
+        update=_follow,
     )
 
     # What the object is bound with.
-    is_bound: BoolProperty(name="Bound", description="The object follows its handles", update=forget_bound)
+    is_bound: BoolProperty(name="Bound", description="The object follows its handles", update=_find_bound)
     handle_items: CollectionProperty(
         type=MESHFREE_PG_handle, name="Handles", description="What moves the groups of handles"
     )

@@ -1,5 +1,7 @@
 """Groups of points: vertex groups of meshes; on point clouds, which have none, attributes of truth or weight."""
 
+import re
+
 import numpy as np
 
 from ...core import PointCloudError
@@ -13,12 +15,13 @@ HANDLE, ANCHOR, FIXED, SOURCE, VALUE, BOUNDARY_GROUP = ROLES = (
     "Value",
     "Boundary",
 )
+_FORMER = {BOUNDARY_GROUP: "Rim"}  # what version 0.1.0 called them
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
 
 
 def group_kind(obj) -> str:
     """What the groups of an object are called in Blender."""
-    return ("vertex group") if obj.type == "MESH" else "attribute"
+    return "vertex group" if obj.type == "MESH" else "attribute"
 
 
 def has_group(obj, name: str) -> bool:
@@ -29,14 +32,18 @@ def has_group(obj, name: str) -> bool:
     return attribute is not None and attribute.data_type in _WEIGHTS and attribute.domain == "POINT"
 
 
-def search_group(layout, settings, name: str, obj):
-    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned."""
-    group = getattr(settings, name)
-    owner, groups = (obj, "vertex_groups") if obj.type == "MESH" else (obj.data, "attributes")
-    awaited = group in ROLES and not has_group(obj, group)
-    layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
-    if awaited:
-        layout.label(text=("No points assigned yet"), icon="INFO")
+def role_group(obj, role: str) -> str:
+    """Name of an object's group for a role: that of the role, or its former one if the object has only that."""
+    former = _FORMER.get(role, role)
+    return former if has_group(obj, former) and not has_group(obj, role) else role
+
+
+def handle_names(obj) -> list:
+    """Names of the groups that are handles: the one that the settings name, and the same with a number."""
+    base = obj.meshfree.deform.handles
+    pattern = re.compile(re.escape(base) + r"(\.\d+)?")
+    groups = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
+    return sorted(group.name for group in groups if pattern.fullmatch(group.name) and has_group(obj, group.name))
 
 
 def group_weights(obj, name: str, outside=0.0):
@@ -113,7 +120,7 @@ def check_assignable(obj, name: str, must_exist: bool):
     if must_exist and not exists:
         raise PointCloudError(f'"{obj.name}" has no {kind} named "{name}" to remove points from. Choose another.')
     if name in obj.data.attributes and not (exists and obj.type != "MESH"):
-        reason = ("vertex groups share their names") if obj.type == "MESH" else ("it holds no weights")
+        reason = "vertex groups share their names" if obj.type == "MESH" else "it holds no weights"
         raise PointCloudError(
             f'"{obj.name}" has an attribute named "{name}", and {reason}. Choose another name, or rename the attribute.'
         )

@@ -84,7 +84,7 @@ def set_input(modifier, name: str, value):
 
 
 def input_property(modifier, name: str):
-    """Return data and property path of an input of a modifier of ours, as `layout.prop` takes them.
+    """Return data and property path of an input of a modifier of ours, as panels draw them.
 
     Raises
     ------

@@ -122,7 +122,7 @@ def seen_positions(context, obj):
 def boundary_points(obj):
     """Read which points the boundary group of an object holds, (n,) bool; None if the settings name no group."""
     name = obj.meshfree.boundary_group
-    return chosen_members(obj, name, ("Boundary Group"), FEWEST) if name else None
+    return chosen_members(obj, name, "Boundary Group", FEWEST) if name else None
 
 
 def key_positions(key):

@@ -12,35 +12,33 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...ui import show
-from ..running.stages import redraw_views
 from . import deform_settings
 from .color_choices import color_choice
+from .earlier import FormerSettings
+from .handlers import tell
 from .options import DEFAULTS
 
 
 def _recolor(settings, context):
-    show.recolor(settings.id_data)
+    tell("colors_changed", settings.id_data)
 
 
 def _recolor_locked(settings, context):
     """Follow bounds that somebody sets; in other modes they only tell what the range came to."""
     if settings.range_mode == "LOCKED":
-        show.recolor(settings.id_data)
+        tell("colors_changed", settings.id_data)
 
 
 def _resize(settings, context):
-    show.resize(settings.id_data)
+    tell("size_changed", settings.id_data)
 
 
 def _show_groups(settings, context):
-    show.show_groups(settings.id_data)
-    if settings.show_groups:
-        show.use_material_preview(context)
+    tell("groups_changed", settings.id_data)
 
 
 def _redraw(settings, context):
-    redraw_views(context.window_manager)
+    tell("views_changed")
 
 
 class MESHFREE_PG_stage(bpy.types.PropertyGroup):
@@ -49,7 +47,7 @@ class MESHFREE_PG_stage(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Seconds", description="Time that this stage took, in seconds", min=0.0)
 
 
-class MESHFREE_PG_settings(bpy.types.PropertyGroup):
+class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     """Settings and results of the Mesh-Free Laplacian for one object"""
 
     # What results depend on. Names and defaults are those of core's options.
@@ -57,7 +55,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         name="Bandwidth",
         description="How far the kernel of each point reaches",
         items=(
-            ("ADAPTIVE", "Adaptive", "As far as uneven spacing demands and bends permit, point by point"),
+            ("ADAPTIVE", "Adaptive", "As far as uneven spacing demands and curvature permits, point by point"),
             ("LOCAL", "Local", "Follows the spacing of the points alone"),
             ("GLOBAL", "Global", "The same for all points, as in the paper: for even samples"),
         ),
@@ -262,7 +260,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     # Results of the last analysis, for the panel and for scripts.
     total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
     point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
-    component_count: IntProperty(name="Components", description="How many parts the surface falls into", min=0)
+    component_count: IntProperty(name="Components", description="How many components the surface falls into", min=0)
     boundary_count: IntProperty(
         name="Boundary Points", description="How many points lie at a boundary of the surface", min=0
     )

@@ -1,112 +1,92 @@
-"""What the operators that apply the Laplacian have in common: read all objects, compute, and only then write."""
+"""Tools that apply the Laplacian, and what their operators have in common: read all, compute, and only then write."""
 
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 
-import bpy
 from bpy.props import BoolProperty
 
 from ...core import PointCloudError
+from ..objects.handlers import tell
 from ..objects.options import laplacian_options
 from ..objects.reading import TYPES, obstacle, read_points, sharing_objects
 from ..objects.result import check_writable
 from . import cache
 from .job import JobOperator
-from .stages import Stages
+from .ready import reporting
 
 
-@dataclass
-class Done:
-    """What the last of these operators did, for the command line."""
+class Tool:
+    """What is done to objects by some settings: those of an operator, or attributes that the command line gives it.
 
-    messages: list = field(default_factory=list)
-    notices: list = field(default_factory=list)
-    seconds: dict = field(default_factory=dict)
-
-
-done = Done()
-
-
-class ApplicationOperator(JobOperator):
-    """An operator on the active object and on all other selected ones that can be read and written.
-
-    Of objects that share a mesh and its scale one is enough. A subclass says what to do by two methods: `plan` reads
-    everything that is needed of an object and returns a function of a progress callback that computes, without touching
-    Blender; `write` puts what that returns on the object and returns a line for the status bar.
+    A subclass says what to do by two methods: `plan` reads everything that is needed of an object and returns a
+    function of a progress callback that computes, without touching Blender; `write` puts what that returns on the
+    object and returns texts: notices, and last a line for the status bar.
     """
 
-    only_active = False  # for what has one object by nature
-    asks = True  # whether a dialog comes before the work
+    asks = ()  # names of the settings that a dialog asks for before the work; without any there is none
+    adjustable = ()  # names of those that Adjust Last Operation, which waits, offers: they compute nothing long again
     writes = ()  # names of the attributes that `write` makes
-    adjustable = ()  # names of the settings that change a result without computing anything again that takes time
 
-    def invoke(self, context, event):
-        self._attended = True
-        return context.window_manager.invoke_props_dialog(self) if self.asks else self.execute(context)
-
-    def execute(self, context):
-        """Do all at once for scripts; beside the window for somebody there."""
-        attended = self.takes_window()
-        context.view_layer.update()  # a script may have moved or scaled an object a line ago
-        objects, left_out = [self.subject(context)], []
-        if not self.only_active:
-            objects, left_out = chosen_objects(context, self.becomes_single)
+    def plan_all(self, context, objects, among=()):
+        """Return name and plan of each object, if it can be written to; for `among` see `check_writable`."""
         plans = []
-        try:
-            for obj in objects:
-                with naming(obj.name):
-                    check_writable(obj, self.writes, self.becomes_single(obj), among=context.selected_objects)
-                    plans.append((obj.name, self.plan(context, obj)))
-            self._left_out = left_out
-            if attended:
-                return self.start(context, objects, lambda progress: compute_all(plans, progress))
-            with Stages(context.window_manager, self.bl_label) as stages:
-                results = compute_all(plans, stages)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self.finish(context, objects, results, stages.seconds)
+        for obj in objects:
+            with naming(obj.name):
+                check_writable(obj, self.writes, self.becomes_single(obj), among)
+                plans.append((obj.name, self.plan(context, obj)))
+        return plans
 
-    def finish(self, context, objects, results, seconds):
-        """Write what was computed."""
-        done.messages, done.notices, done.seconds = [], [], seconds
-        self.warn([(f"Left out: {reason}.") for reason in self._left_out])
+    def write_all(self, context, objects, results) -> list:
+        """Write what was computed, and return the texts of each object."""
         for obj in objects:  # before anything is written to a mesh that is copied
             if self.becomes_single(obj) and sharing_objects(obj):
                 obj.data = obj.data.copy()
-        for obj, result in zip(objects, results, strict=True):
-            done.messages.append(self.write(context, obj, result))
-            self.report({"INFO"}, done.messages[-1])
-        self.conclude(context, objects)
-        return {"FINISHED"}
+        return [self.write(context, obj, result) for obj, result in zip(objects, results, strict=True)]
 
     def becomes_single(self, obj) -> bool:
         """Whether an object that shares its mesh gets its own."""
         return obj.meshfree.make_single_user
 
+    def is_repeated(self, context) -> bool:
+        """Whether this has run before, and is run again by Adjust Last Operation."""
+        return False
+
+
+class ApplicationOperator(Tool, JobOperator):
+    """An operator on the active object and on all other selected ones that can be read and written.
+
+    Of objects that share a mesh and its scale one is enough.
+    """
+
+    only_active = False  # for what has one object by nature
+
+    def invoke(self, context, event):
+        self._attended = True
+        return context.window_manager.invoke_props_dialog(self) if self.asks else self.execute(context)
+
+    @reporting
+    def execute(self, context):
+        context.view_layer.update()  # a script may have moved or scaled an object a line ago
+        objects, self._left_out = [self.subject(context)], []
+        if not self.only_active:
+            objects, self._left_out = chosen_objects(context, self.becomes_single)
+        plans = self.plan_all(context, objects, among=context.selected_objects)
+        return self.work(context, objects, lambda progress: compute_all(plans, progress))
+
+    def finish(self, context, objects, results):
+        """Write what was computed, and report it."""
+        for reason in self._left_out:
+            self.report({"WARNING"}, f"Left out: {reason}.")
+        for *notices, line in self.write_all(context, objects, results):
+            for notice in notices:
+                self.report({"WARNING"}, notice)
+            self.report({"INFO"}, line)
+        self.conclude(context, objects)
+        return {"FINISHED"}
+
     def conclude(self, context, objects):
         """Do what is left when all objects are written."""
 
-    def warn(self, notices):
-        """Report notices of core."""
-        for notice in notices:
-            self.report({"WARNING"}, notice)
-        done.notices += notices
-
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        if not self.is_repeated(context):
-            self.draw_settings(context, layout)
-            return
-        for name in self.adjustable:
-            layout.prop(self, name)
-
-    def draw_settings(self, context, layout):
-        """Draw what the dialog asks for; in Adjust Last Operation, which waits, `adjustable` alone is drawn."""
-
-    def is_repeated(self, context) -> bool:
-        """Whether this has run before, and is run again by Adjust Last Operation."""
+    def is_repeated(self, context):
         return any(last.as_pointer() == self.as_pointer() for last in context.window_manager.operators)
 
 
@@ -125,8 +105,7 @@ class ShownOperator(ApplicationOperator):
         sharing = [other for obj in objects for other in sharing_objects(obj) if other in context.selected_objects]
         if self.show:
             for obj in [*objects, *sharing]:
-                with context.temp_override(object=obj):
-                    bpy.ops.meshfree.colormap(attribute=self.shown if self.shown in obj.data.attributes else "")
+                tell("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
 
 
 def compute_all(plans, progress):

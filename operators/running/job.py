@@ -7,12 +7,12 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core import Cancelled, PointCloudError
+from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import settings_values
 from ..objects.reading import find_object, fingerprint, metric, obstacle, read_points
 from ..objects.result import same_lengths
-from .handlers import add_handlers, remove_handlers
-from .ready import ReadyOperator
-from .stages import StageTimes, redraw_panels
+from .ready import ReadyOperator, reporting
+from .stages import Stages, StageTimes
 
 STOPPED = "Stopped: nothing was changed"  # by somebody
 _FIRST = 0.01  # seconds to the first look, which comes after the first drawing
@@ -31,7 +31,7 @@ def busy() -> str:
     job = running()
     if job is None:
         return ""
-    return f"{job.title} is running. Wait for it, or press Esc to stop it"
+    return f"{job.label} is running. Wait for it, or press Esc to stop it"
 
 
 class Snapshot:
@@ -58,7 +58,7 @@ class Snapshot:
             raise PointCloudError(f'"{self.name}" was deleted meanwhile')
         reason = obstacle(obj, modes)
         if reason:
-            raise PointCloudError(f"{reason}")
+            raise PointCloudError(reason)
         if _state(context, obj) != self._state or not same_lengths(self._metric, metric(obj)):
             raise PointCloudError(f'points, scale or settings of "{obj.name}" were changed meanwhile. Start it again')
         return obj
@@ -123,11 +123,6 @@ class Job(StageTimes):
         """Whether there is a result or an error, or it was stopped."""
         return bool(self.reason) or self._future.done()
 
-    @property
-    def title(self):
-        """The label in the language of the interface."""
-        return self.label
-
     def go_on(self, context):
         """Let the work begin, if it has not yet: once Blender has drawn that it does, from which it would take time."""
         if self._thread.ident is None:
@@ -159,11 +154,11 @@ class Job(StageTimes):
                 if all(operator.bl_idname != _ESCAPE for operator in window.modal_operators):
                     with bpy.context.temp_override(window=window):
                         bpy.ops.meshfree.escape("INVOKE_DEFAULT")
-        text = f"{self.title}: {self.stage}, {self.fraction:.0%}    Esc to stop"
+        text = f"{self.label}: {self.stage}, {self.fraction:.0%}    Esc to stop"
         if text != self._shown:
             self._shown = text
             _set_status([window.workspace for window in windows], text)
-            redraw_panels(context.window_manager)
+            tell("panels_changed")
 
     def open(self, context):
         """Begin to show it; one that has not begun is looked at again and again in the window that it belongs to."""
@@ -182,7 +177,7 @@ class Job(StageTimes):
         if not bpy.app.background:
             # Later: a window that is being closed must not find another context than it had.
             bpy.app.timers.register(_clear_status, persistent=True)
-        redraw_panels(context.window_manager)
+        tell("panels_changed")
 
 
 class SteppedJob(Job):
@@ -240,6 +235,7 @@ class JobOperator(ReadyOperator):
     """
 
     _job = None
+    _attended = False  # somebody at the window waits for it
 
     @classmethod
     def poll(cls, context):
@@ -247,6 +243,19 @@ class JobOperator(ReadyOperator):
             cls.poll_message_set(busy())
             return False
         return super().poll(context)
+
+    def takes_window(self):
+        """Tell whether to work beside the window, once for each time that somebody started it there."""
+        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
+        return attended and not bpy.app.background
+
+    def work(self, context, objects, compute):
+        """Compute for some objects beside the window, or at once for scripts, and let `finish` use the results."""
+        if self.takes_window():
+            return self.start(context, objects, compute)
+        with Stages(context.window_manager, self.bl_label) as stages:
+            results = compute(stages)
+        return self.finish(context, objects, results)
 
     def start(self, context, objects, compute, kind=Job):
         """Begin to work for some objects."""
@@ -283,6 +292,7 @@ class JobOperator(ReadyOperator):
     def leave(self, context):
         """Put back what the work itself has changed in Blender: nothing."""
 
+    @reporting
     def complete(self, context, job):
         """Find the objects again, and let `finish` use what was computed for them, if they are as they were."""
         try:
@@ -290,16 +300,12 @@ class JobOperator(ReadyOperator):
         except Cancelled:
             self.report({"INFO"}, job.reason)
             return {"CANCELLED"}
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            text = f"{job.title} wrote nothing: {change}"
-            self.report({"WARNING"}, text)
+            self.report({"WARNING"}, f"{job.label} wrote nothing: {change}")
             return {"CANCELLED"}
-        return self.finish(context, objects, results, job.seconds)
+        return self.finish(context, objects, results)
 
 
 class MESHFREE_OT_stop(bpy.types.Operator):

@@ -1,8 +1,23 @@
 """What all operators have in common: they run on objects that can be read and written, and can be undone."""
 
-import bpy
+from functools import wraps
 
+from ...core import PointCloudError
 from ..objects.reading import obstacle
+
+
+def reporting(method):
+    """Let an operator report what a method of it, such as `execute`, refuses."""
+
+    @wraps(method)
+    def guarded(self, context, *more):
+        try:
+            return method(self, context, *more)
+        except PointCloudError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    return guarded
 
 
 class ReadyOperator:
@@ -10,7 +25,6 @@ class ReadyOperator:
 
     bl_options = {"REGISTER", "UNDO"}
     works_in = ("OBJECT",)  # modes of the object
-    _attended = False  # somebody at the window waits for it
 
     @classmethod
     def subject(cls, context):
@@ -28,8 +42,3 @@ class ReadyOperator:
         if reason:
             cls.poll_message_set(reason)
         return not reason
-
-    def takes_window(self):
-        """Tell whether to work beside the window, once for each time that somebody started it there."""
-        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
-        return attended and not bpy.app.background

@@ -78,20 +78,3 @@ class Stages(StageTimes):
             print(f"{self._label}: {stage}, {fraction:.0%}", file=sys.stderr, flush=True)
         super().__call__(stage, fraction)
         self._window_manager.progress_update(100 * fraction)
-
-
-def redraw_views(window_manager):
-    """Draw all 3D views again, for what is drawn over them."""
-    for area in _views(window_manager):
-        area.tag_redraw()
-
-
-def redraw_panels(window_manager):
-    """Draw the sidebars of all 3D views again, for what they tell of work that goes on."""
-    for area in _views(window_manager):
-        next(region for region in area.regions if region.type == "UI").tag_redraw()
-
-
-def _views(window_manager):
-    areas = (area for window in window_manager.windows for area in window.screen.areas)
-    return (area for area in areas if area.type == "VIEW_3D")

@@ -13,7 +13,7 @@ from ..objects.reading import read_points
 from ..objects.result import analysis_names, area_text, write_result
 from ..running import cache
 from ..running.application import ShownOperator
-from ..running.stages import Stages, StageTimes
+from ..running.stages import StageTimes
 
 WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each takes 4 bytes per point in the file
 
@@ -62,12 +62,6 @@ def plan_analysis(context, obj, modes: int = 0):
     return compute
 
 
-def analyze_object(context, obj, modes: int = 0) -> Analysis:
-    """Compute all that an analysis gives, with the lowest modes if any are asked for; write nothing."""
-    with Stages(context.window_manager, "Analyze Points") as stages:
-        return plan_analysis(context, obj, modes)(stages)
-
-
 def resolved_modes(laplacian, modes, progress):
     """Compute the modes asked for, or as many of them as the points resolve and a notice of that."""
     try:
@@ -82,7 +76,6 @@ def resolved_modes(laplacian, modes, progress):
 class AnalysisOperator(ShownOperator):
     """What the operators that analyze objects have in common; `wanted` is how many modes one computes."""
 
-    asks = False
     adjustable = ("write_limit", "show")
 
     write_limit: IntProperty(
@@ -112,10 +105,10 @@ class AnalysisOperator(ShownOperator):
 
     def write(self, context, obj, result):
         write_result(obj, result, self.write_limit)
-        self.warn(result.notices)
         modes = "" if result.spectrum is None else f", {len(result.spectrum.eigenvalues)} modes"
         points, seconds = point_count(obj.data), sum(result.seconds.values())
-        return f"{obj.name}: {area_text(result.total_area)} from {points:,} points{modes}, {seconds:.1f} s"
+        line = f"{obj.name}: {area_text(result.total_area)} from {points:,} points{modes}, {seconds:.1f} s"
+        return [*result.notices, line]
 
 
 class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):

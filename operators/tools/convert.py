@@ -7,14 +7,13 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core import PointCloudError
-from ..deform.binding import handle_names, is_bound
 from ..objects.attributes import SELECTION, point_count, write_attribute
 from ..objects.counting import renew_counts
-from ..objects.groups import ROLES, group_weights, has_group
+from ..objects.groups import ROLES, group_weights, handle_names, has_group, role_group
 from ..objects.modifiers import get_input, is_display, set_input
 from ..objects.result import check_writable
 from ..running.application import chosen_objects
-from ..running.ready import ReadyOperator
+from ..running.ready import ReadyOperator, reporting
 from .select import selection
 
 _SEGMENT = re.compile(r"Segment \d+")
@@ -40,23 +39,17 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
     @classmethod
     def obstacle(cls, context):
         old = bpy.app.version < cls.since
-        return super().obstacle(context) or (("Meshes become point clouds from Blender 4.5 on") if old else "")
+        return super().obstacle(context) or ("Meshes become point clouds from Blender 4.5 on" if old else "")
 
+    @reporting
     def execute(self, context):
         objects = chosen_objects(context, lambda obj: obj.meshfree.make_single_user)[0]
         objects = [obj for obj in objects if obj.type != self.target]
-        try:
-            if not objects:
-                raise PointCloudError(
-                    (f'"{context.object.name}" is a point cloud already.')
-                    if self.target == "POINTCLOUD"
-                    else (f'"{context.object.name}" is a mesh already.')
-                )
-            for obj in objects:
-                _check(obj)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        if not objects:
+            kind = "point cloud" if self.target == "POINTCLOUD" else "mesh"
+            raise PointCloudError(f'"{context.object.name}" is a {kind} already.')
+        for obj in objects:
+            _check(obj)
         active, chosen = context.view_layer.objects.active, context.selected_objects
         for obj in objects:
             if obj.meshfree.make_single_user and obj.data.users > 1:
@@ -72,7 +65,7 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
 def _check(obj):
     """Refuse an object that would lose something."""
     check_writable(obj, (), obj.meshfree.make_single_user)
-    if is_bound(obj):
+    if obj.meshfree.deform.is_bound:
         raise PointCloudError(f'"{obj.name}" is bound to handles, which would be lost. Apply or unbind it first.')
     if not obj.visible_get():
         raise PointCloudError(f'"{obj.name}" is hidden, and Blender converts what is seen. Show it first.')
@@ -107,7 +100,8 @@ def _convert(context, obj, target):
 def _group_names(obj):
     """Names of the groups that tools take, and of the parts."""
     settings = obj.meshfree
-    names = {*ROLES, *handle_names(obj), settings.deform.anchors, settings.boundary_group}
+    names = {role_group(obj, role) for role in ROLES}
+    names |= {*handle_names(obj), settings.deform.anchors, settings.boundary_group}
     kept = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
     names |= {group.name for group in kept if _SEGMENT.fullmatch(group.name)}
     return [name for name in names if name and has_group(obj, name)]

@@ -6,7 +6,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ...core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
 from ..objects.attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
-from ..objects.groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind, is_chosen, search_group
+from ..objects.groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind, is_chosen
 from ..objects.result import length_text
 from ..running import cache
 from ..running.application import ShownOperator, operator_reader
@@ -42,14 +42,20 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
     )
 
     @property
+    def asks(self):
+        """Names of the settings: the values come from one group, or from two."""
+        groups = ("group",) if self.values == "WEIGHTS" else ("low_group", "high_group")
+        return "values", *groups, "low", "high", "source", "show"
+
+    @property
     def adjustable(self):
         """Names of the settings that need no new solution: with a source, the given values do."""
         return ("show",) if self.source else ("low", "high", "show")
 
     def plan(self, context, obj):
         if self.values == "GROUPS":
-            low = chosen_members(obj, self.low_group, ("Low Group"))
-            high = chosen_members(obj, self.high_group, ("High Group"))
+            low = chosen_members(obj, self.low_group, "Low Group")
+            high = chosen_members(obj, self.high_group, "High Group")
             both = np.count_nonzero(low & high)
             if both:
                 raise PointCloudError(
@@ -104,17 +110,7 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
     def write(self, context, obj, result):
         write_attribute(obj.data, FIELD, result)
         tag_changed(obj.data)
-        return f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"
-
-    def draw_settings(self, context, layout):
-        layout.prop(self, "values")
-        names = ("group",) if self.values == "WEIGHTS" else ("low_group", "high_group")
-        for name in names:
-            search_group(layout, self, name, context.object)
-        for name in ("low", "high"):
-            layout.prop(self, name)
-        layout.prop_search(self, "source", context.object.data, "attributes")
-        layout.prop(self, "show")
+        return [f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"]
 
 
 class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
@@ -123,6 +119,7 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
     bl_idname = "meshfree.geodesic_distance"
     bl_label = "Geodesic Distance"
     writes = (DISTANCE,)
+    asks = ("group", "show")
 
     group: StringProperty(
         name="Sources",
@@ -158,15 +155,9 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
         reached = np.isfinite(result)
         write_attribute(obj.data, DISTANCE, np.where(reached, result, UNREACHED))
         tag_changed(obj.data)
-        missed = np.count_nonzero(~reached)
-        if missed:
-            far = f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."
-            self.warn([far])
-        return f"{obj.name}: distances up to {length_text(result[reached].max())}"
-
-    def draw_settings(self, context, layout):
-        search_group(layout, self, "group", context.object)
-        layout.prop(self, "show")
+        missed, line = np.count_nonzero(~reached), f"{obj.name}: distances up to {length_text(result[reached].max())}"
+        far = f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."
+        return [far, line] if missed else [line]
 
 
 CLASSES = (MESHFREE_OT_harmonic_field, MESHFREE_OT_geodesic_distance)

@@ -5,22 +5,21 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ...core import Cancelled, PointCloudError
 from ...core.applications import minimal_surface
-from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen, search_group
+from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen
 from ..objects.options import laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.reading import read_points
 from ..objects.result import area_text
 from ..running import cache
-from ..running.application import ApplicationOperator
+from ..running.application import ApplicationOperator, Tool
 
 HISTORY = "lb_area_history"  # custom property of the object: area after each step
 
 
-class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
-    """Let the points shrink to the least area that their boundary can span, as a soap film does"""
+class MinimalSurface(Tool):
+    """The settings and the work of `meshfree.minimal_surface`."""
 
-    bl_idname = "meshfree.minimal_surface"
-    bl_label = "Minimal Surface"
+    asks = ("group", "tolerance", "steps", "target")
     adjustable = ("target",)
 
     group: StringProperty(
@@ -66,20 +65,19 @@ class MESHFREE_OT_minimal_surface(ApplicationOperator, bpy.types.Operator):
 
     def write(self, context, obj, result):
         reading, film = result
-        self.warn(film.notices)
         if film.steps:
             write_positions(obj, reading, film.points, self.target, "Minimal Surface")
         obj[HISTORY] = film.area_history.tolist()
         area = film.area_history[-1] if film.steps else film.initial_area
-        return (
-            f"{obj.name}: area from {area_text(film.initial_area)} to {area_text(float(area))} in {film.steps}"
-            f" steps ({film.reason})"
-        )
+        areas = f"from {area_text(film.initial_area)} to {area_text(float(area))}"
+        return [*film.notices, f"{obj.name}: area {areas} in {film.steps} steps ({film.reason})"]
 
-    def draw_settings(self, context, layout):
-        search_group(layout, self, "group", context.object)
-        for name in ("tolerance", "steps", "target"):
-            layout.prop(self, name)
+
+class MESHFREE_OT_minimal_surface(MinimalSurface, ApplicationOperator, bpy.types.Operator):
+    """Let the points shrink to the least area that their boundary can span, as a soap film does"""
+
+    bl_idname = "meshfree.minimal_surface"
+    bl_label = "Minimal Surface"
 
 
 def _shrink(points, boundary, tolerance, steps, options, progress):

@@ -18,17 +18,15 @@ from ..objects.attributes import (
 )
 from ..objects.result import EIGENVALUES, check_writable
 from ..running import cache
-from ..running.application import ApplicationOperator, ShownOperator, operator_reader
+from ..running.application import ApplicationOperator, ShownOperator, Tool, operator_reader
 from .analyze import resolved_modes
 
 GROUP = "Segment {}"  # of vertex groups and objects
 
 
-class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
-    """Divide the points into parts, such as the limbs of a figure, or where a vibration mode has one sign"""
+class Segment(Tool):
+    """The settings and the work of `meshfree.segment`."""
 
-    bl_idname = "meshfree.segment"
-    bl_label = "Segment"
     writes = (SEGMENT,)
     adjustable = ("vertex_groups", "show")
 
@@ -51,6 +49,11 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         default=False,
     )
 
+    @property
+    def asks(self):
+        """Names of the settings that the method takes."""
+        return "method", "mode" if self.method == "NODAL" else "parts", "vertex_groups", "show"
+
     def plan(self, context, obj):
         if self.vertex_groups and obj.type == "MESH":
             _check_groups(obj)
@@ -71,11 +74,14 @@ class MESHFREE_OT_segment(ShownOperator, bpy.types.Operator):
         if self.vertex_groups:
             _write_groups(obj, [result == label for label in range(count)])
         tag_changed(obj.data)
-        return (f"{obj.name}: {count} parts") if count > 1 else (f"{obj.name}: {count} part")
+        return [f"{obj.name}: {count} part{'s' if count > 1 else ''}"]
 
-    def draw_settings(self, context, layout):
-        for name in ("method", "mode" if self.method == "NODAL" else "parts", "vertex_groups", "show"):
-            layout.prop(self, name)
+
+class MESHFREE_OT_segment(Segment, ShownOperator, bpy.types.Operator):
+    """Divide the points into parts, such as the limbs of a figure, or where a vibration mode has one sign"""
+
+    bl_idname = "meshfree.segment"
+    bl_label = "Segment"
 
 
 def _by_mode(laplacian, mode, progress):
@@ -131,7 +137,6 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.separate_by_segment"
     bl_label = "Separate by Segment"
-    asks = False
 
     @classmethod
     def obstacle(cls, context):
@@ -163,7 +168,7 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
                 collection.objects.link(part)
             _keep(context, part, result == number)
         _keep(context, obj, ~np.isin(result, numbers))
-        return f"{obj.name}: {len(numbers) + 1} parts are objects of their own"
+        return [f"{obj.name}: {len(numbers) + 1} parts are objects of their own"]
 
 
 def _keep(context, obj, kept):
@@ -195,11 +200,10 @@ def _keep_points(context, obj, kept):
         other.select_set(True)
 
 
-class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
-    """Compute signatures that tell points apart by the shape around them, at several scales, however it is bent"""
+class Signature(Tool):
+    """The settings and the work of `meshfree.signature`."""
 
-    bl_idname = "meshfree.signature"
-    bl_label = "Signatures"
+    asks = ("kind", "count", "modes", "show")
     adjustable = ("kind", "count", "show")
 
     kind: EnumProperty(
@@ -232,16 +236,19 @@ class MESHFREE_OT_signature(ShownOperator, bpy.types.Operator):
         count, modes = self.count, self.modes
         return lambda progress: signature(cache.lowest_modes(operator(progress), modes, progress), count=count)
 
-    def draw_settings(self, context, layout):
-        for name in ("kind", "count", "modes", "show"):
-            layout.prop(self, name)
-
     def write(self, context, obj, result):
         remove_numbered(obj.data, self._prefix(), beyond=self.count)
         for name, values in zip(self.writes, result.T, strict=True):
             write_attribute(obj.data, name, values)
         tag_changed(obj.data)
-        return f"{obj.name}: signatures at {self.count} scales"
+        return [f"{obj.name}: signatures at {self.count} scales"]
+
+
+class MESHFREE_OT_signature(Signature, ShownOperator, bpy.types.Operator):
+    """Compute signatures that tell points apart by the shape around them, at several scales, however it is bent"""
+
+    bl_idname = "meshfree.signature"
+    bl_label = "Signatures"
 
 
 CLASSES = (MESHFREE_OT_segment, MESHFREE_OT_separate_by_segment, MESHFREE_OT_signature)

@@ -9,10 +9,12 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from ...core import PointCloudError, grow
 from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.counting import renew_counts
-from ..objects.groups import HANDLE, assign, check_assignable, chosen_members
+from ..objects.groups import HANDLE, assign, check_assignable, chosen_members, role_group
+from ..objects.handlers import tell
 from ..objects.reading import obstacle
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
+from ..running.ready import reporting
 from ..running.stages import Stages
 
 
@@ -48,24 +50,21 @@ class SelectionOperator(JobOperator):
         with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):
             return super().complete(context, job)
 
-    def finish(self, context, objects, results, seconds):
+    def finish(self, context, objects, results):
         """Do it with the selection of now: the operators are kept."""
         return self.change(context, objects)
 
     def execute(self, context):
         return self.change(context, edited_objects(context))
 
+    @reporting
     def change(self, context, objects):
         """Compute for all objects, then change all."""
         with object_mode(context, context.object):
-            try:
-                objects, changes = self.with_points(objects), []
-                for obj in objects:
-                    with naming(obj.name):
-                        changes.append(self.prepare(context, obj))
-            except PointCloudError as error:
-                self.report({"ERROR"}, str(error))
-                return {"CANCELLED"}
+            objects, changes = self.with_points(objects), []
+            for obj in objects:
+                with naming(obj.name):
+                    changes.append(self.prepare(context, obj))
             messages = [change() for change in changes]
         for obj, message in zip(objects, messages, strict=True):
             self.report({"INFO"}, f"{obj.name}: {message}")
@@ -147,7 +146,7 @@ def select(context, obj, chosen) -> str:
 def groups_changed(obj):
     """Let the panel count the groups of an object again, and the display color them, if it does."""
     renew_counts(obj)
-    obj.meshfree.show_groups = obj.meshfree.show_groups
+    tell("groups_changed", obj)
 
 
 def analyzed(context, obj):
@@ -183,13 +182,13 @@ class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
     """Select all points of the components that hold selected points"""
 
     bl_idname = "meshfree.select_component"
-    bl_label = "Select Connected Part"
+    bl_label = "Select Component"
 
     def prepare(self, context, obj):
         chosen = selected(obj)
         component = analyzed(context, obj)[1].component
-        parts = np.unique(component[chosen & (component >= 0)])  # points left out belong to none
-        return lambda: select(context, obj, chosen | np.isin(component, parts))
+        found = np.unique(component[chosen & (component >= 0)])  # points left out belong to none
+        return lambda: select(context, obj, chosen | np.isin(component, found))
 
 
 class FrontOnly:
@@ -281,7 +280,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     f'All selected points of "{obj.name}" face away from the viewer. Turn off Front Only, or'
                     " look from the other side."
                 )
-        name = self.name or self.role.title()
+        name = self.name or role_group(obj, self.role.title())
         check_assignable(obj, name, must_exist=self.action == "REMOVE")
 
         def change():
@@ -306,7 +305,7 @@ class MESHFREE_OT_select_boundary(SelectionOperator, bpy.types.Operator):
         boundary = analyzed(context, obj)[1].boundary
         if not boundary.any():
             raise PointCloudError(
-                f'"{obj.name}" has no boundary: its surface is closed, or Boundaries is off in the settings.'
+                f'"{obj.name}" has no boundary: its surface is closed, or Boundary is off in the settings.'
             )
         return lambda: select(context, obj, boundary)
 

@@ -14,22 +14,19 @@ from ...core import (
     smooth_points,
     smoothing_base,
 )
-from ..objects.groups import chosen_weights, search_group
+from ..objects.groups import chosen_weights
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.result import length_text
 from ..running import cache
-from ..running.application import ApplicationOperator, operator_reader
+from ..running.application import ApplicationOperator, Tool, operator_reader
 
 _HEAT, _DETAIL = 6.0, 12.0  # smoothing lengths of a wavelength that suits a scan: finer ones the kernel does not see
 _READY = 20  # modes computed together at least, so that Adjust Last Operation can go through them
 _FINEST = 8.0  # details finer than this share of the wavelength count as noise, which is not boosted
 
 
-class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
-    """Smooth the shape of the points: remove noise, soften details, keep a few modes, or strengthen details"""
-
-    bl_idname = "meshfree.smooth"
-    bl_label = "Smooth Points"
+class Smooth(Tool):
+    """The settings and the work of `meshfree.smooth`."""
 
     method: EnumProperty(
         name="Method",
@@ -79,6 +76,12 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
     target: target_property()
 
     @property
+    def asks(self):
+        """Names of the settings that the method takes."""
+        names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
+        return ["method", *names, "strength", "group", "keep", "keep_boundary", "target"]
+
+    @property
     def adjustable(self):
         """Names of the settings that need no new solution: to keep a size, one looks for a scale."""
         return ("strength", "target") if self.keep == "NONE" else ("target",)
@@ -86,7 +89,7 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
     def plan(self, context, obj):
         check_movable(obj, self.target)
         reading, operator = operator_reader(context, obj)
-        mask = chosen_weights(obj, self.group, ("Vertex Group")) if self.group else None
+        mask = chosen_weights(obj, self.group, "Vertex Group") if self.group else None
         method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
         shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
         keep_boundary, name = self.keep_boundary, obj.name
@@ -136,16 +139,14 @@ class MESHFREE_OT_smooth(ApplicationOperator, bpy.types.Operator):
         reading, points = result
         write_positions(obj, reading, points, self.target, "Smooth")
         moved = np.sqrt(np.mean(np.sum((points - reading.points) ** 2, axis=1)))
-        return f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"
+        return [f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"]
 
-    def draw_settings(self, context, layout):
-        layout.prop(self, "method")
-        names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
-        for name in [*names, "strength"]:
-            layout.prop(self, name)
-        search_group(layout, self, "group", context.object)
-        for name in ("keep", "keep_boundary", "target"):
-            layout.prop(self, name)
+
+class MESHFREE_OT_smooth(Smooth, ApplicationOperator, bpy.types.Operator):
+    """Smooth the shape of the points: remove noise, soften details, keep a few modes, or strengthen details"""
+
+    bl_idname = "meshfree.smooth"
+    bl_label = "Smooth Points"
 
 
 def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
@@ -167,11 +168,9 @@ def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
     return smooth_points(laplacian, boost(gain, low, _FINEST**2 * low), **settings)
 
 
-class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
-    """Move the points along their normals by a vibration mode, on demand as an animated shape key"""
+class ModeShape(Tool):
+    """The settings and the work of `meshfree.mode_shape`."""
 
-    bl_idname = "meshfree.mode_shape"
-    bl_label = "Deform by Mode"
     adjustable = ("mode", "amplitude", "phase", "animate", "period", "target")
 
     mode: IntProperty(
@@ -195,6 +194,11 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
     )
     period: IntProperty(name="Period", description="Frames of one vibration", default=48, min=4, soft_max=250)
     target: target_property()
+
+    @property
+    def asks(self):
+        """Names of the settings: an animation takes a shape key."""
+        return "mode", "amplitude", "phase", "animate", "period" if self.animate else "target"
 
     def plan(self, context, obj):
         target = "SHAPE_KEY" if self.animate else self.target
@@ -223,9 +227,6 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
 
     def write(self, context, obj, result):
         reading, points, mode = result
-        if mode < self.mode:
-            again = f"Only {mode} modes are computed: this is the last. Start Deform by Mode again for more."
-            self.warn([again])
         key = write_positions(obj, reading, points, "SHAPE_KEY" if self.animate else self.target, f"Mode {mode}")
         if self.animate:
             key.slider_min = -1.0
@@ -234,12 +235,16 @@ class MESHFREE_OT_mode_shape(ApplicationOperator, bpy.types.Operator):
                 key.value = (1.0, 0.0, -1.0, 0.0)[index % 4]
                 key.keyframe_insert("value", frame=scene.frame_start + index * quarter)
         largest = np.linalg.norm(points - reading.points, axis=1).max()
-        return f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"
+        again = f"Only {mode} modes are computed: this is the last. Start Deform by Mode again for more."
+        line = f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"
+        return [again, line] if mode < self.mode else [line]
 
-    def draw_settings(self, context, layout):
-        for name in ("mode", "amplitude", "phase", "animate"):
-            layout.prop(self, name)
-        layout.prop(self, "period" if self.animate else "target")
+
+class MESHFREE_OT_mode_shape(ModeShape, ApplicationOperator, bpy.types.Operator):
+    """Move the points along their normals by a vibration mode, on demand as an animated shape key"""
+
+    bl_idname = "meshfree.mode_shape"
+    bl_label = "Deform by Mode"
 
 
 CLASSES = (MESHFREE_OT_smooth, MESHFREE_OT_mode_shape)

@@ -231,7 +231,7 @@ def test_attributes_of_other_origin_can_be_shown(display, obj):
         ("lb_mean_curvature", "Mean Curvature"),
         ("lb_eigenvector_007", "Mode 7"),
         ("lb_boundary", "Boundary"),
-        ("lb_component", "Connected Part"),
+        ("lb_component", "Component"),
         ("weight", "Weight"),
     ],
 )

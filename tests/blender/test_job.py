@@ -79,8 +79,8 @@ def operator(jobs, monkeypatch):
         def report(self, kinds, text):
             self.reports.append((*kinds, text))
 
-        def finish(self, context, objects, results, seconds):
-            self.finished = objects, results, seconds
+        def finish(self, context, objects, results):
+            self.finished = objects, results
             return {"FINISHED"}
 
         def tick(self, kind="TIMER", value="NOTHING"):
@@ -115,8 +115,8 @@ def test_a_result_comes_with_its_objects_and_stages(operator, jobs, obj):
     assert (jobs.running().stage, jobs.running().fraction) == ("One", 0.25)
     work.go_on.set()
     assert started.end() == {"FINISHED"}
-    objects, result, seconds = started.finished
-    assert (objects, result, list(seconds)) == ([obj], 7, ["One", "Two"])
+    assert started.finished == ([obj], 7)
+    assert list(started._job.seconds) == ["One", "Two"]
     assert jobs.running() is None
 
 

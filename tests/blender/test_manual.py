@@ -75,8 +75,8 @@ def check_rows(items, text, path):
             assert f"*{choice.name}*" in told or f"`{choice.identifier}`" in told, f"{path.name}: {choice.name}"
 
 
-def visible(rna):
-    return [item for item in rna.properties if not item.is_hidden and item.identifier != "rna_type"]
+def visible(properties):
+    return [item for item in properties if not item.is_hidden and item.identifier != "rna_type"]
 
 
 def test_operators():
@@ -89,7 +89,7 @@ def test_operators():
         assert label == rna.name
         assert (DOCS / link.split("#")[0]).resolve() == path
         assert name in link or name in path.stem or link.endswith(f"{path.stem}.md")
-        check_rows(visible(rna), section, path)
+        check_rows(visible(rna.properties), section, path)
         assert f"`meshfree.{name}`" in read(path)
 
 
@@ -109,7 +109,7 @@ def settings_group(name=""):
 
 def test_settings():
     """The pages about settings, colors and deformation hold all that the panels draw."""
-    shown = [item for item in settings_group() if item.identifier not in KEPT | RESULTS | {"rna_type"}]
+    shown = [item for item in visible(settings_group()) if item.identifier not in KEPT | RESULTS]
     pages = DOCS / "settings.md", DOCS / "colors.md"
     told = "\n".join(map(read, pages))
     check_rows(shown, told, pages[0])

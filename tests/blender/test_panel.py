@@ -48,6 +48,17 @@ OPERATORS = (
     "spectrum",
     "stop",
 )
+DIALOGS = (  # operators that ask before they work, in a layout of ours
+    "export_points",
+    "geodesic_distance",
+    "harmonic_field",
+    "import_points",
+    "minimal_surface",
+    "mode_shape",
+    "segment",
+    "signature",
+    "smooth",
+)
 PANELS = ("main", "settings", "spectrum", "display", "points", "shape", "segment", "fields", "deform", "minimal")
 
 
@@ -244,12 +255,15 @@ def test_all_operators_and_panels_are_known_to_these_tests():
     assert sorted(panels) == sorted(f"MESHFREE_PT_{name}" for name in PANELS)
 
 
-@pytest.mark.parametrize("name", OPERATORS)
+def value_of(attribute, settings):
+    """What an attribute of an operator is by its settings."""
+    return attribute.fget(settings) if isinstance(attribute, property) else attribute
+
+
+@pytest.mark.parametrize("name", DIALOGS)
 def test_dialogs_show_every_setting(name):
     add_object(sphere_points())
     operator = getattr(bpy.types, f"MESHFREE_OT_{name}")
-    if not hasattr(operator, "draw") or not getattr(operator, "asks", True):
-        return
     properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if not item.is_hidden]
     properties = [item for item in properties if item.type != "POINTER" and item.identifier != "filepath"]
     values = {item.identifier: item.default for item in properties}
@@ -258,10 +272,9 @@ def test_dialogs_show_every_setting(name):
     texts = []
     for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
         settings = Settings(layout=Layout(texts), **values | variant)
-        if hasattr(operator, "draw_settings"):
-            operator.draw_settings(settings, bpy.context, settings.layout)
-        else:
-            operator.draw(settings, bpy.context)
+        settings.asks = value_of(operator.asks, settings)
+        settings.is_repeated = lambda context: False
+        operator.draw(settings, bpy.context)
     assert set(texts) - {"No points assigned yet"} == set(values)
 
 
@@ -274,8 +287,7 @@ def test_adjust_last_operation_offers_what_is_quick(name):
     values = {item.identifier: item.default for item in properties if item.type != "POINTER"}
     for variant in ({}, {"keep": "AREA"}, {"source": "x"}):
         settings = Settings(**values | {key: value for key, value in variant.items() if key in values})
-        quick = operator.adjustable
-        quick = quick.fget(settings) if isinstance(quick, property) else quick
+        quick = value_of(operator.adjustable, settings)
         texts = []
         settings.layout, settings.adjustable, settings.is_repeated = Layout(texts), quick, lambda context: True
         operator.draw(settings, bpy.context)
@@ -286,7 +298,7 @@ def test_adjust_last_operation_offers_what_is_quick(name):
 def test_panel_while_something_runs(extension, monkeypatch):
     add_object(sphere_points())
     panel = importlib.import_module(f"{extension.__name__}.ui.panel")
-    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(title="Smooth Points", stage="Filter", fraction=0.25))
+    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(label="Smooth Points", stage="Filter", fraction=0.25))
     texts = draw()
     assert "Smooth Points (Esc to Stop)" in texts
     assert "Filter: 25%" in texts

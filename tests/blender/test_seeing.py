@@ -289,7 +289,7 @@ def texts(picture):
 
 @pytest.mark.parametrize(
     ("name", "title"),
-    [("lb_area", "Area"), ("lb_normal", "Normal"), ("lb_boundary", "Boundary"), ("lb_component", "Connected Part")],
+    [("lb_area", "Area"), ("lb_normal", "Normal"), ("lb_boundary", "Boundary"), ("lb_component", "Component")],
 )
 def test_pictures_stay_on_their_plates(overlay, obj, name, title):
     obj.meshfree.histogram = obj.meshfree.plot_eigenvalues = True
@@ -363,6 +363,7 @@ def test_pictures_of_many_parts_name_the_first_ones(overlay, obj):
     bpy.ops.meshfree.colormap(attribute="part", color_map="CATEGORICAL")
     legend, histogram = overlay.pictures(obj, bpy.context.scene)
     assert texts(legend)[1:] == [*map(str, range(11)), "29 more"]
+    assert len(legend.places) == 6 * (1 + 11)  # the plate, and a box for each that is named
     assert {"0", "39"} <= set(texts(histogram))
 
 

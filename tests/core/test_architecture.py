@@ -1,6 +1,7 @@
 """The arrows of the house: ui -> operators -> core, the wings of core among themselves, and no bpy in core."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -28,12 +29,40 @@ def imported(path):
             yield from (f"{stem}{'' if stem.endswith('.') else '.'}{alias.name}" for alias in node.names)
 
 
-@pytest.mark.parametrize(("package", "forbidden"), [("core", ("bpy", "..operators", "..ui")), ("operators", ("..ui",))])
+@pytest.mark.parametrize(("package", "forbidden"), [("core", {"bpy", "operators", "ui"}), ("operators", {"ui"})])
 def test_imports_point_one_way(package, forbidden):
     files = sorted((ROOT / package).rglob("*.py"))
     assert files
-    wrong = [f"{file.name}: {name}" for file in files for name in imported(file) if name.startswith(forbidden)]
-    assert wrong == []
+    found = {(file.name, name) for file in files for name in imported(file)}
+    assert {(file, name) for file, name in found if name.lstrip(".").split(".")[0] in forbidden} == set()
+
+
+OPERATORS = {  # what each wing may import, beside itself and core
+    "objects": (),
+    "running": ("objects.",),
+    "tools": ("objects.", "running."),
+    "deform": ("objects.", "running.", "tools.select."),  # for the base class of what works on selected points
+    "files": ("objects.", "running.", "tools."),  # for the command line, which runs them
+}
+
+
+def test_operators_have_these_wings():
+    assert {file.parent.name for file in (ROOT / "operators").glob("*/*.py")} == OPERATORS.keys()
+
+
+@pytest.mark.parametrize("wing", OPERATORS)
+def test_wings_of_operators_point_one_way(wing):
+    files = sorted((ROOT / "operators" / wing).glob("*.py"))
+    found = {(file.name, name) for file in files for name in imported(file) if name.startswith("..")}
+    allowed = ("core.", *OPERATORS[wing])
+    assert {(file, name) for file, name in found if not name.lstrip(".").startswith(allowed)} == set()
+
+
+@pytest.mark.parametrize("call", [r"\blayout\b", r"\bdef draw", r"\bbpy\.ops\.meshfree\.(?!escape\b)"])
+def test_operators_draw_nothing_and_call_no_operator(call):
+    """What they have to say goes to those that listen, see operators/objects/handlers.py; `escape` is of their own."""
+    files = sorted((ROOT / "operators").rglob("*.py"))
+    assert [file.name for file in files if re.search(call, file.read_text(encoding="utf-8"))] == []
 
 
 GROUND = {"kernel", "options", "errors"}

@@ -107,6 +107,14 @@ class TestPly:
         (tmp_path / "a.ply").write_bytes(data + np.array([5.0, 6.0, 7.0], "<f4").tobytes())
         assert read_points(tmp_path / "a.ply").points.tolist() == [[5.0, 6.0, 7.0]]
 
+    @pytest.mark.parametrize("order", ["ascii", "binary_little_endian"])
+    def test_an_empty_element_of_lists_before_the_points(self, tmp_path, order):
+        start = f"ply\nformat {order} 1.0\nelement face 0\nproperty list uchar int vertex_indices\n"
+        head = f"{start}element vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n".encode()
+        data = b"5 6 7\n" if order == "ascii" else np.array([5.0, 6.0, 7.0], "<f4").tobytes()
+        (tmp_path / "a.ply").write_bytes(head + data)
+        assert read_points(tmp_path / "a.ply").points.tolist() == [[5.0, 6.0, 7.0]]
+
     @pytest.mark.parametrize(
         ("data", "text"),
         [
@@ -124,6 +132,11 @@ class TestPly:
             (header(*XYZ) + b"1 2 3 4\n5 6 7 8\n", "point 1: 4 numbers where the header names 3"),
             (header(*XYZ) + b"1 2 3\n4 nan 6\n", "1 of 2 points.* first of them is point 2"),
             (header(*XYZ, order="binary_little_endian") + bytes(47), "ends after 1 of the 2 points"),
+            (header(*XYZ, order="binary_big_endian", count=10**12) + bytes(48), "ends after 2 of the 1000000000000"),
+            (header(*XYZ, count=10**12) + b"1 2 3\n", "ends after 1 of the 1000000000000 points"),
+            (header(*XYZ, count=10**20), "line 4: 'element vertex 1000.*' does not belong"),
+            (b"ply\nformat binary_little_endian 1.0\nelement vertex 2\nend_header\n12", "has no x y z among"),
+            (header(*XYZ) + b"1 2 3\n4 \xff 6\n", "point 2: could not convert"),
             (header(*XYZ, "list uchar int many"), "lists in its element vertex"),
         ],
     )

@@ -1,0 +1,80 @@
+"""The examples in the docstrings of the public calls, run as they stand, and the sections around them."""
+
+import doctest
+import inspect
+import re
+
+import pytest
+
+import core
+
+SHOWN = [
+    "Deformer",
+    "LaplaceBeltrami.apply",
+    "LaplaceBeltrami.eigenpairs",
+    "LaplacianOptions",
+    "LaplacianOptions.paper",
+    "build_laplacian",
+    "check_stability",
+    "displace_by_mode",
+    "estimate_areas",
+    "estimate_normals",
+    "fair_points",
+    "geodesic_distance",
+    "grow",
+    "harmonic_field",
+    "heat_kernel_signature",
+    "mean_curvature",
+    "minimal_surface",
+    "nodal_domains",
+    "segment",
+    "smooth_points",
+    "solve_poisson",
+    "spectral_filter",
+    "wave_kernel_signature",
+]
+SECTIONS = ["Parameters", "Attributes", "Returns", "Raises", "See Also", "Notes", "References", "Examples"]
+FOUND = {
+    test.name: test
+    for name in core.__all__
+    for test in doctest.DocTestFinder(exclude_empty=False).find(getattr(core, name), name, globs={})
+}
+RUNNABLE = [name for name, test in FOUND.items() if test.examples]
+
+
+def sections(name):
+    """Names of the sections of a docstring, with their texts."""
+    pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}\n", inspect.cleandoc(FOUND[name].docstring), flags=re.MULTILINE)
+    return dict(zip(pieces[1::2], pieces[2::2], strict=True))
+
+
+@pytest.mark.parametrize("name", RUNNABLE)
+def test_example_gives_what_it_says(name):
+    printed = []
+    doctest.DocTestRunner().run(FOUND[name], out=printed.append)
+    assert not printed, "".join(printed)
+
+
+def test_calls_that_users_start_from_have_examples():
+    assert set(RUNNABLE) == set(SHOWN)
+
+
+def test_examples_begin_with_the_sphere_of_the_package():
+    sphere = [example.source for example in doctest.DocTestParser().get_examples(core.__doc__)]
+    begins = {name: [example.source for example in FOUND[name].examples[: len(sphere)]] for name in RUNNABLE}
+    assert [name for name in RUNNABLE if begins[name] != sphere] == ["minimal_surface"]
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_see_also_names_what_there_is(name):
+    lines = sections(name)["See Also"].strip().splitlines()
+    named = [other.strip() for line in lines for other in line.split(" : ")[0].split(",")]
+    assert named
+    assert set(named) <= set(FOUND)
+    assert name not in named
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_sections_follow_the_order_of_numpydoc(name):
+    found = list(sections(name))
+    assert found == sorted(found, key=SECTIONS.index)
