@@ -33,6 +33,16 @@ def test_wave_on_the_sphere_is_even(spectrum):
     np.testing.assert_allclose(found, 1.0 / (4.0 * np.pi), rtol=2e-2)
 
 
+def test_wave_by_its_definition(ellipsoid):
+    spectrum = ellipsoid.eigenpairs(20)
+    logarithms, squares = np.log(spectrum.eigenvalues[1:]), spectrum.eigenvectors[:, 1:] ** 2
+    energies = np.linspace(logarithms[0], logarithms[-1], 7)
+    window = 0.07 * np.ptp(logarithms)
+    for energy, found in zip(energies, core.wave_kernel_signature(spectrum, energies).T, strict=True):
+        weights = np.exp(-0.5 * ((energy - logarithms) / window) ** 2)
+        np.testing.assert_allclose(found, squares @ weights / weights.sum(), rtol=1e-9, atol=1e-15)
+
+
 def test_short_times_tell_curvature(ellipsoid):
     # The heat kernel on its diagonal is 1 / (4 pi t) (1 + t K / 3 + ...).
     spectrum = ellipsoid.eigenpairs(80)
