@@ -126,16 +126,6 @@ def start_gui(suites, required):
     suites.start("gui", ensure(f"core-{version}", "test", python), "tests/gui")
 
 
-def start_modules(suites, found, blenders):
-    """Start the tests of core in every Python given, and of the extension in so many versions of Blender for each."""
-    for version, python in found:
-        suites.start(f"core-{version}", ensure(f"core-{version}", "test", python), "tests/core")
-    package.build([package.this_platform()])
-    for version, python in found:
-        for blender in pythons.BLENDERS[version][:blenders]:
-            suites.start(f"blender-{blender}", ensure_blender(blender, python), "tests/blender")
-
-
 def main():
     """Run the tests for the Python to prefer and the newest Blender it has, all that can run here, or the window's."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -146,16 +136,18 @@ def main():
     RESULTS.mkdir(parents=True, exist_ok=True)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # what stops a run from outside ends its suites too
     began = time.monotonic()
-    found = list(pythons.find().items())
+    found = [] if options.gui else list(pythons.find().items())[: None if options.all else 1]
     with Suites() as suites:
-        if options.gui:
-            package.build([package.this_platform()])
-        else:
-            start_modules(suites, found if options.all else found[:1], None if options.all else 1)
-        if options.gui or options.all:
+        for version, python in found:
+            suites.start(f"core-{version}", ensure(f"core-{version}", "test", python), "tests/core")
+        package.build([package.this_platform()])
+        if options.gui or options.all:  # the longest: not the last
             start_gui(suites, required=options.gui)
+        for version, python in found:
+            for blender in pythons.BLENDERS[version][: None if options.all else 1]:
+                suites.start(f"blender-{blender}", ensure_blender(blender, python), "tests/blender")
         results = suites.results()
-    for version in pythons.BLENDERS.keys() - pythons.find().keys():
+    for version in () if options.gui else pythons.BLENDERS.keys() - pythons.find().keys():
         print(f"Left out: Blender {' and '.join(pythons.BLENDERS[version])}, no Python {version} is found")
     total = {
         word: sum(counts[word] for counts in results.values()) for word in ("failed", "passed", "skipped", "errors")
