@@ -271,15 +271,15 @@ class _Film:
         free = self.free[stiffness.diagonal()[self.free] > 0.0]  # in noise a point may lie on a sheet of its own
         pulled = (pull @ foot - stiffness @ points)[free]
         normals, areas = laplacian.normals[free], laplacian.areas[free]
-        bend = 4.0 * laplacian.mean_curvature[free] ** 2 - 2.0 * laplacian.gaussian_curvature[free]
-        bend = np.sqrt(np.maximum(bend, 0.0))  # |A|
+        squared = 4.0 * laplacian.mean_curvature[free] ** 2 - 2.0 * laplacian.gaussian_curvature[free]
+        curvature = np.sqrt(np.maximum(squared, 0.0))  # |A|
         stiffness = stiffness[free][:, free]
         force = np.einsum("ic,ic->i", normals, pulled)
-        jacobi = (stiffness - sparse.diags_array(areas * bend**2)).tocsr()
+        jacobi = (stiffness - sparse.diags_array(areas * curvature**2)).tocsr()
         newton = _solve(jacobi, force)
         along, definite = newton.values, newton.definite
         step = np.zeros_like(points)
-        if definite and np.max(np.abs(along) * bend) <= _TURN:
+        if definite and np.max(np.abs(along) * curvature) <= _TURN:
             step[free] = along[:, None] * normals
         else:
             for axis in range(3):
@@ -292,7 +292,7 @@ class _Film:
             step=step,
             savings=0.5 * float(along @ force),
             definite=definite,
-            bent=float(np.partition(bend * laplacian.smoothing_lengths[free], -few)[-few]),
+            bent=float(np.partition(curvature * laplacian.smoothing_lengths[free], -few)[-few]),
         )
 
     def advance(self, before, bent):

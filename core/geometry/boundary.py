@@ -184,7 +184,7 @@ def measure_boundary(nearest, normals, at_boundary):
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
         doubt = (near + 2.0 * spacing) * np.where(course.kinked[seen], 10.0, 1.0)
-        distance, bend = course.measure(nearest.points, normals, block, seen)
+        distance, curvature = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
         eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
         for side in (0, 1):
@@ -199,7 +199,7 @@ def measure_boundary(nearest, normals, at_boundary):
             boundary.distance[block, side] = np.where(
                 known, np.maximum((trust * distance).sum(axis=1) / total, 0), np.inf
             )
-            boundary.curvature[block, side] = (trust * bend).sum(axis=1) / total
+            boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
             if side == 0:
                 # Around a corner that the surface fills, the second boundary turns away and lies inside the first.
@@ -334,8 +334,8 @@ def given_boundary(nearest, normals, distance):
         weighted = np.swapaxes(basis * nearest.weight[block][:, :, None], 1, 2)
         fit = np.linalg.solve(weighted @ basis + 1e-9 * np.eye(6), weighted @ distance[index][:, :, None])[:, :, 0]
         # Of the line at this distance; the boundary's own is the next.
-        bend = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
-        curvature[block] = bend / np.maximum(1.0 + bend * distance[block], 0.5)
+        level = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
+        curvature[block] = level / np.maximum(1.0 + level * distance[block], 0.5)
     boundary = no_boundary(len(distance))
     boundary.distance[:, 0], boundary.curvature[:, 0] = distance, curvature
     return replace(boundary, at_boundary=distance < 0.5 * nearest.spacing)

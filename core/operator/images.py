@@ -45,17 +45,17 @@ def mirror(pairs, distance, boundary):
         rows = np.flatnonzero((near[first] & known[second]) | (near[second] & known[first]))
     first, second = first[rows], second[rows]
     d, e = boundary.distance[first], boundary.distance[second]
-    bend = 0.5 * (boundary.curvature[first] + boundary.curvature[second])
+    curvature = 0.5 * (boundary.curvature[first] + boundary.curvature[second])
     cosine = np.einsum("iac,ibc->iab", boundary.outward[first], boundary.outward[second])
     alone = ~np.isfinite(d[:, 1]) & ~np.isfinite(e[:, 1])
     # Which boundary of the second point is the first one's nearest?
     alike = np.maximum(cosine, 0.0)
     swapped = ~alone & (alike[:, 0, 1] + alike[:, 1, 0] > alike[:, 0, 0] + alike[:, 1, 1])
     e[swapped] = e[swapped, ::-1]
-    bend[swapped] = 0.5 * (boundary.curvature[first[swapped]] + boundary.curvature[second[swapped], ::-1])
+    curvature[swapped] = 0.5 * (boundary.curvature[first[swapped]] + boundary.curvature[second[swapped], ::-1])
     agreed = np.where(swapped[:, None], np.stack([cosine[:, 0, 1], cosine[:, 1, 0]], axis=1), cosine[:, [0, 1], [0, 1]])
     seen = np.isfinite(d) & np.isfinite(e) & (alone[:, None] | (agreed > _SHARED))
-    return _images(seen, distance[rows], d, e, bend, 0.5 * (lengths[first] + lengths[second]), rows)
+    return _images(seen, distance[rows], d, e, curvature, 0.5 * (lengths[first] + lengths[second]), rows)
 
 
 def own_images(pairs, boundary):
@@ -72,12 +72,12 @@ def _images(seen, distance, d, e, curvature, lengths, rows):
     larger = np.ones(len(rows))
     for side in (0, 1):
         left, right = np.where(seen[:, side], d[:, side], 0.0), np.where(seen[:, side], e[:, side], 0.0)
-        bend = np.clip(curvature[:, side] * (left + right), -_BEND, _BEND)
-        added = 4.0 * left * right + bend * np.maximum(squared - (left - right) ** 2, 0.0)
+        growth = np.clip(curvature[:, side] * (left + right), -_BEND, _BEND)
+        added = 4.0 * left * right + growth * np.maximum(squared - (left - right) ** 2, 0.0)
         further += added
-        larger *= 1.0 + bend
+        larger *= 1.0 + growth
         reached = seen[:, side] & (squared + added < (SUPPORT * lengths) ** 2)
-        result.append((rows[reached], np.sqrt(squared + added)[reached], 1.0 + bend[reached]))
+        result.append((rows[reached], np.sqrt(squared + added)[reached], 1.0 + growth[reached]))
     reached = seen.all(axis=1) & (further < (SUPPORT * lengths) ** 2)
     result.append((rows[reached], np.sqrt(further[reached]), larger[reached]))
     return result

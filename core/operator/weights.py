@@ -118,8 +118,8 @@ class _Block:
         """Return the factor of each pair's weight."""
         result = np.ones(len(self.first))
         for ends, direction in ((self.first, self.here), (self.second, self.there)):
-            bend = linear[ends].conj() * self.reach + quadratic[ends].conj() * direction
-            result += 0.5 * (constant[ends] + bend.real * direction.real - bend.imag * direction.imag)
+            terms = linear[ends].conj() * self.reach + quadratic[ends].conj() * direction
+            result += 0.5 * (constant[ends] + terms.real * direction.real - terms.imag * direction.imag)
         return result
 
     def add_moments(self, constant, linear, quadratic, trace, slope, traceless):
