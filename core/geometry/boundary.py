@@ -34,6 +34,7 @@ _KINKED = 1.3  # scatter over that of the neighbours at which a corner is near
 _CHANCE = 3.0  # variances of a curvature that may be chance
 _VIEWS = 48  # nearest candidates that a point looks at
 _FEW = 5  # candidates that make a second boundary
+_FURTHER = 1.5, 3.0  # times the measured distance, and spacings, within which a point of the boundary must lie
 _AVERAGED = 8  # the nearest of them on one side of a corner, whose measures of the distance are averaged
 _STRAIGHT, _CORNER = 0.8, 0.75  # cosine of the directions across the boundary: of one course, at least; of two, at most
 
@@ -196,9 +197,10 @@ def measure_boundary(nearest, normals, at_boundary):
             total = trust.sum(axis=1)
             known = np.count_nonzero(same, axis=1) >= (_FEW if side else 1)
             total[~known] = 1.0
-            boundary.distance[block, side] = np.where(
-                known, np.maximum((trust * distance).sum(axis=1) / total, 0), np.inf
-            )
+            measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
+            # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
+            known &= np.where(same, near, np.inf).min(axis=1) <= _FURTHER[0] * measured + _FURTHER[1] * spacing[:, 0]
+            boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
             if side == 0:

@@ -95,9 +95,8 @@ class ScaledPoints:
 
     def leave_out(self, dropped):
         """Return the same without some of the distinct points, (m,) bool."""
-        row = np.cumsum(~dropped) - 1
-        row[dropped] = -1
         kept = ~dropped
+        row = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)  # what was left out before stays so
         return replace(
             self, points=self.points[kept], inverse=row[self.inverse], copies=self.copies[kept], first=self.first[kept]
         )

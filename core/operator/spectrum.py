@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_symbol, symbol
 
-_DEGREE = 6  # of the polynomial that the Lanczos steps work on
+_DEGREE = 6  # of the polynomial that the Lanczos steps work on, at least
 _FLAT = 4.0  # the symbol hardly rises beyond
 
 
@@ -109,7 +109,8 @@ def lowest_eigenpairs(laplacian, stiffness, count, progress):
     cut = symbol(np.sqrt(min(frequency, _FLAT**2))) / squared
     while True:
         if cut < 0.7 * top:
-            degree, center, radius = _DEGREE, 0.5 * (top + cut), 0.5 * (top - cut)
+            degree = max(_DEGREE, round(np.sqrt(top / cut)))
+            center, radius = 0.5 * (top + cut), 0.5 * (top - cut)
         else:  # too few points for a polynomial: a shift to [1, 2], right wherever the cut lies
             degree, center, radius = 1, 2.0 * top, top
 

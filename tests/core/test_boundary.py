@@ -190,6 +190,19 @@ class TestMeasuring:
         # The equator is a geodesic.
         assert abs(np.median(cloud.boundary.curvature[near, 0])) < 0.1
 
+    def test_the_course_leads_no_further_than_its_points(self):
+        points = square_grid(40)
+        step = 1.0 / 39.0
+        some = (points[:, 0] == 0.0) & (np.abs(points[:, 1] - 0.5) < 6.0 * step)
+        nearest = find_nearest(points)
+        boundary = measure_boundary(nearest, np.tile([0.0, 0.0, 1.0], (len(points), 1)), some)
+        beside = np.abs(points[:, 1] - 0.5) < 5.0 * step
+        near = beside & (points[:, 0] < 9.0 * step)
+        np.testing.assert_allclose(boundary.distance[near, 0], points[near, 0], atol=1e-9)
+        away = (points[:, 0] == 0.0) & (np.abs(points[:, 1] - 0.5) > 11.0 * step)
+        assert away.sum() > 10
+        assert not np.isfinite(boundary.distance[away]).any()
+
     def test_few_points_have_no_boundary(self):
         points = np.random.default_rng(0).random((200, 3)) * (1.0, 1.0, 0.0)
         nearest, normals = find_nearest(points), np.tile(UP, (200, 1))

@@ -3,6 +3,7 @@ import pytest
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere
+from core.geometry.points import scale_points
 
 
 @pytest.fixture
@@ -215,3 +216,13 @@ class TestGivenNormals:
 def test_options_out_of_range(settings):
     with pytest.raises(core.PointCloudError, match="Choose|Use|Raise"):
         core.LaplacianOptions(**settings)
+
+
+def test_points_left_out_before_stay_so():
+    scaled = scale_points(fibonacci_sphere(60), 50)
+    once = scaled.leave_out(np.arange(60) < 3)
+    twice = once.leave_out(np.arange(57) == 0)
+    assert np.count_nonzero(twice.inverse < 0) == 4
+    known = twice.inverse >= 0
+    np.testing.assert_array_equal(twice.points[twice.inverse[known]], scaled.points[scaled.inverse[known]])
+    np.testing.assert_array_equal(twice.scatter(np.ones(56), 0.0), np.where(known, 1.0, 0.0))

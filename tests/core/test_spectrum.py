@@ -128,3 +128,12 @@ def test_progress_is_reported(laplacian):
     laplacian.eigenpairs(5, progress=lambda stage, fraction: calls.append((stage, fraction)))
     assert {stage for stage, _ in calls} == {"Spectrum"}
     assert all(0.0 <= fraction < 1.0 for _, fraction in calls)
+
+
+def test_a_small_dense_part_beside_a_large_one():
+    # The largest eigenvalue is a thousand times that of an even cloud: a polynomial of low degree tells nothing apart.
+    sphere = fibonacci_sphere(1200)
+    laplacian = core.build_laplacian(np.concatenate([sphere, 0.03 * sphere + [3.0, 0.0, 0.0]]))
+    eigenvalues = laplacian.eigenpairs(21).eigenvalues
+    exact = np.append(0.0, sphere_eigenvalues(20))  # those of the small one lie far above
+    np.testing.assert_allclose(eigenvalues[:17], exact[:17], rtol=2e-2, atol=1e-8)
