@@ -191,7 +191,7 @@ class Deformer:
             Positions of the wrong shape or type, or not finite.
         """
         report = progress or (lambda stage, fraction: None)
-        target = _check_positions(handle_positions, len(self.handles), ("handle positions"), "handle")
+        target = _check_positions(handle_positions, len(self.handles), "handle positions", "handle")
         target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
         result = self.points.copy()
         loose = self._row < 0
@@ -216,7 +216,7 @@ class Deformer:
         if start is None or not self.rotation_aware or steps < 1:
             now = place(0.0)
         else:
-            now = _check_positions(start, len(self.points), ("starting points"), "point")[self._moving]
+            now = _check_positions(start, len(self.points), "starting points", "point")[self._moving]
         step, converged = 0, True
         if self.rotation_aware and steps > 0:
             at_rest = self._turned(turn, self._differential)

@@ -193,8 +193,8 @@ def minimal_surface(
 
 def _notices(reason, steps):
     texts = {
-        "step limit": (f"The surface had not settled after {steps} steps. Allow more steps, or a larger tolerance."),
-        "stopped": (f"The iteration was stopped after {steps} steps, before the surface had settled."),
+        "step limit": f"The surface had not settled after {steps} steps. Allow more steps, or a larger tolerance.",
+        "stopped": f"The iteration was stopped after {steps} steps, before the surface had settled.",
         "pinching": (
             f"The surface pinches: after {steps} steps the points no longer resolve its neck. These boundaries"
             " span no surface in one piece; move them closer together. The last sound step was kept."
@@ -203,9 +203,7 @@ def _notices(reason, steps):
             f"After {steps} steps the points no longer resolve the surface. Use more points, or spread"
             " them more evenly. The last sound step was kept."
         ),
-        "stalled": (
-            f"After {steps} steps no further one lowered the area. Use more points, or spread them more evenly."
-        ),
+        "stalled": f"After {steps} steps no further one lowered the area. Use more points, or spread them more evenly.",
     }
     texts["cancelled"] = texts["stopped"]
     return [texts[reason]] if reason in texts else []

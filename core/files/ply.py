@@ -52,7 +52,7 @@ def read_ply(path) -> PointTable:
         columns = read(file, order, before, vertex, path)
     table = from_columns(dict(zip(vertex.names, columns, strict=True)), path)
     table.notices += [
-        (f"{path.name}: left out {element.count} {element.name} elements. Only points are read.")
+        f"{path.name}: left out {element.count} {element.name} elements. Only points are read."
         for element in elements
         if element is not vertex and element.count
     ]
@@ -132,7 +132,7 @@ def _refuse_row(lines, width, path):
     for number, line in enumerate(lines, start=1):
         words = line.decode("ascii", errors="replace").split()
         try:
-            wrong = "" if len(words) == width else (f"{len(words)} numbers where the header names {width} properties")
+            wrong = "" if len(words) == width else f"{len(words)} numbers where the header names {width} properties"
             [float(word) for word in words]
         except ValueError as error:
             wrong = str(error)

@@ -103,7 +103,7 @@ def _find_first(lines, path):
         seen += bool(line.strip())
         if seen > _HEADER:
             break
-    problem = ("there are none") if seen <= _HEADER else (f"there are none in its first {_HEADER} lines")
+    problem = "there are none" if seen <= _HEADER else f"there are none in its first {_HEADER} lines"
     raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {problem}. Correct the file.")
 
 
