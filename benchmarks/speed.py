@@ -116,7 +116,7 @@ def areas_against_algorithm_1():
 
     def judge(name, areas, seconds, steps):
         # On a sphere the mean-normal plane holds the chord, so the distance in space is the projected one.
-        stiffness = assemble_stiffness(cloud, pairs.distance, areas)[0]
+        stiffness = assemble_stiffness(cloud, pairs.distance, areas).matrix
         total = scaled.share(areas, 0.0) * scaled.scale**2
         laplacian = replace(default, areas=total, stiffness=stiffness)
         values = laplacian.eigenpairs(36).eigenvalues[1:] / sphere_eigenvalues(36)[1:] - 1.0
@@ -136,7 +136,7 @@ def areas_against_algorithm_1():
     judge("density, 1 / (A 1)", density, assembly, "1 product")
 
     began = time.perf_counter()
-    fast = fast_areas(matrix, target)
+    fast = fast_areas(matrix, target, density)
     fast_seconds = time.perf_counter() - began
     judge("fast (default)", fast.areas, fast_seconds, f"{fast.products} products")
 

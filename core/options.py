@@ -20,11 +20,10 @@ class LaplacianOptions:
     Parameters
     ----------
     bandwidth : {"adaptive", "local", "global"}
-        "adaptive": a smoothing length h per point, as wide as the irregularity of the spacing demands and the curvature
-        permits, h_ij the mean of both ends. "local": it follows the spacing alone. "global": one for all points, as in
-        the paper.
+        "adaptive": a smoothing length h per point, as wide as the widest gaps between the points around demand, h_ij
+        the mean of both ends. "local": it follows the spacing alone. "global": one for all points, as in the paper.
     neighbors : int
-        The smoothing length is measured by the distance to this neighbour.
+        The smoothing length is measured by the distance to this neighbour; "adaptive" ones change as its square root.
     bandwidth_factor : float
         "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on the chosen
         length. The kernel reaches 3 h.
@@ -34,7 +33,7 @@ class LaplacianOptions:
     orient : bool
         Orient normals from the covariance consistently, outwards on closed surfaces, as those from quadrics always are.
     areas : {"fast", "regularized", "constrained", "uniform"}
-        "fast": the unit-integral condition (eq. 6) regularised towards the density areas, with a lower bound.
+        "fast": the unit-integral condition (eq. 6) from the points' Voronoi cells, with their area at large.
         "regularized": eq. (7). "constrained": eq. (8). "uniform": the mean of eq. (7) for every point.
     regularization : float
         rho of eqs. (7) and (8), in coordinates scaled to a root mean square radius of one.

@@ -41,7 +41,7 @@ def figure_1():
             "eq. (7), rho = 1e-8": partial(regularized_areas, matrix, target, 1e-8, products=PRODUCTS),
             "eq. (7), rho = 1e-3": partial(regularized_areas, matrix, target, 1e-3, products=PRODUCTS),
             "eq. (8)": partial(constrained_areas, matrix, target, 1e-3, products=PRODUCTS),
-            "fast, same kernel": partial(fast_areas, matrix, target),
+            "fast, same kernel": partial(fast_areas, matrix, target, cloud.cell_areas),
             "default": partial(core.estimate_areas, points),
         }
         if sampling != "random":

@@ -114,7 +114,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
     matrix = matrix[free][:, free]
     result[free] = solve_symmetric(matrix, load, result[free], 1.0 / matrix.diagonal(), report)
     if laplacian.options.symbol_correction:
-        result[loose] -= SECOND_MOMENT / 8.0 * laplacian.smoothing_lengths[loose] ** 2 * source[loose]
+        result[loose] -= SECOND_MOMENT / 8.0 * laplacian.kernel_widths[loose] ** 2 * source[loose]
     result[loose] += level - _means(laplacian.areas, result, component, loose)
     return result
 

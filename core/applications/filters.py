@@ -280,7 +280,7 @@ def corrected_operator(laplacian, dirichlet=False, raw=False):
     order, root, matrix = symmetric_form(laplacian, laplacian.dirichlet[0] if dirichlet else laplacian.stiffness)
     if raw or not laplacian.options.symbol_correction:
         return order, root, lambda y: matrix @ y
-    squared = (SECOND_MOMENT / 8.0) * laplacian.smoothing_lengths[order, None] ** 2
+    squared = (SECOND_MOMENT / 8.0) * laplacian.kernel_widths[order, None] ** 2
 
     def multiply(y):
         product = matrix @ y

@@ -8,6 +8,7 @@ from ..errors import ComponentError
 from ..options import LaplacianOptions
 from .bandwidth import depth, smoothing_lengths
 from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
+from .cells import measure_cells
 from .components import label_components, move_apart
 from .distances import measure_roughness
 from .nearest import Nearest, find_nearest
@@ -69,6 +70,8 @@ class Cloud:
         How far the points were moved to smooth noise.
     mean_curvature, gaussian_curvature : ndarray, (m,)
         Of local quadrics; the latter is zero where the options do not ask for it.
+    cell_areas : ndarray, (m,)
+        Areas of the points' Voronoi cells.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
     roughness : ndarray, (m,)
@@ -89,6 +92,7 @@ class Cloud:
     moved: np.ndarray
     mean_curvature: np.ndarray
     gaussian_curvature: np.ndarray
+    cell_areas: np.ndarray
     spacing: np.ndarray
     roughness: np.ndarray
     boundary: Boundary
@@ -136,10 +140,9 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     boundary = locate_boundary(sample, oriented, options.boundary == "auto", boundary, boundary_distance)
 
     report("Neighbors", 0.2)
-    deepest = depth(nearest, boundary.distance)
-    lengths = smoothing_lengths(
-        nearest, options, sample.component, quadrics.max_abs_curvature, boundary.distance, deepest
-    )
+    gaussian = quadrics.gaussian_curvature if options.curvature_correction else np.zeros(len(oriented))
+    cells = measure_cells(nearest, oriented, gaussian, boundary)
+    lengths = smoothing_lengths(nearest, options, sample.component, cells.reach)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
     own = final_normals(nearest, pairs, given, oriented, options)
 
@@ -153,7 +156,8 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         normals=own,
         moved=sample.moved,
         mean_curvature=0.5 * side * np.trace(quadrics.shape_operator, axis1=1, axis2=2),
-        gaussian_curvature=quadrics.gaussian_curvature if options.curvature_correction else np.zeros(count),
+        gaussian_curvature=gaussian,
+        cell_areas=cells.areas,
         spacing=nearest.spacing,
         # What sticks out is noise where there is any, and shape where not.
         roughness=np.zeros(count)
@@ -166,7 +170,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
             duplicates=len(points) - len(scaled.points),
             left_out=len(scaled.points) - len(own),
             noise=noise if options.projection == "auto" else 0.0,
-            narrow=np.mean(lengths > _NARROW * deepest) > _MANY,
+            narrow=np.mean(lengths > _NARROW * depth(nearest, boundary.distance)) > _MANY,
         ),
     )
 

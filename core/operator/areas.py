@@ -1,7 +1,7 @@
 """Area elements from the unit-integral condition of the kernel, eqs. (6) to (8) of the paper."""
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -13,13 +13,14 @@ from ..options import LaplacianOptions
 from .curvature import kernel_integral, uneven
 from .images import image_excess, mirror, own_images
 
-_FLOOR = 0.05  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
+_FLOOR = 0.5  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
 _STEPS = 60, 40, 20, 20, 10, 10  # of the rounds of the fast areas where the kernel matrix is definite
 _INDEFINITE = (  # where it is not: its least eigenvalue, then steps of each round and what eigenvalues it resolves
     (-0.005, ((80, 5e-3), (80, 5e-3), (20, 5e-2))),
     (-0.02, ((80, 1e-2), (80, 1e-2), (20, 5e-2))),
     (-1.0, ((100, 5e-2), (100, 5e-2))),
 )
+_SMOOTH = 12  # means over the kernel after which the share of cells and areas is one of parts, not of points
 _GROWTH = 4.0  # of a squared residual, that only an eigenvalue below the expected least one can cause
 _EVEN = 1e-9  # changes of h, as a share, that are none
 NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
@@ -115,7 +116,25 @@ def solve_areas(cloud, distance, options, report=lambda: None):
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
     if options.curvature_correction:
         target += _gain(matrix, lengths)
-    return SOLVERS[options.areas](matrix, target, cloud.definite, options.regularization)
+    solution = SOLVERS[options.areas](matrix, target, cloud.cell_areas, cloud.definite, options.regularization)
+    if options.areas != "fast":
+        return solution
+    return replace(solution, areas=_like_cells(matrix, solution.areas, cloud.cell_areas))
+
+
+def _like_cells(matrix, areas, cells):
+    """Scale areas, part by part, to those of the Voronoi cells, (m,).
+
+    Around sharp bends, where distances along the surface are not known well enough for the kernel's integral, it asks
+    for too little area. The cells, which are as wide as a spacing and not as a kernel, tell how much there is at large;
+    which of the points has it, the kernel.
+    """
+    mean = 1.0 / (matrix @ areas)
+    ratio = cells / areas
+    for _ in range(_SMOOTH):
+        ratio = mean * (matrix @ (areas * ratio))
+    areas = areas * ratio
+    return areas * (cells.sum() / areas.sum())
 
 
 def _gain(matrix, lengths):
@@ -155,13 +174,13 @@ class KernelMatrix:
         return self._diagonal * values + self._half @ values + self._half.T @ values
 
 
-def fast_areas(matrix, target, definite=True, rho=None):
-    """Solve A v = b by a few projected rounds of polynomials in A, from the density areas v0 = 1 / (A 1).
+def fast_areas(matrix, target, cells, definite=True, rho=None):
+    """Solve A v = b by a few projected rounds of polynomials in A, from the areas c of the Voronoi cells.
 
-    M = V0^(1/2) A V0^(1/2) has its eigenvalues in [0, 1]. Each round adds p(M) times the residual to y in
-    M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue and bounded below it: the
-    smooth part is solved for, and what the kernel cannot see stays near the density areas. Between rounds areas below
-    the floor of 0.05 v0 are put on it, held there, and released when the gradient turns inward; the later rounds, which
+    M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [0, 1]. Each round adds p(M) times the residual
+    to y in M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue and bounded below
+    it: the smooth part is solved for, and what the kernel cannot see stays near the cells. Between rounds areas below
+    the floor of c / 2 are put on it, held there, and released when the gradient turns inward; the later rounds, which
     are shorter, make up for what that changes at large. A fixed number of linear steps, unlike conjugate gradients,
     does not amplify rounding: the result is the same to 1e-10 for any order of the points.
 
@@ -176,18 +195,20 @@ def fast_areas(matrix, target, definite=True, rho=None):
         A, (n, n).
     target : ndarray, (n,)
         b, the integral that the kernel should have at each point (1 on a flat surface).
+    cells : ndarray, (n,)
+        Areas of the Voronoi cells.
     definite : bool
         There is no noise, no pairs were left out, and no images added.
     rho : float, optional
-        Not used: what the kernel cannot see is regularized towards the density areas.
+        Not used: what the kernel cannot see is regularized towards the cells.
 
     Returns
     -------
     AreaSolution
     """
-    density = 1.0 / (matrix @ np.ones(len(target)))
-    root = np.sqrt(density)
-    right, floor = root * target, _FLOOR * root
+    root = np.sqrt(cells / (matrix @ cells))
+    right, start = root * target, cells / root
+    floor = _FLOOR * start
     products = 1
 
     def multiply(y):
@@ -196,7 +217,7 @@ def fast_areas(matrix, target, definite=True, rho=None):
         return root * (matrix @ (root * y))
 
     for least, rounds in _polynomials()[0 if definite else 1 :]:
-        y, held = root, np.zeros(len(target), dtype=bool)
+        y, held = start, np.zeros(len(target), dtype=bool)
         for coefficients in rounds:
             residual = right - multiply(y)
             held &= residual < 0.0

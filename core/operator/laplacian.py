@@ -48,6 +48,9 @@ class LaplaceBeltrami:
         Component of each point, the largest first; -1 for points that were left out.
     smoothing_lengths : ndarray, (n,)
         h of each point [L]; the kernel reaches 3 h.
+    kernel_widths : ndarray, (n,)
+        Smoothing length of the kernel that the balanced weights are like [L], by their fourth moment: what the symbol
+        correction goes by.
     stiffness : csr_array, (n, n)
         Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the Neumann one: no flow
         across.
@@ -72,6 +75,7 @@ class LaplaceBeltrami:
     boundary_direction: np.ndarray
     component: np.ndarray
     smoothing_lengths: np.ndarray
+    kernel_widths: np.ndarray
     stiffness: sparse.csr_array
     neumann_images: sparse.csr_array
     dirichlet_images: sparse.csr_array
@@ -141,13 +145,13 @@ class LaplaceBeltrami:
             raise InvalidPointsError(
                 f"Values have the shape {values.shape}, the operator {len(self.areas)} points. Give one row per point."
             )
-        areas, lengths = self.areas, self.smoothing_lengths
+        areas, widths = self.areas, self.kernel_widths
         if values.ndim == 2:
-            areas, lengths = areas[:, None], lengths[:, None]
+            areas, widths = areas[:, None], widths[:, None]
         result = -(self.stiffness @ values) / areas
         if raw or not self.options.symbol_correction:
             return result
-        return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (lengths**2 * result)) / areas
+        return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (widths**2 * result)) / areas
 
     def eigenpairs(self, count, raw=False, *, dirichlet=False, progress=None):
         """Compute the lowest eigenpairs of the negated operator, eq. (12).
@@ -303,7 +307,7 @@ def build_laplacian(
     report("Operator", 0.8)
     if not options.curvature_correction:
         distance = projected_distance(pairs, cloud.normals)
-    stiffness, neumann, dirichlet = assemble_stiffness(
+    assembled = assemble_stiffness(
         cloud, distance, solution.areas, options.curvature_correction, lambda: report("Operator", 0.8)
     )
     return LaplaceBeltrami(
@@ -319,9 +323,10 @@ def build_laplacian(
         boundary_direction=scaled.scatter(cloud.boundary.outward[:, 0], 0.0),
         component=scaled.scatter(cloud.component, -1),
         smoothing_lengths=scaled.scatter(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
-        stiffness=stiffness,
-        neumann_images=neumann,
-        dirichlet_images=dirichlet,
+        kernel_widths=scaled.scatter(assembled.widths * scaled.scale, pairs.lengths.mean() * scaled.scale),
+        stiffness=assembled.matrix,
+        neumann_images=assembled.neumann_images,
+        dirichlet_images=assembled.dirichlet_images,
         options=options,
         notices=notices,
     )

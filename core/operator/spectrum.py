@@ -165,7 +165,7 @@ def correct_eigenvalues(laplacian, values, vectors):
     UnresolvedModesError
         Some modes lie beyond the resolved range.
     """
-    squared = (laplacian.areas * laplacian.smoothing_lengths**2) @ vectors**2
+    squared = (laplacian.areas * laplacian.kernel_widths**2) @ vectors**2
     corrected = inverse_symbol(values * squared) ** 2 / squared
     if not np.isfinite(corrected).all():
         resolved = int(np.argmin(np.isfinite(corrected)))

@@ -1,11 +1,11 @@
 """Assemble the stiffness matrix, eq. (10) of the paper."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
-from ..kernel import pair_kernel
+from ..kernel import SECOND_MOMENT, pair_kernel
 from .curvature import weight_factor
 from .images import mirror, own_images
 from .weights import balance_weights
@@ -14,6 +14,32 @@ _NEUMANN, _DIRICHLET = (
     2.0,
     2.0 / 3.0,
 )  # growth of the images' weights over that of their areas next to a curved boundary
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """The weak form of the operator, and what is known of its weights.
+
+    Attributes
+    ----------
+    matrix : csr_array, (n, n)
+        Symmetric, rows sum to zero, columns sorted; without units, so the same in any scale.
+    neumann_images, dirichlet_images : csr_array, (n, n)
+        Symmetric weights of the images in one boundary, those of points in their own image on the diagonal: the part of
+        the stiffness that is theirs, and what takes its place for fixed values at the boundary. (An image of an image,
+        across a corner, has the point's value either way.)
+    residual : ndarray, (m,)
+        What the moments of the weights around each distinct point are off by, relatively; zero where they are not
+        balanced.
+    widths : ndarray, (m,)
+        Smoothing length of the kernel whose fourth moment the weights have; h where they are not balanced.
+    """
+
+    matrix: sparse.csr_array
+    neumann_images: sparse.csr_array
+    dirichlet_images: sparse.csr_array
+    residual: np.ndarray
+    widths: np.ndarray
 
 
 def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: None):
@@ -37,12 +63,7 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
 
     Returns
     -------
-    stiffness : csr_array, (n, n)
-        Symmetric, rows sum to zero, columns sorted; without units, so the same in any scale.
-    neumann_images, dirichlet_images : csr_array, (n, n)
-        Symmetric weights of the images in one boundary, those of points in their own image on the diagonal: the part of
-        the stiffness that is theirs, and what takes its place for fixed values at the boundary. (An image of an image,
-        across a corner, has the point's value either way.)
+    Stiffness
 
     Notes
     -----
@@ -58,8 +79,11 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     own_scale = factor / pairs.lengths**4 * areas**2
     # Weights of pairs, and of points with themselves, without images; then those of the images in one boundary.
     plain = pair_kernel(distance / lengths) * scale, pair_kernel(0.0) * own_scale
+    residual, widths = np.zeros(len(areas)), pairs.lengths
     if balanced:
-        plain = plain[0] * balance_weights(cloud, distance, plain[0], areas, report), plain[1]
+        balance = balance_weights(cloud, distance, plain[0], areas, report)
+        plain = plain[0] * balance.factor, plain[1]
+        residual, widths = balance.residual, _widths(cloud, distance, plain[0], areas)
     neumann, dirichlet = (tuple(np.zeros_like(part) for part in plain) for _ in range(2))
     for part, images, h, units in (
         (0, mirror(pairs, distance, cloud.boundary), lengths, scale),
@@ -74,11 +98,20 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
         plain[part][rows] += (1.0 + _NEUMANN * (larger - 1.0)) * pair_kernel(image / h[rows]) * units[rows]
     weights = _for_callers_points(cloud, plain[0] + neumann[0], plain[1] + neumann[1])
     stiffness = (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
-    if not neumann[1].any():
-        return stiffness, sparse.csr_array(stiffness.shape), sparse.csr_array(stiffness.shape)
-    known = neumann[0] > 0.0
-    cloud = replace(cloud, pairs=pairs.keep(known))
-    return stiffness, *(_for_callers_points(cloud, images[0][known], images[1]) for images in (neumann, dirichlet))
+    images = [sparse.csr_array(stiffness.shape)] * 2
+    if neumann[1].any():
+        known = neumann[0] > 0.0
+        cloud = replace(cloud, pairs=pairs.keep(known))
+        images = [_for_callers_points(cloud, part[0][known], part[1]) for part in (neumann, dirichlet)]
+    return Stiffness(stiffness, *images, residual, widths)
+
+
+def _widths(cloud, distance, weights, areas):
+    """Return the smoothing length of the kernel whose fourth moment, 8 mu2 h^2 of the area, the weights have, (m,)."""
+    pairs = cloud.pairs
+    fourth = pairs.half(weights * distance**4)
+    width = np.sqrt((fourth.sum(axis=0) + fourth.sum(axis=1)) / (8.0 * SECOND_MOMENT * areas))
+    return np.where(cloud.boundary.reached(pairs.lengths), pairs.lengths, width)
 
 
 def _for_callers_points(cloud, weights, own):

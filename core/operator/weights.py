@@ -1,15 +1,35 @@
-"""Moments of the pair weights: those of the kernel make the operator right at every point, for slopes and bends."""
+"""Pair weights of maximum entropy: as close to the kernel's as its own moments around every point allow."""
+
+from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from ..geometry import frames
 from ..kernel import SECOND_MOMENT
 from .curvature import second_moment, uneven
 
-_ROUNDS = 4
-_BLOCK = 1 << 16  # pairs, at least, worked on at one time, so that their temporaries stay in the cache
-_LARGEST = 0.1  # most that each term may change a weight
+_ROUNDS = 12  # of the solver, at most
+_ENOUGH = 2e-4  # root mean square of what the moments are off by, relatively, at which it stops
+_MEMORY = 5  # earlier rounds that a step is extrapolated from
+_RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the terms apart
+_LARGEST = 3.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
+_TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Balanced weights and how well their moments are met.
+
+    Attributes
+    ----------
+    factor : ndarray, (p,)
+        By which each pair's weight is multiplied, positive.
+    residual : ndarray, (m,)
+        What the moments of each point are off by, relatively; zero next to boundaries, where they are not balanced.
+    """
+
+    factor: np.ndarray
+    residual: np.ndarray
 
 
 def balance_weights(cloud, distance, weights, areas, report=lambda: None):
@@ -17,13 +37,15 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
 
     For the operator to be right on every function that is quadratic along the surface, the weights of a point i must
     have no first moment, ``sum_j w_ij u_ij = 0``, and the second moment ``sum_j w_ij u_ij u_ij^T = 2 v_i m_i I``, where
-    u_ij is the way to j along the surface as i sees it and m_i = 1 up to curvature. Areas from the unit-integral
-    condition leave errors of both, as the sum over the points is not quite an integral. A pair takes the factor
-    ``1 + (p_i(u_ij) + p_j(u_ji)) / 2``, with a p_i of each point: a constant, a linear and a traceless quadratic term.
-    That keeps the weights symmetric, and, as the terms are bounded, positive.
+    u_ij is the way to j along the surface as i sees it and m_i = 1 up to curvature. Of all symmetric positive weights
+    with these moments those are taken that are closest to the kernel's own in relative entropy (as in local
+    maximum-entropy approximation; Arroyo and Ortiz 2006): ``w_ij exp((p_i(u_ij) + p_j(u_ji)) / 2)`` with a quadratic
+    polynomial p_i without a constant for each point. Its coefficients solve a convex problem, whose gradient is what
+    the moments are off by.
 
-    A few steps of Jacobi's iteration find them. They take away what changes from point to point, which is what is
-    wrong, and leave alone linear terms that change slowly, which cancel between the two ends of a pair.
+    It is solved by Newton's method point by point, the other ends of the pairs held, and Anderson's extrapolation from
+    the last rounds. Where a few points lie in a row, or on one side, no weights have these moments: the residual says
+    so.
 
     Parameters
     ----------
@@ -40,28 +62,39 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
 
     Returns
     -------
-    ndarray, (p,)
+    Balance
     """
-    pairs = cloud.pairs
-    lengths = pairs.lengths
+    lengths = cloud.pairs.lengths
     free = ~cloud.boundary.reached(lengths)
-    blocks = list(_Block.of(cloud, distance, weights, report))
-    moment = 4.0 * areas * _trace(cloud, weights, areas)
-    # Terms of every point: constant, and the linear and quadratic one as complex numbers in the point's own frame.
-    constant = np.zeros(len(areas))
-    linear, quadratic = (np.zeros(len(areas), dtype=complex) for _ in range(2))
-    for _ in range(_ROUNDS):
-        trace, slope, traceless = (np.zeros(len(areas), dtype=kind) for kind in (float, complex, complex))
-        for block in blocks:
-            report()
-            block.add_moments(constant, linear, quadratic, trace, slope, traceless)
-        share = np.where(free, 1.0 / moment, 0.0)
-        constant = np.clip(constant + (1.0 - trace * share) * free, -_LARGEST, _LARGEST)
-        linear = _bounded(linear - 4.0 * slope * lengths * share)
-        quadratic = _bounded(quadratic - 2.0 * traceless * share)
-    result = np.empty(len(distance))
-    for block in blocks:
-        result[block.rows] = block.factor(constant, linear, quadratic)
+    moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
+    inverse = np.linalg.inv(moments.curvature() + _RIDGE * np.eye(_TERMS))
+    inverse[~free] = 0.0
+    goal = np.zeros((len(areas), _TERMS))
+    goal[:, 0] = 1.0
+    terms, earlier = np.zeros_like(goal), []
+    for step in range(_ROUNDS + 1):
+        missing = goal - moments.of(terms)
+        missing[~free] = 0.0
+        residual = np.linalg.norm(missing, axis=1)
+        if step == _ROUNDS or np.sqrt(np.mean(residual**2)) < _ENOUGH:
+            break
+        change = np.einsum("iab,ib->ia", inverse, missing - _RIDGE * terms)
+        earlier = [*earlier[-_MEMORY:], (terms, change)]
+        terms = _extrapolate(earlier)
+    return Balance(moments.factor(terms), residual)
+
+
+def _extrapolate(earlier):
+    """Return the next iterate of a fixed-point iteration from earlier ones and their changes (Anderson 1965)."""
+    terms, change = earlier[-1]
+    result = terms + change
+    if len(earlier) > 1:
+        slopes = [(before[1] - after[1]).ravel() for before, after in zip(earlier, earlier[1:], strict=False)]
+        products = np.array([[left @ right for right in slopes] for left in slopes])
+        products += 1e-12 * np.trace(products) * np.eye(len(slopes))
+        share = np.linalg.solve(products, [slope @ change.ravel() for slope in slopes])
+        for (before, after), part in zip(zip(earlier, earlier[1:], strict=False), share, strict=True):
+            result = result - part * ((before[0] + before[1]) - (after[0] + after[1]))
     return result
 
 
@@ -78,72 +111,61 @@ def _trace(cloud, weights, areas):
     return second_moment(lengths, cloud.gaussian_curvature) * (1.0 + uneven(gain))
 
 
-def _bounded(terms):
-    return terms * (_LARGEST / np.maximum(np.abs(terms), _LARGEST))
+class _Moments:
+    """The moments of weights around every point, in units of those that the kernel has."""
 
-
-class _Block:
-    """The pairs of some points in a row."""
-
-    @classmethod
-    def of(cls, cloud, distance, weights, report):
-        """Yield all pairs, block by block."""
-        pairs = cloud.pairs
-        start = pairs.half(weights).indptr
-        tangents = np.moveaxis(frames(cloud.normals)[:, :, 1:], 2, 0)
-        # Coordinate by coordinate, which is faster than rows of three.
-        vectors = [np.ascontiguousarray(rows.T) for rows in (pairs.points, cloud.normals, *tangents)]
-        cuts = np.searchsorted(start, np.arange(0, start[-1], max(_BLOCK, len(start))))
-        for low, high in zip(cuts, [*cuts[1:], len(start) - 1], strict=True):
-            report()
-            yield cls(cloud, distance, weights, start[low : high + 1], slice(low, high), *vectors)
-
-    def __init__(self, cloud, distance, weights, start, points, places, normals, *tangents):
-        pairs, self.points = cloud.pairs, points
-        self.rows = slice(start[0], start[-1])
-        self.first, self.second = i, j = pairs.first[self.rows], pairs.second[self.rows]
-        self.start = start - start[0]
-        self.distance = distance[self.rows]
-        self.reach = self.distance / (0.5 * (pairs.lengths[i] + pairs.lengths[j]))
-        self.weights = weights[self.rows]
+    def __init__(self, cloud, distance, weights, unit, report):
+        pairs, normals = cloud.pairs, cloud.normals
+        self._pairs, self._weights, self._unit, self._report = pairs, weights, unit, report
+        self._ends = pairs.first, pairs.second
+        i, j = self._ends
+        places = np.ascontiguousarray(pairs.points.T)
+        tangents = np.moveaxis(frames(normals)[:, :, 1:], 2, 0)
+        left, right = ([values[ends] for values in np.ascontiguousarray(normals.T)] for ends in (i, j))
         chord = [values[j] - values[i] for values in places]
-        left, right = ([values[ends] for values in normals] for ends in (i, j))
         side = np.where(_dot(left, right) < 0.0, -1.0, 1.0)
         # How far the geodesic bends away from the chord, to third order, within the tangent plane.
         turn = (side * _dot(chord, right) - _dot(chord, left)) / 6.0
-        self.here = _direction([d + side * turn * n for d, n in zip(chord, right, strict=True)], tangents, i)
-        self.there = _direction([turn * n - d for d, n in zip(chord, left, strict=True)], tangents, j)
+        ways = (
+            [d + side * turn * n for d, n in zip(chord, right, strict=True)],
+            [turn * n - d for d, n in zip(chord, left, strict=True)],
+        )
+        self._basis = []
+        for ends, way in zip(self._ends, ways, strict=True):
+            report()
+            x, y = (_dot(way, [values[ends] for values in np.ascontiguousarray(axes.T)]) for axes in tangents)
+            size = distance / (np.maximum(np.sqrt(x * x + y * y), 1e-300) * pairs.lengths[ends])
+            x, y = x * size, y * size
+            self._basis.append((x * x + y * y, x, y, x * x - y * y, 2.0 * x * y))
 
-    def factor(self, constant, linear, quadratic):
-        """Return the factor of each pair's weight."""
-        result = np.ones(len(self.first))
-        for ends, direction in ((self.first, self.here), (self.second, self.there)):
-            terms = linear[ends].conj() * self.reach + quadratic[ends].conj() * direction
-            result += 0.5 * (constant[ends] + terms.real * direction.real - terms.imag * direction.imag)
+    def factor(self, terms):
+        """Return the factor of each pair's weight, (p,)."""
+        power = np.zeros(len(self._weights))
+        for ends, basis in zip(self._ends, self._basis, strict=True):
+            for column, values in enumerate(basis):
+                power += np.ascontiguousarray(terms[:, column])[ends] * values
+        return np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST, out=power), out=power)
+
+    def of(self, terms):
+        """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
+        weights = self._weights * self.factor(terms)
+        return np.stack([self._sum(*(weights * basis[k] for basis in self._basis)) for k in range(_TERMS)], axis=1)
+
+    def curvature(self):
+        """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
+        result = np.empty((len(self._unit), _TERMS, _TERMS))
+        weighted = [[self._weights * values for values in basis] for basis in self._basis]
+        for a in range(_TERMS):
+            for b in range(a + 1):
+                parts = (left[a] * right[b] for left, right in zip(weighted, self._basis, strict=True))
+                result[:, a, b] = result[:, b, a] = self._sum(*parts)
         return result
 
-    def add_moments(self, constant, linear, quadratic, trace, slope, traceless):
-        """Add the first moment of the weights, and the trace and the rest of the second, at both ends of each pair."""
-        lever = self.weights * self.factor(constant, linear, quadratic) * self.distance
-        moment = lever * self.distance
-        shape = len(self.start) - 1, len(trace)
-        for total, here, there in (
-            (trace, moment, moment),
-            (slope, lever * self.here, lever * self.there),
-            (traceless, moment * self.here**2, moment * self.there**2),
-        ):
-            total[self.points] += sparse.csr_array((here, self.second, self.start), shape=shape).sum(axis=1)
-            total += sparse.csr_array((there, self.second, self.start), shape=shape).sum(axis=0)
+    def _sum(self, here, there):
+        """Sum quantities of pairs, as their first and their second point see them, at both ends, in the unit."""
+        self._report()
+        return (self._pairs.half(here).sum(axis=1) + self._pairs.half(there).sum(axis=0)) / self._unit
 
 
 def _dot(left, right):
     return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
-
-
-def _direction(way, tangents, ends):
-    """Return unit vectors in the tangent planes as complex numbers."""
-    result = np.empty(len(ends), dtype=complex)
-    x, y = (_dot(way, [values[ends] for values in axes]) for axes in tangents)
-    size = np.maximum(np.sqrt(x * x + y * y), 1e-300)
-    result.real, result.imag = x / size, y / size
-    return result

@@ -15,9 +15,7 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
-from core.geometry.bandwidth import irregularity
 from core.geometry.cloud import read_cloud
-from core.geometry.nearest import find_nearest
 from core.options import LaplacianOptions
 
 
@@ -156,18 +154,3 @@ class TestAny:
     def test_global_ones_are_all_the_same(self):
         assert np.ptp(lengths(uneven_sphere(900), bandwidth="global")) == 0.0
 
-
-class TestIrregularity:
-    @pytest.mark.parametrize(
-        ("points", "least", "most"),
-        [
-            (square_grid(40), 0.0, 0.02),
-            (fibonacci_sphere(3000), 0.0, 0.06),
-            (random_sphere(3000), 0.2, 0.4),
-            (uneven_sphere(3000), 0.2, 0.4),
-        ],
-        ids=["grid", "even", "random", "density jump"],
-    )
-    def test_known_samplings(self, points, least, most):
-        nearest = find_nearest(points)
-        assert least <= irregularity(nearest, nearest.averaging()) <= most
