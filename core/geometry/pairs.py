@@ -1,5 +1,6 @@
 """The neighbour pairs inside the kernel's support."""
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,10 +43,14 @@ class Pairs:
 
     def half(self, values):
         """Return a pair quantity as the (m, m) CSR matrix U that holds each pair once; the whole is U + U.T."""
-        count = len(self.points)
-        start = np.zeros(count + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
-        np.cumsum(np.bincount(self.first, minlength=count), out=start[1:])
-        return sparse.csr_array((values, self.second, start), shape=(count, count))
+        return sparse.csr_array((values, self.second, self._start), shape=(len(self.points),) * 2)
+
+    @functools.cached_property
+    def _start(self):
+        """Where the pairs of each first point start, (m + 1,)."""
+        start = np.zeros(len(self.points) + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
+        np.cumsum(np.bincount(self.first, minlength=len(self.points)), out=start[1:])
+        return start
 
 
 def find_pairs(tree, lengths, report=lambda: None):
