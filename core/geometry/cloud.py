@@ -15,7 +15,7 @@ from .noise import LEAST, STRONG, noise_level, project_points
 from .normals import covariance_normals, orient_normals, unit_normals
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, check_boundary, check_distances, check_points, scale_points
-from .quadrics import Quadrics, fit_quadrics
+from .quadrics import Quadrics, fit_nearest
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
 _NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
@@ -202,7 +202,7 @@ def fit_surface(sample, sheets):
     """
     nearest = sample.nearest
     if not sheets:
-        return Surface(sample, fit_quadrics(nearest.points, nearest.index, nearest.weight))
+        return Surface(sample, fit_nearest(nearest))
     quadrics, nearest = fit_sheets(nearest)
     return Surface(replace(sample, nearest=nearest), quadrics)
 

@@ -174,3 +174,11 @@ class TestOperator:
         distance = np.minimum(points[:, :2], 1.0 - points[:, :2]).min(axis=1)
         assert np.count_nonzero(laplacian.boundary) > 100
         assert np.mean(distance[laplacian.boundary] < 3.0 / 40.0) > 0.95
+
+
+def test_rows_of_a_scan_finer_along_than_across_are_no_curves():
+    # The 20 neighbours of the measure of noise lie in one row, the 40 of the quadrics in several.
+    y, x = np.mgrid[:40, :280]
+    z = 0.05 * np.random.default_rng(0).standard_normal(x.size)
+    laplacian = core.build_laplacian(np.column_stack([x.ravel() / 7.0, y.ravel(), z]))
+    assert laplacian.areas.sum() == pytest.approx(39.0 * 279.0 / 7.0, rel=0.1)
