@@ -13,11 +13,13 @@ from .distances import measure_roughness
 from .nearest import Nearest, find_nearest
 from .noise import LEAST, STRONG, noise_level, project_points
 from .normals import covariance_normals, orient_normals, unit_normals
+from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, check_boundary, check_distances, check_points, scale_points
 from .quadrics import Quadrics, fit_nearest
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
+_ROUNDS = 8  # of leaving out outliers; the first finds most of them, each other one what these had hidden
 _NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
 
 
@@ -123,7 +125,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     points = check_points(points)
     needed = options.neighbors + 1
     scaled = scale_points(points, needed)
-    sample = divide_components(scaled, needed)
+    sample = divide_components(leave_outliers(scaled, needed), needed)
     surface = fit_surface(sample, options.sheets)
     noise = measure_noise(surface)
     surface = remove_noise(surface, noise, options)
@@ -165,18 +167,48 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         notices=_notices(
             duplicates=len(points) - len(scaled.points),
             left_out=len(scaled.points) - len(own),
+            share=1.0 - len(own) / len(scaled.points),
             noise=noise if options.projection == "auto" else 0.0,
             narrow=np.mean(lengths > _NARROW * deepest) > _MANY,
         ),
     )
 
 
-def divide_components(scaled, needed):
-    """Divide distinct points into components that gaps separate, and leave out those of too few points.
+def leave_outliers(scaled, needed):
+    """Leave out distinct points that do not lie on the surface of their neighbours, as long as there are new ones.
 
     Parameters
     ----------
     scaled : ScaledPoints
+    needed : int
+        How many points must be left.
+
+    Returns
+    -------
+    Sample
+        Of one component.
+
+    Raises
+    ------
+    ComponentError
+        Too few are left.
+    """
+    sample = Sample(scaled, np.zeros(len(scaled.points), dtype=int), find_nearest(scaled.points))
+    for _ in range(_ROUNDS):
+        outliers = find_outliers(sample.nearest)
+        if not outliers.any():
+            break
+        sample = _regroup(sample, np.where(outliers, -1, 0), needed)
+    return sample
+
+
+def divide_components(sample, needed):
+    """Divide points into components that gaps separate, and leave out those of too few points.
+
+    Parameters
+    ----------
+    sample : Sample
+        Of one component.
     needed : int
         How many points must be left.
 
@@ -189,8 +221,7 @@ def divide_components(scaled, needed):
     ComponentError
         Too few are left.
     """
-    whole = Sample(scaled, np.zeros(len(scaled.points), dtype=int), find_nearest(scaled.points))
-    return _regroup(whole, label_components(whole.nearest), needed)
+    return _regroup(sample, label_components(sample.nearest), needed)
 
 
 def fit_surface(sample, sheets):
@@ -315,12 +346,13 @@ def final_normals(nearest, pairs, given, oriented, options):
     return orient_normals(nearest, normals) if options.orient else normals
 
 
-def _notices(duplicates, left_out, noise, narrow):
+def _notices(duplicates, left_out, share, noise, narrow):
     """Say what a user should know of the walk, where there is something to say."""
     texts = {
         f"Points that lie exactly on another one: {duplicates}. They share one area.": duplicates,
         f"Noise of {noise:.2f} of the spacing was smoothed within the operator.": noise >= LEAST,
-        f"Points that lie apart from the rest, left out of the operator: {left_out}.": left_out,
+        f"Points that lie apart from the rest or off the surface, left out of the operator: {left_out}"
+        f" ({100.0 * share:.2g} %).": left_out,
         "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"
         " 10 % and more. Add points.": narrow,
     }

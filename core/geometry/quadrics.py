@@ -128,6 +128,26 @@ def fit_nearest(nearest):
     return fitted
 
 
+def heights_over(quadrics, points, rows, other):
+    """Return how far other points are from the quadrics of some, with a sign, along their normals.
+
+    Parameters
+    ----------
+    quadrics : Quadrics
+        Of m points.
+    points : ndarray, (m, 3)
+    rows, other : ndarray of int
+        The points with the quadrics, and those above them, of shapes that broadcast to (k, views).
+
+    Returns
+    -------
+    ndarray, (k, views)
+    """
+    offset = points[other] - points[rows] - quadrics.height[rows]
+    bend = 0.5 * np.einsum("...a,...ab,...b->...", offset, quadrics.shape_operator[rows], offset)
+    return np.einsum("...a,...a->...", offset, quadrics.normals[rows]) + bend
+
+
 def frames(normals):
     """Return orthonormal frames as columns (normal, and two tangents), (k, 3, 3)."""
     axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
