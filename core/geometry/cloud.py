@@ -11,7 +11,7 @@ from .boundary import Boundary, find_boundary, given_boundary, measure_boundary,
 from .components import label_components, move_apart
 from .distances import measure_roughness
 from .nearest import Nearest, find_nearest
-from .noise import LEAST, STRONG, noise_level, project_points
+from .noise import FILLING, LEAST, LITTLE, MOST, STRONG, noise_level, project_points
 from .normals import covariance_normals, orient_normals, unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
@@ -53,6 +53,11 @@ class Surface:
 
     sample: Sample
     quadrics: Quadrics
+
+    @property
+    def misfit(self):
+        """Median distance of neighbours from their quadric, as a share of the spacing."""
+        return np.median(self.quadrics.misfit / self.sample.nearest.spacing)
 
 
 @dataclass(frozen=True)
@@ -240,8 +245,7 @@ def fit_surface(sample, sheets):
 
 def measure_noise(surface):
     """Return the noise of a surface as a share of the spacing; see `noise_level`."""
-    nearest = surface.sample.nearest
-    return noise_level(nearest.tree, np.median(surface.quadrics.misfit / nearest.spacing))
+    return noise_level(surface.sample.nearest.tree, surface.misfit)
 
 
 def remove_noise(surface, noise, options):
@@ -257,10 +261,18 @@ def remove_noise(surface, noise, options):
         method, rounds = "quadric", 0 if noise < LEAST else 1 if noise <= STRONG else 2
     if method == "off" or not rounds:
         return surface
+    result = _project(surface, method, rounds, options.sheets)
+    if options.projection == "auto" and noise > FILLING:
+        while rounds < MOST and result.misfit > LITTLE:
+            result, rounds = _project(result, method, 1, options.sheets), rounds + 1
+    return result
+
+
+def _project(surface, method, rounds, sheets):
     sample, nearest = surface.sample, surface.sample.nearest
     for _ in range(rounds):
         nearest = find_nearest(project_points(nearest.points, method, sample.component))
-    return fit_surface(replace(sample, nearest=nearest), options.sheets)
+    return fit_surface(replace(sample, nearest=nearest), sheets)
 
 
 def divide_sheets(surface, needed):
@@ -350,7 +362,9 @@ def _notices(duplicates, left_out, share, noise, narrow):
     """Say what a user should know of the walk, where there is something to say."""
     texts = {
         f"Points that lie exactly on another one: {duplicates}. They share one area.": duplicates,
-        f"Noise of {noise:.2f} of the spacing was smoothed within the operator.": noise >= LEAST,
+        f"Noise of {noise:.2f} of the spacing was smoothed within the operator.": LEAST <= noise <= FILLING,
+        "Noise of more than half the spacing was smoothed within the operator, and details with it: areas may be off by"
+        " 10 % and more. Use more exact points.": noise > FILLING,
         f"Points that lie apart from the rest or off the surface, left out of the operator: {left_out}"
         f" ({100.0 * share:.2g} %).": left_out,
         "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"
