@@ -9,9 +9,8 @@ _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
 _AGREEING = 3  # of them that are enough, as on each of the three faces at a corner
 # A point nearer than this share of its own spacing to the surface of a neighbour is on it. The spacing of a point far
 # off is half its distance from the surface, so that the rule holds at any height.
-_OFF = 0.4
-_SCATTERS = 4.0  # standard deviations of a neighbour's own neighbours that are on its surface, too
-_SUSPECT = 0.3  # of the spacing: points less off plain quadrics are sound, which saves looking closer
+_OFF = 0.3
+_SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
 _ROUNDS = 2  # in which the quadrics of witnesses let go of what is off them
 _LET_GO, _FINEST = 3.0, 0.1  # by standard deviations, which are at least that share of the spacing
 _SPARSE = 2.5  # median spacings between points whose witnesses must show a surface that thin
@@ -24,7 +23,7 @@ def find_outliers(nearest):
 
     Twelve neighbours are the witnesses of a point. Each of them describes the surface by a quadric through its own
     neighbours, which lets go of those off it. The point is on the surface where three of these pass by it: nearer than
-    a share of its spacing, or than what the witness' own neighbours scatter. Outliers are no witnesses; nor are, for
+    a share of its spacing and what the witness' own neighbours scatter. Outliers are no witnesses; nor are, for
     sparse points, those whose neighbours fill a volume.
 
     Parameters
@@ -42,7 +41,7 @@ def find_outliers(nearest):
     result = np.zeros(len(spacing), dtype=bool)
     off = _third(_heights(nearest, surface, np.arange(len(spacing))))
     sparse = spacing > _SPARSE * np.median(spacing)
-    suspects = np.flatnonzero((off > _SUSPECT * spacing) | (sparse & (surface.misfit > _SUSPECT * spacing)))
+    suspects = np.flatnonzero((off > _OFF * spacing) | (sparse & (surface.misfit > _OFF * spacing)))
     if not len(suspects):
         return result
     witnesses = _witnesses(nearest, suspects)
@@ -51,7 +50,7 @@ def find_outliers(nearest):
     scatter[rows] = _let_go(nearest, surface, rows)
     scatter = scatter[witnesses]
     height = _heights(nearest, surface, suspects)
-    height /= np.maximum(_OFF * spacing[suspects, None], _SCATTERS * scatter)
+    height /= _OFF * spacing[suspects, None] + _SCATTERS * scatter
     height[sparse[suspects, None] & (scatter > _FILLING * spacing[witnesses])] = np.inf
     found = -1
     while np.count_nonzero(result) > found:
