@@ -12,13 +12,15 @@ from .cells import measure_cells
 from .components import label_components, move_apart
 from .distances import measure_roughness
 from .nearest import Nearest, find_nearest
-from .noise import LEAST, STRONG, noise_level, project_points
+from .noise import FILLING, LEAST, LITTLE, MOST, STRONG, noise_level, project_points
 from .normals import covariance_normals, orient_normals, unit_normals
+from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, check_boundary, check_distances, check_points, scale_points
-from .quadrics import Quadrics, fit_quadrics
+from .quadrics import Quadrics, fit_nearest
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
+_ROUNDS = 8  # of leaving out outliers; the first finds most of them, each other one what these had hidden
 _NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
 
 
@@ -52,6 +54,11 @@ class Surface:
 
     sample: Sample
     quadrics: Quadrics
+
+    @property
+    def misfit(self):
+        """Median distance of neighbours from their quadric, as a share of the spacing."""
+        return np.median(self.quadrics.misfit / self.sample.nearest.spacing)
 
 
 @dataclass(frozen=True)
@@ -127,7 +134,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     points = check_points(points)
     needed = options.neighbors + 1
     scaled = scale_points(points, needed)
-    sample = divide_components(scaled, needed)
+    sample = divide_components(leave_outliers(scaled, needed), needed)
     surface = fit_surface(sample, options.sheets)
     noise = measure_noise(surface)
     surface = remove_noise(surface, noise, options)
@@ -169,18 +176,48 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         notices=_notices(
             duplicates=len(points) - len(scaled.points),
             left_out=len(scaled.points) - len(own),
+            share=1.0 - len(own) / len(scaled.points),
             noise=noise if options.projection == "auto" else 0.0,
             narrow=np.mean(lengths > _NARROW * depth(nearest, boundary.distance)) > _MANY,
         ),
     )
 
 
-def divide_components(scaled, needed):
-    """Divide distinct points into components that gaps separate, and leave out those of too few points.
+def leave_outliers(scaled, needed):
+    """Leave out distinct points that do not lie on the surface of their neighbours, as long as there are new ones.
 
     Parameters
     ----------
     scaled : ScaledPoints
+    needed : int
+        How many points must be left.
+
+    Returns
+    -------
+    Sample
+        Of one component.
+
+    Raises
+    ------
+    ComponentError
+        Too few are left.
+    """
+    sample = Sample(scaled, np.zeros(len(scaled.points), dtype=int), find_nearest(scaled.points))
+    for _ in range(_ROUNDS):
+        outliers = find_outliers(sample.nearest)
+        if not outliers.any():
+            break
+        sample = _regroup(sample, np.where(outliers, -1, 0), needed)
+    return sample
+
+
+def divide_components(sample, needed):
+    """Divide points into components that gaps separate, and leave out those of too few points.
+
+    Parameters
+    ----------
+    sample : Sample
+        Of one component.
     needed : int
         How many points must be left.
 
@@ -193,8 +230,7 @@ def divide_components(scaled, needed):
     ComponentError
         Too few are left.
     """
-    whole = Sample(scaled, np.zeros(len(scaled.points), dtype=int), find_nearest(scaled.points))
-    return _regroup(whole, label_components(whole.nearest), needed)
+    return _regroup(sample, label_components(sample.nearest), needed)
 
 
 def fit_surface(sample, sheets):
@@ -206,15 +242,14 @@ def fit_surface(sample, sheets):
     """
     nearest = sample.nearest
     if not sheets:
-        return Surface(sample, fit_quadrics(nearest.points, nearest.index, nearest.weight))
+        return Surface(sample, fit_nearest(nearest))
     quadrics, nearest = fit_sheets(nearest)
     return Surface(replace(sample, nearest=nearest), quadrics)
 
 
 def measure_noise(surface):
     """Return the noise of a surface as a share of the spacing; see `noise_level`."""
-    nearest = surface.sample.nearest
-    return noise_level(nearest.tree, np.median(surface.quadrics.misfit / nearest.spacing))
+    return noise_level(surface.sample.nearest.tree, surface.misfit)
 
 
 def remove_noise(surface, noise, options):
@@ -230,10 +265,18 @@ def remove_noise(surface, noise, options):
         method, rounds = "quadric", 0 if noise < LEAST else 1 if noise <= STRONG else 2
     if method == "off" or not rounds:
         return surface
+    result = _project(surface, method, rounds, options.sheets)
+    if options.projection == "auto" and noise > FILLING:
+        while rounds < MOST and result.misfit > LITTLE:
+            result, rounds = _project(result, method, 1, options.sheets), rounds + 1
+    return result
+
+
+def _project(surface, method, rounds, sheets):
     sample, nearest = surface.sample, surface.sample.nearest
     for _ in range(rounds):
         nearest = find_nearest(project_points(nearest.points, method, sample.component))
-    return fit_surface(replace(sample, nearest=nearest), options.sheets)
+    return fit_surface(replace(sample, nearest=nearest), sheets)
 
 
 def divide_sheets(surface, needed):
@@ -319,12 +362,15 @@ def final_normals(nearest, pairs, given, oriented, options):
     return orient_normals(nearest, normals) if options.orient else normals
 
 
-def _notices(duplicates, left_out, noise, narrow):
+def _notices(duplicates, left_out, share, noise, narrow):
     """Say what a user should know of the walk, where there is something to say."""
     texts = {
         f"Points that lie exactly on another one: {duplicates}. They share one area.": duplicates,
-        f"Noise of {noise:.2f} of the spacing was smoothed within the operator.": noise >= LEAST,
-        f"Points that lie apart from the rest, left out of the operator: {left_out}.": left_out,
+        f"Noise of {noise:.2f} of the spacing was smoothed within the operator.": LEAST <= noise <= FILLING,
+        "Noise of more than half the spacing was smoothed within the operator, and details with it: areas may be off by"
+        " 10 % and more. Use more exact points.": noise > FILLING,
+        f"Points that lie apart from the rest or off the surface, left out of the operator: {left_out}"
+        f" ({100.0 * share:.2g} %).": left_out,
         "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"
         " 10 % and more. Add points.": narrow,
     }

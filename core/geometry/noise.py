@@ -12,6 +12,9 @@ _GROWTH = 1.7  # noise misses both alike; shape misses the wide fit more
 _NONE = 5e-4  # misfit, as a share of the spacing, that is no noise
 LEAST = 0.02  # noise below this share of the spacing is left alone
 STRONG = 0.25  # noise above this share is smoothed twice
+FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would: it is smoothed until little is left
+LITTLE = 0.07  # misfit, as a share of the spacing, that is little
+MOST = 6  # rounds of smoothing
 _NEIGHBORS = 90  # of the fit that points are projected on
 
 
@@ -30,7 +33,7 @@ def noise_level(tree, misfit):
     float
         Median, over a sample of the points, of the misfit of a quadric through 20 neighbours, in units of the spacing;
         zero where it is next to nothing, or where a quadric through 60 neighbours fits so much worse that it is
-        shape, not noise, that it misses.
+        shape, not noise, that it misses. No shape is missed by as much as `FILLING`, on which both fits fail alike.
     """
     rows = np.arange(0, tree.n, max(1, tree.n // _SAMPLE))
     if misfit < _NONE or tree.n <= _MANY:
@@ -41,7 +44,8 @@ def noise_level(tree, misfit):
         np.median(fit_quadrics(tree.data, index[:, :count], fading_weights(distance[:, :count]), rows).misfit / spacing)
         for count in (_FEW + 1, _MANY + 1)
     )
-    return float(min(few, misfit)) if many < _GROWTH * few else 0.0
+    level = float(min(few, misfit))
+    return level if many < _GROWTH * few or level > FILLING else 0.0
 
 
 def project_points(points, method, component=None):

@@ -1,12 +1,14 @@
 """What the cloud tells about the surface around each point: normal and curvature, from local quadrics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from ..errors import NotASurfaceError
 
 _BLOCK = 1 << 13  # points fitted at one time
+_CURVE = 5e-3  # variance across over that along, of neighbours on a curve
+_CURVES = 0.01  # share of the points around which they may be
 _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie on a conic
 
 
@@ -29,6 +31,8 @@ class Quadrics:
         surface bends away from the normal.
     misfit : ndarray, (m,)
         Root mean square distance of the neighbours from the quadric [L].
+    curved : ndarray, (m,) bool
+        The neighbours lie along a curve, so that they tell no normal.
     """
 
     normals: np.ndarray
@@ -37,6 +41,12 @@ class Quadrics:
     height: np.ndarray
     shape_operator: np.ndarray
     misfit: np.ndarray
+    curved: np.ndarray
+
+    def put(self, rows, others):
+        """Put the quadrics of others, of k points, in the place of those of some rows, (k,) int."""
+        for quantity in fields(self):
+            getattr(self, quantity.name)[rows] = getattr(others, quantity.name)
 
 
 def fit_quadrics(points, index, weight, rows=None, normals=None):
@@ -59,16 +69,13 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
     -------
     Quadrics
         Of the k points. The signs of the normals are arbitrary.
-
-    Raises
-    ------
-    NotASurfaceError
-        The points of many neighbourhoods lie along a curve.
     """
     rows = np.arange(len(points)) if rows is None else rows
     count = len(rows)
-    fitted = Quadrics(*(np.empty(shape) for shape in ((count, 3), count, count, (count, 3), (count, 3, 3), count)))
-    curves = 0
+    fitted = Quadrics(
+        *(np.empty(shape) for shape in ((count, 3), count, count, (count, 3), (count, 3, 3), count)),
+        curved=np.zeros(count, dtype=bool),
+    )
     for start in range(0, count, _BLOCK):
         block = slice(start, start + _BLOCK)
         offset = points[index[block]] - points[rows[block], None]
@@ -77,7 +84,7 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
         covariance = np.swapaxes(share[:, :, None] * centered, 1, 2) @ centered
         if normals is None:
             variance, frame = np.linalg.eigh(covariance)
-            curves += np.count_nonzero(variance[:, 1] < 5e-3 * variance[:, 2])
+            fitted.curved[block] = variance[:, 1] < _CURVE * variance[:, 2]
         else:
             frame = frames(normals[block])
         unit = 3.0 * np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))  # makes the equations well scaled
@@ -100,12 +107,45 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
         fitted.shape_operator[block] = (tangents @ form @ np.swapaxes(tangents, 1, 2)) / unit[:, None, None]
         fitted.height[block] = (fit[:, 0] * unit)[:, None] * frame[:, :, 0]
         fitted.misfit[block] = np.sqrt((share * misfit).sum(axis=1)) * unit
-    if curves > 0.01 * count:
+    return fitted
+
+
+def fit_nearest(nearest):
+    """Fit a quadric around every point to its nearest neighbours, on which all that is known of the surface rests.
+
+    Raises
+    ------
+    NotASurfaceError
+        The points of many neighbourhoods lie along a curve.
+    """
+    fitted = fit_quadrics(nearest.points, nearest.index, nearest.weight)
+    curves, count = np.count_nonzero(fitted.curved), len(fitted.curved)
+    if curves > _CURVES * count:
         raise NotASurfaceError(
             f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane."
             " Use points of a surface."
         )
     return fitted
+
+
+def heights_over(quadrics, points, rows, other):
+    """Return how far other points are from the quadrics of some, with a sign, along their normals.
+
+    Parameters
+    ----------
+    quadrics : Quadrics
+        Of m points.
+    points : ndarray, (m, 3)
+    rows, other : ndarray of int
+        The points with the quadrics, and those above them, of shapes that broadcast to (k, views).
+
+    Returns
+    -------
+    ndarray, (k, views)
+    """
+    offset = points[other] - points[rows] - quadrics.height[rows]
+    bend = 0.5 * np.einsum("...a,...ab,...b->...", offset, quadrics.shape_operator[rows], offset)
+    return np.einsum("...a,...a->...", offset, quadrics.normals[rows]) + bend
 
 
 def frames(normals):

@@ -1,14 +1,12 @@
 """Keep close sheets of a surface apart: which neighbours lie on the same sheet, told by their normals."""
 
-from dataclasses import fields
-
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from .components import SMALLEST, label_connected, number_by_size
 from .distances import pair_heights
 from .normals import NEIGHBORS, mirrored_cosine, near_edges
-from .quadrics import fit_quadrics
+from .quadrics import fit_nearest, fit_quadrics
 
 _CLOSE = 0.6  # sheets nearer than this many spacings are taken as one
 LEANING = 0.1  # what normals may be off by, as a share of the distance
@@ -98,7 +96,7 @@ def fit_sheets(nearest):
         With the neighbours on other sheets at weight zero.
     """
     points, index = nearest.points, nearest.index
-    surface = fit_quadrics(points, index, nearest.weight)
+    surface = fit_nearest(nearest)
     spacing = nearest.spacing
     mixed = np.flatnonzero(surface.misfit > _MISFIT * spacing)
     if not len(mixed):
@@ -118,9 +116,7 @@ def fit_sheets(nearest):
     nearest = nearest.keep(kept)
     again = np.flatnonzero(~kept.all(axis=1))
     if len(again):
-        refit = fit_quadrics(points, index[again], nearest.weight[again], again, normals[again])
-        for quantity in fields(surface):
-            getattr(surface, quantity.name)[again] = getattr(refit, quantity.name)
+        surface.put(again, fit_quadrics(points, index[again], nearest.weight[again], again, normals[again]))
     return surface, nearest
 
 

@@ -12,6 +12,7 @@ from core.geometry.cloud import (
     divide_sheets,
     final_normals,
     fit_surface,
+    leave_outliers,
     locate_boundary,
     measure_noise,
     read_cloud,
@@ -24,7 +25,7 @@ NEEDED = 101
 
 
 def sample_of(points):
-    return divide_components(scale_points(points, NEEDED), NEEDED)
+    return divide_components(leave_outliers(scale_points(points, NEEDED), NEEDED), NEEDED)
 
 
 def radii(sample):

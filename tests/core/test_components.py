@@ -178,7 +178,7 @@ class TestIslands:
 class TestLonePoints:
     def test_a_notice_counts_them(self, parts):
         assert [notice for notice in parts.notices if "apart" in notice] == [
-            "Points that lie apart from the rest, left out of the operator: 4."
+            "Points that lie apart from the rest or off the surface, left out of the operator: 4 (0.17 %)."
         ]
 
     def test_neutral_values(self, parts, spectrum):

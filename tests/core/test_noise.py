@@ -162,6 +162,15 @@ class TestOperator:
         assert plane.areas.sum() < 0.99 * plain.areas.sum()
         assert quadric.notices == plane.notices == []
 
+    @pytest.mark.parametrize("level", [1.0, 1.5, 2.0, 3.0])
+    def test_noise_beyond_the_spacing_is_smoothed_and_told(self, level):
+        points = random_sphere(4000)
+        spacing = np.sqrt(4.0 * np.pi / 4000)
+        noise = level * spacing * np.random.default_rng(1).standard_normal((4000, 1))
+        laplacian = core.build_laplacian(points * (1.0 + noise))
+        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=5e-2)
+        assert any("more than half the spacing" in notice for notice in laplacian.notices)
+
     def test_given_normals_are_kept(self, noisy):
         laplacian = core.build_laplacian(noisy, normals=noisy)
         np.testing.assert_allclose(laplacian.normals, noisy / np.linalg.norm(noisy, axis=1)[:, None], atol=1e-12)
@@ -174,3 +183,11 @@ class TestOperator:
         distance = np.minimum(points[:, :2], 1.0 - points[:, :2]).min(axis=1)
         assert np.count_nonzero(laplacian.boundary) > 100
         assert np.mean(distance[laplacian.boundary] < 3.0 / 40.0) > 0.95
+
+
+def test_rows_of_a_scan_finer_along_than_across_are_no_curves():
+    # The 20 neighbours of the measure of noise lie in one row, the 40 of the quadrics in several.
+    y, x = np.mgrid[:40, :280]
+    z = 0.05 * np.random.default_rng(0).standard_normal(x.size)
+    laplacian = core.build_laplacian(np.column_stack([x.ravel() / 7.0, y.ravel(), z]))
+    assert laplacian.areas.sum() == pytest.approx(39.0 * 279.0 / 7.0, rel=0.1)

@@ -1,0 +1,98 @@
+"""Outliers: points that do not lie on the surface of their neighbours."""
+
+import numpy as np
+
+from .quadrics import fit_quadrics, heights_over
+
+# Neighbours asked: near ones, and some further away, where the density may be another.
+_WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
+_AGREEING = 3  # of them that are enough, as on each of the three faces at a corner
+# A point nearer than this share of its own spacing to the surface of a neighbour is on it. The spacing of a point far
+# off is half its distance from the surface, so that the rule holds at any height.
+_OFF = 0.3
+_SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
+_ROUNDS = 2  # in which the quadrics of witnesses let go of what is off them
+_LET_GO, _FINEST = 3.0, 0.1  # by standard deviations, which are at least that share of the spacing
+_SPARSE = 2.5  # median spacings between points whose witnesses must show a surface that thin
+_FILLING = 0.6  # scatter over spacing, where points fill a volume about 1, at noise of half a spacing 0.45
+_BLOCK = 1 << 13  # points looked at at one time
+
+
+def find_outliers(nearest):
+    """Find points that lie off the surfaces of nearly all of their neighbours.
+
+    Twelve neighbours are the witnesses of a point. Each of them describes the surface by a quadric through its own
+    neighbours, which lets go of those off it. The point is on the surface where three of these pass by it: nearer than
+    a share of its spacing and what the witness' own neighbours scatter. Outliers are no witnesses; nor are, for
+    sparse points, those whose neighbours fill a volume.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+
+    Returns
+    -------
+    ndarray, (m,) bool
+        Where there are many, some are only found once others have been left out.
+    """
+    surface = fit_quadrics(nearest.points, nearest.index, nearest.weight)
+    spacing = nearest.spacing
+    result = np.zeros(len(spacing), dtype=bool)
+    off = _third(_heights(nearest, surface, np.arange(len(spacing))))
+    sparse = spacing > _SPARSE * np.median(spacing)
+    suspects = np.flatnonzero((off > _OFF * spacing) | (sparse & (surface.misfit > _OFF * spacing)))
+    if not len(suspects):
+        return result
+    witnesses = _witnesses(nearest, suspects)
+    rows = np.unique(witnesses)
+    scatter = np.zeros(len(spacing))
+    scatter[rows] = _let_go(nearest, surface, rows)
+    scatter = scatter[witnesses]
+    height = _heights(nearest, surface, suspects)
+    height /= _OFF * spacing[suspects, None] + _SCATTERS * scatter
+    height[sparse[suspects, None] & (scatter > _FILLING * spacing[witnesses])] = np.inf
+    found = -1
+    while np.count_nonzero(result) > found:
+        found = np.count_nonzero(result)
+        result[suspects] = _third(np.where(result[witnesses], np.inf, height)) > 1.0
+    return result
+
+
+def _witnesses(nearest, rows):
+    return nearest.index[rows[:, None], np.minimum(_WITNESSES, nearest.index.shape[1] - 1)]
+
+
+def _third(values):
+    return np.partition(values, _AGREEING - 1, axis=1)[:, _AGREEING - 1]
+
+
+def _heights(nearest, surface, rows):
+    """Return how far some points are off the quadrics of their witnesses, (k, 12)."""
+    result = np.empty((len(rows), len(_WITNESSES)))
+    for start in range(0, len(rows), _BLOCK):
+        block = rows[start : start + _BLOCK]
+        witnesses = _witnesses(nearest, block)
+        result[start : start + _BLOCK] = np.abs(heights_over(surface, nearest.points, witnesses, block[:, None]))
+    return result
+
+
+def _let_go(nearest, surface, rows):
+    """Fit the quadrics of some points again without the neighbours off them, and return how these scatter, (k,).
+
+    The scatter is the standard deviation of normal values with the same median; `surface` is changed.
+    """
+    points, spacing = nearest.points, nearest.spacing
+    result = np.empty(len(rows))
+    for start in range(0, len(rows), _BLOCK):
+        block = rows[start : start + _BLOCK]
+        index = nearest.index[block]
+        for _ in range(_ROUNDS):
+            height = np.abs(heights_over(surface, points, block[:, None], index))
+            scatter = np.median(height, axis=1) / 0.6745
+            far = height / (_LET_GO * np.maximum(scatter, _FINEST * spacing[block]))[:, None]
+            weight = nearest.weight[block] * np.maximum(1.0 - far**2, 1e-3) ** 2
+            surface.put(block, fit_quadrics(points, index, weight, block))
+        height = np.abs(heights_over(surface, points, block[:, None], index))
+        result[start : start + _BLOCK] = np.median(height, axis=1) / 0.6745
+    return result
