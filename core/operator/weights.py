@@ -1,5 +1,6 @@
 """Pair weights of maximum entropy: as close to the kernel's as its own moments around every point allow."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,11 +90,11 @@ def _extrapolate(earlier):
     terms, change = earlier[-1]
     result = terms + change
     if len(earlier) > 1:
-        slopes = [(before[1] - after[1]).ravel() for before, after in zip(earlier, earlier[1:], strict=False)]
+        slopes = [(before[1] - after[1]).ravel() for before, after in itertools.pairwise(earlier)]
         products = np.array([[left @ right for right in slopes] for left in slopes])
         products += 1e-12 * np.trace(products) * np.eye(len(slopes))
         share = np.linalg.solve(products, [slope @ change.ravel() for slope in slopes])
-        for (before, after), part in zip(zip(earlier, earlier[1:], strict=False), share, strict=True):
+        for (before, after), part in zip(itertools.pairwise(earlier), share, strict=True):
             result = result - part * ((before[0] + before[1]) - (after[0] + after[1]))
     return result
 

@@ -153,4 +153,3 @@ class TestAny:
 
     def test_global_ones_are_all_the_same(self):
         assert np.ptp(lengths(uneven_sphere(900), bandwidth="global")) == 0.0
-
