@@ -8,8 +8,7 @@ from .distances import arc_squared
 from .quadrics import frames
 from .sheets import on_sheet
 
-_DIRECTIONS = 64  # in which a cell's edge is looked for; two edges that meet between them are cut exactly
-_BLOCK = 1 << 10
+_BLOCK = 1 << 12
 _WIDER = 1, 4, 16  # times the 40 neighbours are looked at where a cell is open: a jump of density has them on one side
 _TURN = 0.15  # most that the turn of two normals counts for an arc's sixth order, as in `distances.arc_length`
 _BENT = (-0.5, 3.0)  # bounds of the Gaussian curvature times the squared reach, where the fit is poor
@@ -36,16 +35,15 @@ class Cells:
 def measure_cells(nearest, normals, gaussian_curvature, boundary):
     """Measure the cell of every point in geodesic polar coordinates around it.
 
-    A neighbour at the distance d cuts the plane at d / 2; of all cuts the nearest counts in each direction. Next to a
-    boundary the cell ends there. On a surface of Gaussian curvature K the cut is a geodesic: in gnomonic coordinates,
-    ``tan(sqrt(K) r) / sqrt(K)``, it is a straight line, and an area is 2 (1 - (1 + K R^2)^(-1/2)) / (K R^2) of what it
-    is in the plane.
+    A neighbour at the distance d cuts the plane at d / 2; next to a boundary the cell ends there. On a surface of
+    Gaussian curvature K the cut is a geodesic: in gnomonic coordinates, ``tan(sqrt(K) r) / sqrt(K)``, it is a straight
+    line, and an area is 2 (1 - (1 + K R^2)^(-1/2)) / (K R^2) of what it is in the plane.
 
     Parameters
     ----------
     nearest : Nearest
         Of m points. Neighbours on other sheets cut nothing. Where the nearest ones leave a cell open, more of them are
-        looked at; cells end halfway to the last one.
+        looked at; cells that stay open end halfway to the last neighbour.
     normals : ndarray, (m, 3)
         Unit normals of any sign.
     gaussian_curvature : ndarray, (m,)
@@ -57,80 +55,107 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
     """
     count = len(normals)
     cells = Cells(np.empty(count), np.empty(count))
-    rows = np.arange(count)
     whole = (nearest.weight[:, :-1] > 0.0).all(axis=1)  # no neighbour was left out: more of them can close a cell
+    rows = np.arange(count)
     for wider in _WIDER:
-        neighbors = min(wider * nearest.index.shape[1], count)
-        open_ended = np.zeros(count, dtype=bool)
-        for start in range(0, len(rows), max(1, _BLOCK // wider)):
-            block = rows[start : start + max(1, _BLOCK // wider)]
-            if wider == 1:
-                seen = nearest.index[block], nearest.distance[block], nearest.weight[block] > 0.0
-            else:
-                distance, index = nearest.tree.query(nearest.points[block], k=neighbors, workers=-1)
-                seen = index, distance, on_sheet(nearest, normals, block, index, distance)[0]
-            frame = frames(normals[block])[:, :, 1:]
-            curvature = gaussian_curvature[block, None]
-            cuts, furthest = _cuts_of_neighbors(nearest.points, normals, block, frame, curvature, *seen)
-            outward = np.einsum("iac,ick->iak", boundary.outward[block], frame)
-            inside = np.maximum(boundary.distance[block], _AT_BOUNDARY * nearest.spacing[block, None])
-            cuts = np.concatenate([cuts, outward / inside[:, :, None]], axis=1)
-            triangles, squared = _corners(cuts, 2.0 / furthest)
-            bent = np.clip(curvature * squared, *_BENT) + 1e-12
-            shrunk = 2.0 * (1.0 - 1.0 / np.sqrt(1.0 + bent)) / bent
-            areas, reach = (triangles * 0.5 * (shrunk + np.roll(shrunk, -1, axis=1))).sum(axis=1), squared.max(axis=1)
-            closed = reach < (0.499 * furthest) ** 2
-            better = closed if wider > 1 else np.full(len(block), True)
-            cells.areas[block[better]], cells.reach[block[better]] = areas[better], np.sqrt(reach[better])
-            open_ended[block] = ~closed & whole[block]
-        rows = np.flatnonzero(open_ended)
-        if not len(rows) or neighbors == count:
-            break
+        still_open = np.zeros(count, dtype=bool)
+        for start in range(0, len(rows), _BLOCK // wider):
+            block = rows[start : start + _BLOCK // wider]
+            cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, block, wider)
+            areas, reach, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
+            known = np.flatnonzero(closed)
+            if wider == 1 and not closed.all():
+                gaps = np.flatnonzero(~closed)
+                capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 2.0 / furthest[gaps])], axis=1)
+                areas[gaps], reach[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
+                known = np.arange(len(block))
+            cells.areas[block[known]], cells.reach[block[known]] = areas[known], reach[known]
+            still_open[block] = ~closed & whole[block]
+        rows = np.flatnonzero(still_open)
     return cells
 
 
-def _cuts_of_neighbors(points, normals, rows, frame, curvature, index, distance, counted):
-    """Return cuts as vectors that point across them, as long as one over their distance, (k, views, 2); and the last.
+def _cuts(nearest, normals, gaussian_curvature, boundary, rows, wider):
+    """Return the cuts of some points, (k, cuts, 2), and how far the last of their neighbours is.
 
-    All but the first of the neighbours, which is the point itself, cut; those that do not count at no distance.
+    A cut is the vector across it, as long as one over its distance; one that does not count is zero.
     """
-    index, counted = index[:, 1:], counted[:, 1:]
-    chord = points[index] - points[rows, None]
+    if wider == 1:
+        index, distance, counted = nearest.index[rows], nearest.distance[rows], nearest.weight[rows] > 0.0
+    else:
+        many = min(wider * nearest.index.shape[1], len(normals))
+        distance, index = nearest.tree.query(nearest.points[rows], k=many, workers=-1)
+        counted = on_sheet(nearest, normals, rows, index, distance)[0]
+    index, distance, counted = index[:, 1:], distance[:, 1:], counted[:, 1:]
+    frame = frames(normals[rows])[:, :, 1:]
+    chord = nearest.points[index] - nearest.points[rows, None]
     own, other = normals[rows], normals[index]
     cosine = np.einsum("ikc,ic->ik", other, own)
     other = np.where(cosine < 0.0, -1.0, 1.0)[:, :, None] * other
     turn = np.einsum("ikc,ikc->ik", chord, other) - np.einsum("ikc,ic->ik", chord, own)
-    squared = arc_squared(distance[:, 1:] ** 2, turn, np.minimum(1.0 - np.abs(cosine), _TURN))
+    squared = arc_squared(distance**2, turn, np.minimum(1.0 - np.abs(cosine), _TURN))
     # The arc leaves the point along the chord, bent away from it by a third of the turn.
     way = (chord + (turn / 6.0)[:, :, None] * other) @ frame
-    arc = np.sqrt(squared)
-    length = 0.5 * arc * (1.0 + np.clip(curvature * squared / 12.0, -0.25, 0.25))
-    size = np.maximum(np.linalg.norm(way, axis=2), 1e-300)
-    return way * (counted / (size * length))[:, :, None], arc[:, -1]
+    length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -0.25, 0.25))
+    cuts = way * (counted / (np.maximum(np.linalg.norm(way, axis=2), 1e-300) * length))[:, :, None]
+    inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])
+    outward = np.einsum("iac,ick->iak", boundary.outward[rows], frame) / inside[:, :, None]
+    return np.concatenate([cuts, outward], axis=1), np.sqrt(squared[:, -1])
 
 
-def _corners(cuts, least):
-    """Return the triangles between the point and a cell's edge, in each direction, and its squared distance there.
+def _caps(cuts, size):
+    """Return cuts of one size opposite to all others, and to the sides of the nearest one: they close any cell."""
+    length = np.linalg.norm(cuts, axis=2)
+    unit = cuts / np.maximum(length, 1e-300)[:, :, None]
+    first = unit[np.arange(len(cuts)), length.argmax(axis=1)]
+    side = np.stack([-first[:, 1], first[:, 0]], axis=1)[:, None]
+    return size[:, None, None] * np.concatenate([-unit, side, -side], axis=1)
 
-    One over the edge's distance is the largest product of a cut with the direction, and at least ``least``.
+
+def _intersect(cuts, gaussian_curvature, furthest):
+    """Return the area of what no cut takes away, how far it reaches, and whether it is closed and no larger, (k,) each.
+
+    Its corners are the edges of the convex hull of the cuts, which is wrapped around the origin from the longest cut
+    on; an edge that ends in the origin is a way out.
     """
-    angle = np.arange(_DIRECTIONS) * (2.0 * np.pi / _DIRECTIONS)
-    step = 2.0 * np.pi / _DIRECTIONS
-    ray = np.stack([np.cos(angle), np.sin(angle)])
-    product = np.swapaxes(cuts, 1, 2).astype(np.float32)
-    product = product[:, :1] * ray[0, :, None].astype(np.float32) + product[:, 1:] * ray[1, :, None].astype(np.float32)
-    nearest = product.argmax(axis=2)
-    here = np.take_along_axis(cuts, nearest[:, :, None], axis=1)
-    there = np.roll(here, -1, axis=1)
-    # Where another cut takes over, the corner lies in the direction in which both are as far.
-    between = np.arctan2(here[:, :, 0] - there[:, :, 0], there[:, :, 1] - here[:, :, 1])
-    between = np.clip(np.mod(between - angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi, 0.0, step)
-    between = np.where(nearest == np.roll(nearest, -1, axis=1), step, between)
+    count = len(cuts)
+    cuts = np.concatenate([cuts, np.zeros((count, 1, 2))], axis=1)
+    first = np.linalg.norm(cuts, axis=2).argmax(axis=1)
+    here = cuts[np.arange(count), first]
+    ahead = np.stack([-here[:, 1], here[:, 0]], axis=1)
+    areas, reach = np.zeros(count), np.zeros(count)
+    closed = np.zeros(count, dtype=bool)
+    start = corner = None
+    rows = np.arange(count)
+    for _ in range(cuts.shape[1] + 1):
+        way = cuts[rows] - here[:, None]
+        length = np.linalg.norm(way, axis=2)
+        along = np.einsum("ikc,ic->ik", way, ahead) / np.where(length > 0.0, length, 1.0)
+        chosen = np.where(length > 0.0, along, -np.inf).argmax(axis=1)
+        every = np.arange(len(rows))
+        there, ahead = cuts[rows, chosen], way[every, chosen] / length[every, chosen, None]
+        across = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+        out = across <= 1e-9 * np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
+        before, corner = corner, np.stack([there[:, 1] - here[:, 1], here[:, 0] - there[:, 0]], axis=1)
+        corner /= np.where(out, 1.0, across)[:, None]
+        reach[rows] = np.maximum(reach[rows], np.where(out, 0.0, np.linalg.norm(corner, axis=1)))
+        if before is None:
+            start = corner
+        else:
+            areas[rows] += _triangles(before, corner, gaussian_curvature[rows])
+        done = ~out & (chosen == first[rows])
+        closed[rows[done]] = True
+        areas[rows[done]] += _triangles(corner[done], start[done], gaussian_curvature[rows[done]])
+        left = ~out & ~done
+        rows, here, ahead, corner, start = (values[left] for values in (rows, there, ahead, corner, start))
+        if not len(rows):
+            break
+    return areas, reach, closed & (reach < furthest)
 
-    def far(cut, turned):
-        direction = angle + turned
-        return np.maximum(cut[:, :, 0] * np.cos(direction) + cut[:, :, 1] * np.sin(direction), least[:, None])
 
-    first, corner, last = far(here, 0.0), far(here, between), far(there, step)
-    triangles = 0.5 * np.sin(between) / (first * corner) + 0.5 * np.sin(step - between) / (corner * last)
-    return triangles, 1.0 / np.minimum(first, corner) ** 2
+def _triangles(corner, other, gaussian_curvature):
+    """Return the areas of triangles with one corner at the point, on a surface of that curvature."""
+    plane = 0.5 * (corner[:, 0] * other[:, 1] - corner[:, 1] * other[:, 0])
+    squared = np.einsum("ic,ic->i", corner, corner) + np.einsum("ic,ic->i", other, corner + other)
+    bent = np.clip(gaussian_curvature * squared / 3.0, *_BENT) + 1e-12  # of the mean squared distance along the edge
+    return plane * 2.0 * (1.0 - 1.0 / np.sqrt(1.0 + bent)) / bent
