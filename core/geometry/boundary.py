@@ -308,7 +308,7 @@ def _parabola(t, e, weight):
 
 
 def given_boundary(nearest, normals, distance):
-    """Take distances to the boundary as they are, and find the boundary's curvature from them.
+    """Take distances to the boundary as they are, and find the boundary's direction and curvature from them.
 
     Parameters
     ----------
@@ -323,7 +323,8 @@ def given_boundary(nearest, normals, distance):
     -------
     Boundary
     """
-    curvature = np.zeros(len(distance))
+    boundary = no_boundary(len(distance))
+    boundary.distance[:, 0] = distance
     known = np.isfinite(distance)
     rows = np.flatnonzero(known & known[nearest.index].all(axis=1))
     for start in range(0, len(rows), _BLOCK):
@@ -331,13 +332,13 @@ def given_boundary(nearest, normals, distance):
         index = nearest.index[block]
         unit = nearest.distance[block, -1]
         offset = (nearest.points[index] - nearest.points[block, None]) / unit[:, None, None]
-        u, v = np.moveaxis((offset @ frames(normals[block]))[:, :, 1:], 2, 0)
+        tangents = frames(normals[block])[:, :, 1:]
+        u, v = np.moveaxis(offset @ tangents, 2, 0)
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
         weighted = np.swapaxes(basis * nearest.weight[block][:, :, None], 1, 2)
         fit = np.linalg.solve(weighted @ basis + 1e-9 * np.eye(6), weighted @ distance[index][:, :, None])[:, :, 0]
         # Of the line at this distance; the boundary's own is the next.
         level = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
-        curvature[block] = level / np.maximum(1.0 + level * distance[block], 0.5)
-    boundary = no_boundary(len(distance))
-    boundary.distance[:, 0], boundary.curvature[:, 0] = distance, curvature
+        boundary.curvature[block, 0] = level / np.maximum(1.0 + level * distance[block], 0.5)
+        boundary.outward[block, 0] = _tangents(-np.einsum("ick,ik->ic", tangents, fit[:, 1:3]), normals[block])
     return replace(boundary, at_boundary=distance < 0.5 * nearest.spacing)

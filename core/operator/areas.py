@@ -119,10 +119,10 @@ def solve_areas(cloud, distance, options, report=lambda: None):
     solution = SOLVERS[options.areas](matrix, target, cloud.cell_areas, cloud.definite, options.regularization)
     if options.areas != "fast":
         return solution
-    return replace(solution, areas=_like_cells(matrix, solution.areas, cloud.cell_areas))
+    return replace(solution, areas=_like_cells(matrix, solution.areas, cloud))
 
 
-def _like_cells(matrix, areas, cells):
+def _like_cells(matrix, areas, cloud):
     """Scale areas, part by part, to those of the Voronoi cells, (m,).
 
     Around sharp bends, where distances along the surface are not known well enough for the kernel's integral, it asks
@@ -130,11 +130,12 @@ def _like_cells(matrix, areas, cells):
     which of the points has it, the kernel.
     """
     mean = 1.0 / (matrix @ areas)
-    ratio = cells / areas
+    ratio = cloud.cell_areas / areas
     for _ in range(_SMOOTH):
         ratio = mean * (matrix @ (areas * ratio))
     areas = areas * ratio
-    return areas * (cells.sum() / areas.sum())
+    total, found = (np.bincount(cloud.component, values) for values in (cloud.cell_areas, areas))
+    return areas * (total / found)[cloud.component]
 
 
 def _gain(matrix, lengths):

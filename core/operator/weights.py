@@ -10,10 +10,11 @@ from ..kernel import SECOND_MOMENT
 from .curvature import second_moment, uneven
 
 _ROUNDS = 12  # of the solver, at most
-_ENOUGH = 2e-4  # root mean square of what the moments are off by, relatively, at which it stops
+_ENOUGH = 1e-3  # root mean square of that over h, which a first moment makes of a slope, at which it stops
 _MEMORY = 5  # earlier rounds that a step is extrapolated from
 _RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the terms apart
 _LARGEST = 3.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
+_SMALLEST = 1e-8  # share of what rounds change that an extrapolation goes by: less would be rounding
 _TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 
 
@@ -77,7 +78,7 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
         missing = goal - moments.of(terms)
         missing[~free] = 0.0
         residual = np.linalg.norm(missing, axis=1)
-        if step == _ROUNDS or np.sqrt(np.mean(residual**2)) < _ENOUGH:
+        if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
         change = np.einsum("iab,ib->ia", inverse, missing - _RIDGE * terms)
         earlier = [*earlier[-_MEMORY:], (terms, change)]
@@ -92,7 +93,7 @@ def _extrapolate(earlier):
     if len(earlier) > 1:
         slopes = [(before[1] - after[1]).ravel() for before, after in itertools.pairwise(earlier)]
         products = np.array([[left @ right for right in slopes] for left in slopes])
-        products += 1e-12 * np.trace(products) * np.eye(len(slopes))
+        products += _SMALLEST * np.trace(products) * np.eye(len(slopes))
         share = np.linalg.solve(products, [slope @ change.ravel() for slope in slopes])
         for (before, after), part in zip(itertools.pairwise(earlier), share, strict=True):
             result = result - part * ((before[0] + before[1]) - (after[0] + after[1]))

@@ -235,7 +235,7 @@ class TestImages:
         cloud = read_cloud(square_grid(40), LaplacianOptions(boundary="off"))
         sums = row_sums(cloud)
         assert sums.min() < 0.4
-        assert sums.max() == pytest.approx(1.0, abs=2e-2)
+        assert sums.max() == pytest.approx(1.0, abs=4e-2)
 
     def test_they_nearly_complete_it_at_curved_boundaries(self, disc_sums):
         sums, excess, near = disc_sums
@@ -244,7 +244,7 @@ class TestImages:
     def test_the_excess_is_what_they_add_there(self, disc_sums):
         sums, excess, near = disc_sums
         error, plain = (np.sqrt(np.mean((sums[near] - target) ** 2)) for target in (1.0 + excess[near], 1.0))
-        assert plain > 2e-3
+        assert plain > 3e-4
         assert error < 0.5 * plain
 
     @pytest.mark.parametrize("wide", [6, 10, 14])

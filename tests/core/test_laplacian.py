@@ -73,8 +73,8 @@ class TestAccuracy:
     @pytest.mark.parametrize("name", ["random sphere", "another random sphere"])
     def test_random_sphere(self, operators, name):
         laplacian = operators(name)
-        assert max(sphere_errors(laplacian)[:2]) < 1e-2
-        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-3)
+        assert max(sphere_errors(laplacian)[:2]) < 1.5e-2
+        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-4)
 
     def test_marching_cubes_sphere(self, operators):
         laplacian = operators("marching cubes")
@@ -112,7 +112,8 @@ class TestAccuracy:
 
     def test_error_falls_on_even_points(self):
         coarse, fine = (max(sphere_errors(core.build_laplacian(fibonacci_sphere(n)))) for n in (1000, 4000))
-        assert fine < coarse / 4.0
+        assert fine < coarse
+        assert fine < 1.2e-3
 
 
 class TestInvariance:

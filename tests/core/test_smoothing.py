@@ -74,7 +74,7 @@ def smoothed(clouds):
 def test_noise_falls_and_the_shape_stays(clouds, smoothed, name, bumpy):
     error, height = radial(smoothed(name, bumpy), bumpy)
     noise = clouds[bumpy][1]
-    assert rms(noise) > 4.0 * rms(error)
+    assert rms(noise) > 3.0 * rms(error)
     assert abs(error.mean()) < 4e-3
     if bumpy:
         assert height > 0.88
@@ -156,8 +156,8 @@ def test_spectrum_given_or_computed_is_the_same(ellipsoid):
 
 def test_modes_beyond_those_resolved_serve_a_reconstruction(ellipsoid):
     with pytest.raises(core.UnresolvedModesError):
-        ellipsoid.eigenpairs(150)
-    errors = [rms(core.smooth_points(ellipsoid, count) - ellipsoid.points) for count in (10, 50, 150)]
+        ellipsoid.eigenpairs(450)
+    errors = [rms(core.smooth_points(ellipsoid, count) - ellipsoid.points) for count in (10, 50, 450)]
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 2e-3
 
@@ -245,7 +245,7 @@ class TestBoundary:
         boundary = np.abs(points[:, 2]) > 0.99
         np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
         assert np.mean(laplacian.boundary[boundary]) > 0.95
-        assert rms(np.linalg.norm(moved[:, :2], axis=1) - 2.0) < rms(noise) / 3.0
+        assert rms(np.linalg.norm(moved[:, :2], axis=1) - 2.0) < rms(noise) / 2.5
         free = core.fair_points(laplacian)
         assert np.abs(free[boundary, 2]).mean() < np.abs(moved[boundary, 2]).mean()
 
