@@ -12,7 +12,6 @@ from benchmarks.samplings import (
     square_random,
     torus_area,
     torus_low_discrepancy,
-    torus_points,
     uneven_sphere,
 )
 from core.geometry.cloud import read_cloud
