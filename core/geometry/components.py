@@ -12,8 +12,9 @@ _REACH = 8
 def label_components(nearest):
     """Number the components of the cloud, which gaps separate.
 
-    Points are joined to their neighbours, all forty where points crowd along lines, except over gaps far wider than the spacing at the nearer end;
-    components of some size are joined over gaps that are no wider than the spacing of the sparser one would let expect.
+    Points are joined to their forty neighbours, as points may crowd along lines, except over gaps far wider than the
+    spacing at the nearer end; components of some size are joined over gaps that are no wider than the spacing of the
+    sparser one would let expect.
 
     Returns
     -------

@@ -240,9 +240,8 @@ class TestWays:
     def rolled(cls):
         """A hairpin of two flat arms that meet in half a turn, its normals, and where along it the points lie."""
         bend = 1.2
-        way = np.concatenate(
-            [np.arange(-20.0, 0.0), np.linspace(0.0, np.pi * bend, 5), np.pi * bend + np.arange(1, 21)]
-        )
+        half = np.pi * bend
+        way = np.concatenate([np.arange(-20.0, 0.0), np.linspace(0.0, half, 5), half + np.arange(1, 21)])
         turn = np.clip(way / bend, 0.0, np.pi)
         straight = np.minimum(way, 0.0) - np.maximum(way - half, 0.0)
         x, z = straight + bend * np.sin(turn), -bend * np.cos(turn)
