@@ -19,6 +19,7 @@ _NEIGHBORS = 30  # looked at around a candidate
 _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 6.0, 0.6  # no point within 0.6 of 6 spacings of the place 6 spacings further out
 _FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
+_BESIDE = 16  # the nearest of them tell what faces elsewhere: on coarse balls more reach around
 _FACING = 0.7  # cosine of its normal and those of neighbours that face elsewhere, at most
 _LINK = 4.0  # spacings between candidates of the same boundary
 _SHORTEST = 16  # candidates of a boundary that is found
@@ -135,6 +136,7 @@ def _bends_away(nearest, oriented, rows):
     """Tell around which points neighbours lie off their sheet or face elsewhere: it goes on there, past an edge."""
     other = nearest.index[rows, 1:_NEIGHBORS]
     beside = np.abs(np.einsum("ikc,ic->ik", oriented[other], oriented[rows])) < _FACING
+    beside[:, _BESIDE:] = False
     beside |= nearest.weight[rows, 1:_NEIGHBORS] <= 0.0
     return np.count_nonzero(beside, axis=1) > _FOLDED
 

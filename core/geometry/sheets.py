@@ -10,8 +10,8 @@ from .components import label_connected, number_by_size
 from .distances import pair_heights
 from .quadrics import fit_quadrics, frames
 
-_CLOSE = 0.6  # sheets nearer than this many spacings share their quadrics
-_GAP = 0.35  # nearer ones are taken as one: no step leads over a wider gap
+_CLOSE = 0.6  # sheets nearer than this many spacings are taken as one
+_GAP = 0.35  # of the spacing: a step along a sheet leads over none that is wider
 LEANING = 0.1  # what normals may be off by, as a share of the distance
 _MISFIT = 0.2  # a quadric that misses its points by more than this share of the spacing may mix two sheets
 _PATIENCE = 0.3  # of the spacing: neighbours of a plane through nearby points count as near it
@@ -21,6 +21,8 @@ _SECTORS = 8  # directions in which a sheet is followed from every point
 _TOUCH = 1.5  # spacings within which points touch
 _AROUND = 1.55  # the way along a sheet over the chord: sqrt(2) across a right angle, 8 % for steps in eight directions
 _TURN = 0.5  # cosine of normals on one smooth sheet, at least: the kernel reaches no further around a bend
+_LEVEL = 0.8  # the same for a step between points that do not touch
+_HOLLOW = 0.5  # turn of two normals towards each other, in radians, that a gap may make
 _SOURCES = 1 << 7  # points from which ways are followed at one time
 
 
@@ -158,7 +160,7 @@ def label_sheets(nearest, normals, component):
     ndarray, (m,) int
         The largest component is 0; points off the surface are -1.
     """
-    sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals)))
+    sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)))
     # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
     touching = nearest.distance <= _TOUCH * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
@@ -174,7 +176,7 @@ def label_sheets(nearest, normals, component):
     return result
 
 
-def sheet_neighbors(nearest, normals):
+def sheet_neighbors(nearest, normals, oriented):
     """Tell which neighbours of every point are the nearest ones on its sheet in one of eight directions, (m, 41) bool.
 
     Unlike a number of nearest neighbours, they lie all around a point where points crowd along lines, too.
@@ -185,7 +187,9 @@ def sheet_neighbors(nearest, normals):
         index = nearest.index[block]
         flat = (nearest.points[index] - nearest.points[block, None]) @ frames(normals[block])[:, :, 1:]
         sector = np.floor(np.arctan2(flat[:, :, 1], flat[:, :, 0]) * (0.5 * _SECTORS / np.pi)) % _SECTORS
-        same = on_sheet(nearest, normals, block, index, nearest.distance[block], close=_GAP)[0]
+        same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=_GAP)
+        # Across an edge only points that touch are next to each other, others may be so across a gap.
+        same &= ((cosine if oriented else np.abs(cosine)) > _LEVEL) | (nearest.distance[block] < _TOUCH * nearest.spacing[block, None])
         same[:, 0] = False
         rows = np.arange(len(block))
         for side in range(_SECTORS):
@@ -231,11 +235,13 @@ def _plainly_on_one_sheet(pairs, oriented, spacing):
     result = np.empty(len(pairs.first), dtype=bool)
     for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, oriented):
         mean = 0.5 * (spacing[pairs.first[block]] + spacing[pairs.second[block]])
-        result[block] = (cosine > _TURN) & same_sheet(left, right, cosine, pairs.distance[block], mean, close=_GAP)
+        level = same_sheet(left, right, cosine, pairs.distance[block], mean)
+        # In a hollow two sheets may face each other across a gap.
+        result[block] = level & (cosine > _TURN) & (right - left > -_HOLLOW * pairs.distance[block])
     return result
 
 
-def step_lengths(nearest, normals):
+def step_lengths(nearest, oriented):
     """Return the lengths of the steps along sheets between next neighbours.
 
     Sharp folds, whose normals join them to nothing, are joined to what is nearest to them.
@@ -244,15 +250,15 @@ def step_lengths(nearest, normals):
     ----------
     nearest : Nearest
         Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals of any sign.
+    oriented : ndarray, (m, 3)
+        Unit normals whose signs agree.
 
     Returns
     -------
     csr_array, (m, m)
         Symmetric; no more parts than the neighbourhoods themselves hang together in.
     """
-    next_to = sheet_neighbors(nearest, normals)
+    next_to = sheet_neighbors(nearest, oriented, True)
     count = len(next_to)
     first = np.repeat(np.arange(count, dtype=np.int32), np.count_nonzero(next_to, axis=1))
     second, length = nearest.index[next_to], nearest.distance[next_to]
