@@ -189,7 +189,9 @@ def sheet_neighbors(nearest, normals, oriented):
         sector = np.floor(np.arctan2(flat[:, :, 1], flat[:, :, 0]) * (0.5 * _SECTORS / np.pi)) % _SECTORS
         same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=_GAP)
         # Across an edge only points that touch are next to each other, others may be so across a gap.
-        same &= ((cosine if oriented else np.abs(cosine)) > _LEVEL) | (nearest.distance[block] < _TOUCH * nearest.spacing[block, None])
+        same &= ((cosine if oriented else np.abs(cosine)) > _LEVEL) | (
+            nearest.distance[block] < _TOUCH * nearest.spacing[block, None]
+        )
         same[:, 0] = False
         rows = np.arange(len(block))
         for side in range(_SECTORS):
