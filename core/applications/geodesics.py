@@ -10,6 +10,7 @@ from ..geometry import as_mask, circle_arc, pair_heights
 from .graph import mean_spacing
 
 _BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
+_SQUARE = 0.1  # cosine of two normals below which they stand at a right angle
 _GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point: the surface is there
 
 
@@ -95,8 +96,10 @@ def _lengths_of_pairs(laplacian):
     for block, chord, left, right, cosine in pair_heights(points, first, second, laplacian.normals):
         i, j = first[block], second[block]
         length = np.linalg.norm(chord, axis=1)
-        turn = np.where(cosine < 0.0, -right, right) - left
-        bend = np.minimum(0.5 * np.abs(turn) / np.maximum(length, 1e-300), 1.0)
+        turn = np.abs(np.where(cosine < 0.0, -right, right) - left)
+        # Which way normals face each other across a right angle is chance: it bends, either way.
+        turn = np.where(np.abs(cosine) < _SQUARE, np.maximum(turn, np.abs(left) + np.abs(right)), turn)
+        bend = np.minimum(0.5 * turn / np.maximum(length, 1e-300), 1.0)
         arcs[block] = circle_arc(length, bend)
         short = length < 0.5 * (laplacian.smoothing_lengths[i] + laplacian.smoothing_lengths[j])
         kept[block] = short | (bend < _BEND)

@@ -18,7 +18,9 @@ _LOPSIDED = 0.15  # mean offset of the neighbours over their mean distance; less
 _NEIGHBORS = 30  # looked at around a candidate
 _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 6.0, 0.6  # no point within 0.6 of 6 spacings of the place 6 spacings further out
-_FOLDED = 2  # neighbours on another sheet that a boundary point may have
+_FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
+_BESIDE = 16  # the nearest of them tell what faces elsewhere: on coarse balls more reach around
+_FACING = 0.7  # cosine of its normal and those of neighbours that face elsewhere, at most
 _LINK = 4.0  # spacings between candidates of the same boundary
 _SHORTEST = 16  # candidates of a boundary that is found
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
@@ -86,7 +88,8 @@ def find_boundary(nearest, oriented):
     """Find the points at which the surface ends.
 
     Candidates are points around which the directions of the neighbours leave a wide gap, and far into which there is
-    nothing. Short rows of candidates are dropped, as chance or as a hole that the kernel spans.
+    nothing. Where neighbours lie off a point's sheet or face elsewhere, the surface does not end but goes on past an
+    edge. Short rows of candidates are dropped, as chance or as a hole that the kernel spans.
 
     Parameters
     ----------
@@ -119,11 +122,7 @@ def find_boundary(nearest, oriented):
     rows = np.concatenate(rows)
     if not len(rows):
         return result
-    # Where the surface folds back on itself both sides end, and go on in each other.
-    other = nearest.index[rows, 1:_NEIGHBORS]
-    behind = np.einsum("ikc,ic->ik", oriented[other], oriented[rows]) < 0.0
-    folded = np.count_nonzero(behind & (nearest.weight[rows, 1:_NEIGHBORS] <= 0.0), axis=1) > _FOLDED
-    rows = rows[~folded]
+    rows = rows[~_bends_away(nearest, oriented, rows)]
     spacing = nearest.spacing[rows]
     probe = points[rows] + _PROBE * spacing[:, None] * outward_directions(nearest, oriented, rows)
     rows = rows[nearest.tree.query(probe, workers=-1)[0] > _EMPTY * _PROBE * spacing]
@@ -131,6 +130,15 @@ def find_boundary(nearest, oriented):
         return result
     result[rows[_row_sizes(points[rows], _LINK * nearest.spacing[rows]) >= _SHORTEST]] = True
     return result
+
+
+def _bends_away(nearest, oriented, rows):
+    """Tell around which points neighbours lie off their sheet or face elsewhere: it goes on there, past an edge."""
+    other = nearest.index[rows, 1:_NEIGHBORS]
+    beside = np.abs(np.einsum("ikc,ic->ik", oriented[other], oriented[rows])) < _FACING
+    beside[:, _BESIDE:] = False
+    beside |= nearest.weight[rows, 1:_NEIGHBORS] <= 0.0
+    return np.count_nonzero(beside, axis=1) > _FOLDED
 
 
 def _row_sizes(points, reach):

@@ -154,7 +154,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     own = final_normals(nearest, pairs, given, oriented, options)
 
     report("Neighbors", 0.4)
-    separated = separate_sheets(pairs, nearest, oriented, quadrics) if options.sheets else pairs
+    separated = separate_sheets(pairs, nearest, oriented) if options.sheets else pairs
     side = np.sign(np.einsum("ij,ij->i", own, quadrics.normals))
     count = len(own)
     return Cloud(

@@ -12,16 +12,17 @@ _REACH = 8
 def label_components(nearest):
     """Number the components of the cloud, which gaps separate.
 
-    Points are joined to their nearest neighbours, except over gaps far wider than the spacing at the nearer end;
-    components of some size are joined over gaps that are no wider than the spacing of the sparser one would let expect.
+    Points are joined to their forty neighbours, as points may crowd along lines, except over gaps far wider than the
+    spacing at the nearer end; components of some size are joined over gaps that are no wider than the spacing of the
+    sparser one would let expect.
 
     Returns
     -------
     ndarray, (m,) int
         The largest component is 0. Those of fewer than 50 points, which get no operator, are -1.
     """
-    index, distance = nearest.index[:, 1 : _REACH + 1], nearest.distance[:, 1 : _REACH + 1]
-    reach = _GAP * distance[:, -1]
+    index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
+    reach = _GAP * distance[:, _REACH - 1]
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
     close = number_by_size(label_connected(index, strict))
     large = close >= 0

@@ -98,7 +98,7 @@ def orient_normals(nearest, normals):
     """
     points = nearest.points
     n = len(points)
-    first, second, _ = near_edges(nearest)
+    first, second = near_edges(nearest)
     cost = (
         1.0 + 1e-9 - np.minimum(np.abs(mirrored_cosine(points, normals, first, second)), 1.0)
     )  # zero would be no edge
@@ -125,11 +125,11 @@ def orient_normals(nearest, normals):
 
 
 def near_edges(nearest):
-    """Return the edges from every point to its nearest neighbours on its own sheet: both ends and the length."""
+    """Return the edges from every point to its nearest neighbours on its own sheet, by both ends."""
     near = slice(1, NEIGHBORS + 1)
     same = nearest.weight[:, near] > 0.0
     first = np.repeat(np.arange(len(same), dtype=np.int32), np.count_nonzero(same, axis=1))
-    return first, nearest.index[:, near][same], nearest.distance[:, near][same]
+    return first, nearest.index[:, near][same]
 
 
 def mirrored_cosine(points, normals, first, second):

@@ -1,31 +1,30 @@
-"""Keep close sheets of a surface apart: which neighbours lie on the same sheet, told by their normals."""
+"""Keep close sheets of a surface apart: which points lie on the same sheet, told by normals and by ways along it."""
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
-from .components import SMALLEST, label_connected, number_by_size
+from .components import label_connected, number_by_size
 from .distances import pair_heights
-from .normals import NEIGHBORS, mirrored_cosine, near_edges
-from .quadrics import fit_nearest, fit_quadrics
+from .quadrics import fit_nearest, fit_quadrics, frames
 
 _CLOSE = 0.6  # sheets nearer than this many spacings are taken as one
+_GAP = 0.35  # of the spacing: a step along a sheet leads over none that is wider
 LEANING = 0.1  # what normals may be off by, as a share of the distance
 _MISFIT = 0.2  # a quadric that misses its points by more than this share of the spacing may mix two sheets
 _PATIENCE = 0.3  # of the spacing: neighbours of a plane through nearby points count as near it
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
 _BLOCK = 1 << 11
-_EDGES = 12  # neighbours that a sheet is followed along
+_SECTORS = 8  # directions in which a sheet is followed from every point
 _TOUCH = 1.5  # spacings within which points touch
-_STEEP = 0.35  # an edge that rises more than this out of the mean tangent plane leads to another sheet
-_BACK = -0.2  # cosine of two oriented normals below which the points lie on two sides of a wall
-_PARALLEL = 0.5  # cosine, without its sign, of normals on one sheet where the signs do not tell
-_AGAINST, _BENT = 0.5, 0.25  # turn against the bend, and bend, in radians, that cannot both be true
-_LEANING = 0.3  # what normals within sharp features may be off by, as a share of the distance
-_NEXT = 2.0  # spacings between neighbours whose normals cannot point against each other
-_OPPOSED = -0.5  # cosine at which they do
+_AROUND = 1.55  # the way along a sheet over the chord: sqrt(2) across a right angle, 8 % for steps in eight directions
+_TURN = 0.5  # cosine of normals on one smooth sheet, at least: the kernel reaches no further around a bend
+_LEVEL = 0.8  # the same for a step between points that do not touch
+_HOLLOW = 0.5  # turn of two normals towards each other, in radians, that a gap may make
+_SOURCES = 1 << 7  # points from which ways are followed at one time
 
 
-def same_sheet(left, right, dot, distance, spacing, leaning=LEANING):
+def same_sheet(left, right, dot, distance, spacing, leaning=LEANING, close=_CLOSE):
     """Tell which pairs lie on one sheet: their chord is orthogonal to their mean normal, within what may be off.
 
     Parameters
@@ -38,15 +37,17 @@ def same_sheet(left, right, dot, distance, spacing, leaning=LEANING):
         Of the pair.
     leaning : float
         What normals may be off by, as a share of the distance.
+    close : float
+        How far apart the sheets may be that are taken as one, in spacings.
 
     Returns
     -------
     ndarray of bool
     """
-    return np.abs(left + np.where(dot < 0.0, -right, right)) <= 2.0 * (_CLOSE * spacing + leaning * distance)
+    return np.abs(left + np.where(dot < 0.0, -right, right)) <= 2.0 * (close * spacing + leaning * distance)
 
 
-def on_sheet(nearest, normals, rows, other, distance, leaning=LEANING):
+def on_sheet(nearest, normals, rows, other, distance, leaning=LEANING, close=_CLOSE):
     """Tell which of other points lie on the sheet of some points.
 
     Parameters
@@ -60,7 +61,7 @@ def on_sheet(nearest, normals, rows, other, distance, leaning=LEANING):
     other : ndarray, (k, views) int
         Points that each of them is compared with.
     distance : ndarray, (k, views)
-    leaning : float
+    leaning, close : float
         See `same_sheet`.
 
     Returns
@@ -73,7 +74,7 @@ def on_sheet(nearest, normals, rows, other, distance, leaning=LEANING):
     cosine = np.einsum("ikc,ic->ik", normals[other], normals[rows])
     left = np.einsum("ikc,ic->ik", chord, normals[rows])
     right = np.einsum("ikc,ikc->ik", chord, normals[other])
-    return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], leaning), cosine
+    return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], leaning, close), cosine
 
 
 def fit_sheets(nearest):
@@ -155,12 +156,7 @@ def label_sheets(nearest, normals, component):
     ndarray, (m,) int
         The largest component is 0; points off the surface are -1.
     """
-    index, distance = nearest.index[:, 1 : _EDGES + 1], nearest.distance[:, 1 : _EDGES + 1]
-    offset = nearest.points[index] - nearest.points[:, None]
-    other = normals[index]
-    side = np.where(np.einsum("ikc,ic->ik", other, normals) < 0.0, -1.0, 1.0)
-    rise = np.einsum("ikc,ikc->ik", offset, normals[:, None] + side[:, :, None] * other)
-    sheet = number_by_size(label_connected(index, np.abs(rise) <= 2.0 * _STEEP * distance))
+    sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)))
     # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
     touching = nearest.distance <= _TOUCH * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
@@ -176,24 +172,36 @@ def label_sheets(nearest, normals, component):
     return result
 
 
-def unsure_orientation(nearest, normals):
-    """Tell where the signs of oriented normals contradict each other between close neighbours, (m,) bool.
+def sheet_neighbors(nearest, normals, oriented):
+    """Tell which neighbours of every point are the nearest ones on its sheet in one of eight directions, (m, 41) bool.
 
-    A one-sided surface has such a seam; so has a narrow gap that the orientation once leapt.
+    Unlike a number of nearest neighbours, they lie all around a point where points crowd along lines, too.
     """
-    first, second, distance = near_edges(nearest)
-    close = distance < _NEXT * nearest.spacing[first]
-    first, second = first[close], second[close]
-    against = mirrored_cosine(nearest.points, normals, first, second) < _OPPOSED
-    result = np.zeros(len(normals), dtype=bool)
-    result[first[against]] = result[second[against]] = True
-    for _ in range(2):
-        result |= result[nearest.index[:, 1 : NEIGHBORS + 1]].any(axis=1)
+    result = np.zeros(nearest.index.shape, dtype=bool)
+    for start in range(0, len(result), _BLOCK):
+        block = np.arange(start, min(start + _BLOCK, len(result)))
+        index = nearest.index[block]
+        flat = (nearest.points[index] - nearest.points[block, None]) @ frames(normals[block])[:, :, 1:]
+        sector = np.floor(np.arctan2(flat[:, :, 1], flat[:, :, 0]) * (0.5 * _SECTORS / np.pi)) % _SECTORS
+        same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=_GAP)
+        # Across an edge only points that touch are next to each other, others may be so across a gap.
+        same &= ((cosine if oriented else np.abs(cosine)) > _LEVEL) | (
+            nearest.distance[block] < _TOUCH * nearest.spacing[block, None]
+        )
+        same[:, 0] = False
+        rows = np.arange(len(block))
+        for side in range(_SECTORS):
+            ahead = same & (sector == side)
+            first = ahead.argmax(axis=1)
+            result[block, first] |= ahead[rows, first]
     return result
 
 
-def separate_sheets(pairs, nearest, oriented, quadrics):
-    """Leave out the pairs whose ends lie on different sheets, but for the last ones of a few points.
+def separate_sheets(pairs, nearest, oriented):
+    """Leave out the pairs whose ends lie on different sheets, which face each other across a gap.
+
+    Normals tell it of most pairs. Where they leave a doubt, two points lie on one sheet if a way of short steps leads
+    from one to the other along it that is not much longer than their distance.
 
     Parameters
     ----------
@@ -203,72 +211,103 @@ def separate_sheets(pairs, nearest, oriented, quadrics):
         Of the m points.
     oriented : ndarray, (m, 3)
         Unit normals whose signs agree.
-    quadrics : Quadrics
-        Of the m points.
 
     Returns
     -------
     Pairs
         The same ones where all lie on one sheet.
     """
-    side = np.sign(np.einsum("ij,ij->i", oriented, quadrics.normals))
-    shape_operator = side[:, None, None] * quadrics.shape_operator
-    same = pairs_on_one_sheet(pairs, oriented, unsure_orientation(nearest, oriented), shape_operator, nearest.spacing)
-    return pairs if same.all() else pairs.keep(same | last_pairs(pairs, same))
+    doubtful = np.flatnonzero(~_plainly_on_one_sheet(pairs, oriented, nearest.spacing))
+    if not len(doubtful):
+        return pairs
+    first, second = pairs.first[doubtful], pairs.second[doubtful]
+    longest = _AROUND * pairs.distance[doubtful]
+    apart = ways_along(step_lengths(nearest, oriented), nearest.tree, first, second, longest) > longest
+    kept = np.ones(len(pairs.first), dtype=bool)
+    kept[doubtful[apart]] = False
+    return pairs.keep(kept) if apart.any() else pairs
 
 
-def pairs_on_one_sheet(pairs, normals, unsure, shape_operator, spacing):
-    """Tell which pairs lie on one sheet of the surface.
-
-    Parameters
-    ----------
-    pairs : Pairs
-        With p pairs.
-    normals : ndarray, (m, 3)
-        Unit normals whose signs agree: two that point against each other lie on two sides of a wall.
-    unsure : ndarray, (m,) bool
-        Where their signs do not tell.
-    shape_operator : ndarray, (m, 3, 3)
-        Second fundamental form for these normals.
-    spacing : ndarray, (m,)
-        Distance between neighbouring points.
-
-    Returns
-    -------
-    ndarray, (p,) bool
-    """
+def _plainly_on_one_sheet(pairs, oriented, spacing):
+    """Tell of which pairs the normals say that they lie on one sheet, (p,) bool."""
     result = np.empty(len(pairs.first), dtype=bool)
-    for block, chord, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, normals):
+    for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, oriented):
         mean = 0.5 * (spacing[pairs.first[block]] + spacing[pairs.second[block]])
-        same = same_sheet(left, right, cosine, pairs.distance[block], mean, _LEANING)
-        doubt = unsure[pairs.first[block]] | unsure[pairs.second[block]]
-        same &= np.where(doubt, np.abs(cosine) > _PARALLEL, cosine > _BACK)
-        # Where normals turn against the way the surface bends at both ends, two sheets face each other across a gap.
-        turn = (right - left) / pairs.distance[block]
-        doubtful = np.flatnonzero(same & (turn < -_AGAINST))
-        i, j, chord = pairs.first[block][doubtful], pairs.second[block][doubtful], chord[doubtful]
-        bend = 0.5 * sum(np.einsum("pa,pab,pb->p", chord, shape_operator[k], chord) for k in (i, j))
-        same[doubtful[bend > _BENT * pairs.distance[block][doubtful]]] = False
-        result[block] = same
+        level = same_sheet(left, right, cosine, pairs.distance[block], mean)
+        # In a hollow two sheets may face each other across a gap.
+        result[block] = level & (cosine > _TURN) & (right - left > -_HOLLOW * pairs.distance[block])
     return result
 
 
-def last_pairs(pairs, same):
-    """Tell which pairs join the few points that would be left on their own to the rest, (p,) bool.
+def step_lengths(nearest, oriented):
+    """Return the lengths of the steps along sheets between next neighbours.
 
-    Points in a sharp fold may belong to no sheet by their normals; each such group stays with what is nearest to it.
+    Sharp folds, whose normals join them to nothing, are joined to what is nearest to them.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    oriented : ndarray, (m, 3)
+        Unit normals whose signs agree.
+
+    Returns
+    -------
+    csr_array, (m, m)
+        Symmetric; no more parts than the neighbourhoods themselves hang together in.
     """
-    result = np.zeros(len(same), dtype=bool)
-    while True:
-        joined = pairs.keep(same | result)
-        label = connected_components(joined.half(np.ones(len(joined.first))), directed=False)[1]
-        size = np.bincount(label)
-        size[size.argmax()] = len(label)  # the largest group is the rest, however small
-        ends = label[np.stack([pairs.first, pairs.second])]
-        between = np.flatnonzero((ends[0] != ends[1]) & (size[ends].min(axis=0) < SMALLEST))
-        if not len(between):
-            return result
-        between = between[np.argsort(pairs.distance[between], kind="stable")]
-        for side in ends[:, between]:
-            group, nearest = np.unique(side, return_index=True)
-            result[between[nearest[size[group] < SMALLEST]]] = True
+    next_to = sheet_neighbors(nearest, oriented, True)
+    count = len(next_to)
+    first = np.repeat(np.arange(count, dtype=np.int32), np.count_nonzero(next_to, axis=1))
+    second, length = nearest.index[next_to], nearest.distance[next_to]
+    label = connected_components(sparse.csr_array((length, (first, second)), shape=(count, count)), directed=False)[1]
+    row, column = np.nonzero(label[nearest.index] != label[:, None])
+    if len(row):
+        other, gap = nearest.index[row, column], nearest.distance[row, column]
+        low, high = np.sort([label[row], label[other]], axis=0)
+        order = np.lexsort((gap, high, low))
+        shortest = order[np.append(True, np.diff(low[order]) | np.diff(high[order]) != 0)]
+        low, high, row, other, gap = (values[shortest] for values in (low, high, row, other, gap))
+        shape = (label.max() + 1,) * 2
+        bridge = minimum_spanning_tree(sparse.csr_array((gap, (low, high)), shape=shape)).tocoo()
+        chosen = np.isin(low.astype(np.int64) * shape[0] + high, bridge.row.astype(np.int64) * shape[0] + bridge.col)
+        first = np.append(first, row[chosen]).astype(np.int32)
+        second, length = np.append(second, other[chosen]), np.append(length, gap[chosen])
+    steps = sparse.csr_array((length, (first, second)), shape=(count, count))
+    return steps.maximum(steps.T).tocsr()
+
+
+def ways_along(steps, tree, first, second, longest):
+    """Return the length of the shortest way along steps between the ends of pairs, (k,); infinite if it is longer.
+
+    Parameters
+    ----------
+    steps : csr_array, (m, m)
+        Their lengths, symmetric.
+    tree : cKDTree
+        Of the m points.
+    first, second : ndarray, (k,) int
+    longest : ndarray, (k,)
+        How long the way may be.
+    """
+    # Ways start at the end with more pairs, so that fewer are followed; starts near each other share a neighbourhood.
+    often = np.bincount(first, minlength=tree.n) + np.bincount(second, minlength=tree.n)
+    swap = often[second] > often[first]
+    first, second = np.where(swap, second, first), np.where(swap, first, second)
+    place = np.empty(tree.n, dtype=np.int64)
+    place[tree.indices] = np.arange(tree.n)
+    order = np.argsort(place[first], kind="stable")
+    start = np.flatnonzero(np.diff(place[first[order]], prepend=-1))
+    result = np.empty(len(first))
+    for block in range(0, len(start), _SOURCES):
+        source = first[order[start[block : block + _SOURCES]]]
+        end = start[block + _SOURCES] if block + _SOURCES < len(start) else len(order)
+        rows = order[start[block] : end]
+        limit = longest[rows].max()
+        low, high = tree.data[source].min(axis=0), tree.data[source].max(axis=0)
+        reach = 0.5 * np.linalg.norm(high - low) + limit
+        around = np.array(tree.query_ball_point(0.5 * (low + high), reach, return_sorted=True))
+        length = dijkstra(steps[around][:, around], indices=np.searchsorted(around, source), limit=1.001 * limit)
+        which = np.cumsum(np.diff(first[rows], prepend=first[rows[0]]) != 0)
+        result[rows] = length[which, np.searchsorted(around, second[rows])]
+    return result

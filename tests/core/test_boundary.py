@@ -121,6 +121,15 @@ class TestFinding:
     def test_none_on_closed_surfaces(self, name):
         assert np.count_nonzero(read_cloud(CLOSED[name], LaplacianOptions()).boundary.at_boundary) == 0
 
+    @pytest.mark.parametrize("seed", range(3))
+    def test_none_at_the_edge_of_a_thin_lens(self, seed):
+        # Two caps that meet at an acute edge, and hardly bend elsewhere.
+        rng = np.random.default_rng(seed)
+        radius, angle = np.sqrt(rng.random(6000)), 2.0 * np.pi * rng.random(6000)
+        height = 0.25 * (1.0 - radius**2) * np.where(np.arange(6000) % 2, 1.0, -1.0)
+        points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+        assert not np.any(read_cloud(points, LaplacianOptions()).boundary.at_boundary)
+
     @pytest.mark.parametrize("level", [0.1, 0.5])
     def test_none_on_a_noisy_sphere(self, level):
         assert not np.any(read_cloud(noisy_sphere(2000, level), LaplacianOptions()).boundary.at_boundary)

@@ -16,8 +16,7 @@ from benchmarks.samplings import (
 )
 from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
-from core.geometry.pairs import Pairs
-from core.geometry.sheets import fit_sheets, label_sheets, last_pairs, same_sheet
+from core.geometry.sheets import fit_sheets, label_sheets, same_sheet, step_lengths, ways_along
 from core.options import LaplacianOptions
 
 
@@ -114,8 +113,8 @@ class TestPairs:
         faces = face[pairs.first] * face[pairs.second] == 0
         opposite = faces & (face[pairs.first] + face[pairs.second] == 1)
         around = inset[pairs.first] + inset[pairs.second] + 2.0
-        reach = 3.0 * pairs.mean(pairs.lengths) * cloud.scaled.scale
-        return np.count_nonzero(opposite & (around > reach)), cloud
+        # Steps of a way cut the corners of the grid, so that it is up to a quarter shorter.
+        return np.count_nonzero(opposite & (around > 2.0 * pairs.distance * cloud.scaled.scale)), cloud
 
     @staticmethod
     def across_the_arms(capsule, options):
@@ -221,19 +220,57 @@ class TestLabels:
         assert values[2] > 1e-4
 
 
-class TestLastPairs:
-    """Of points in sharp folds, which belong to no sheet by their normals."""
+class TestWhereSheetsMeet:
+    @pytest.mark.parametrize("polar", [0.5, 1.0])
+    def test_points_that_crowd_along_lines_hang_together(self, polar):
+        # Meridians and parallels: the forty nearest neighbours of a point at a pole all lie on its own parallel.
+        angle = np.pi * (np.arange(60) + polar) / (59 + 2 * polar)
+        around = np.exp(2j * np.pi * np.arange(120) / 120)
+        ring = np.sin(angle)[:, None] * around
+        points = np.stack([ring.real, ring.imag, np.repeat(np.cos(angle)[:, None], 120, axis=1)], axis=2).reshape(-1, 3)
+        laplacian = core.build_laplacian(points)
+        assert np.all(laplacian.component == 0)
+        assert connected_components(laplacian.stiffness, directed=False)[0] == 1
+        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=5e-3)
 
-    def test_few_points_on_their_own_are_joined_to_what_is_nearest(self):
-        points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.5, 0.0, 0.0], [2.5, 1.0, 0.0]])
-        first, second = np.array([0, 0, 1, 1, 2]), np.array([1, 2, 2, 3, 3])
-        distance = np.linalg.norm(points[first] - points[second], axis=1)
-        pairs = Pairs(points, np.ones(4), first, second, distance)
-        same = np.array([False, False, False, False, True])
-        np.testing.assert_array_equal(last_pairs(pairs, same), [True, False, True, False, False])
-        same = np.array([True, False, False, False, False])
-        np.testing.assert_array_equal(last_pairs(pairs, same), [False, False, True, False, True])
 
-    def test_none_where_all_have_pairs(self):
-        pairs = Pairs(np.eye(3), np.ones(3), np.array([0, 0]), np.array([1, 2]), np.ones(2))
-        assert not last_pairs(pairs, np.array([True, True])).any()
+class TestWays:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def rolled(cls):
+        """A hairpin of two flat arms that meet in half a turn, its normals, and where along it the points lie."""
+        bend = 1.2
+        half = np.pi * bend
+        way = np.concatenate([np.arange(-20.0, 0.0), np.linspace(0.0, half, 5), half + np.arange(1, 21)])
+        turn = np.clip(way / bend, 0.0, np.pi)
+        straight = np.minimum(way, 0.0) - np.maximum(way - half, 0.0)
+        x, z = straight + bend * np.sin(turn), -bend * np.cos(turn)
+        points = np.concatenate([np.column_stack([x, np.full(len(x), y), z]) for y in np.arange(30.0)])
+        normal = np.column_stack([np.sin(turn), np.zeros(len(x)), -np.cos(turn)])
+        return find_nearest(points), np.tile(normal, (30, 1)), np.tile(way, 30)
+
+    def test_they_lead_around_a_gap_and_not_across(self, rolled):
+        nearest, normals, way = rolled
+        first, second = np.triu_indices(len(way), 1)
+        chord = np.linalg.norm(nearest.points[first] - nearest.points[second], axis=1)
+        near = chord < 6.0
+        first, second = first[near], second[near]
+        length = ways_along(step_lengths(nearest, normals), nearest.tree, first, second, np.full(len(first), 30.0))
+        exact = np.hypot(way[first] - way[second], nearest.points[first, 1] - nearest.points[second, 1])
+        seen = exact < 25.0
+        assert np.all(length[seen] > 0.85 * exact[seen])
+        assert np.all(length[seen] < 1.4 * exact[seen])
+
+    def test_longer_ones_than_asked_for_are_infinite(self, rolled):
+        nearest, normals, _ = rolled
+        first, second = np.array([0, 0]), np.array([3, 44])
+        length = ways_along(step_lengths(nearest, normals), nearest.tree, first, second, np.full(2, 5.0))
+        np.testing.assert_array_equal(np.isfinite(length), [True, False])
+
+    def test_what_normals_join_to_nothing_is_joined_to_what_is_nearest(self):
+        points = np.concatenate([grid_points(range(10), range(10), [0.0]), [[4.5, 4.5, 2.0], [4.5, 4.5, 3.0]]])
+        steps = step_lengths(find_nearest(points), np.tile([0.0, 0.0, 1.0], (102, 1)))
+        assert connected_components(steps, directed=False)[0] == 1
+        assert steps[[101]].indices.tolist() == [100]
+        assert steps[[100]].nnz == 2
+        assert abs(steps - steps.T).max() == 0.0
