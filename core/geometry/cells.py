@@ -43,7 +43,7 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
     ----------
     nearest : Nearest
         Of m points. Neighbours on other sheets cut nothing. Where the nearest ones leave a cell open, more of them are
-        looked at; cells that stay open end halfway to the last neighbour.
+        looked at; cells that stay open end halfway to the last neighbour, or a spacing away where some were left out.
     normals : ndarray, (m, 3)
         Unit normals of any sign.
     gaussian_curvature : ndarray, (m,)
@@ -66,7 +66,8 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
             known = np.flatnonzero(closed)
             if wider == 1 and not closed.all():
                 gaps = np.flatnonzero(~closed)
-                capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 2.0 / furthest[gaps])], axis=1)
+                end = np.where(whole[block[gaps]], 0.5 * furthest[gaps], nearest.spacing[block[gaps]])
+                capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / end)], axis=1)
                 areas[gaps], reach[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
                 known = np.arange(len(block))
             cells.areas[block[known]], cells.reach[block[known]] = areas[known], reach[known]

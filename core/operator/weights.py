@@ -13,7 +13,7 @@ _ROUNDS = 12  # of the solver, at most
 _ENOUGH = 1e-3  # root mean square of that over h, which a first moment makes of a slope, at which it stops
 _MEMORY = 5  # earlier rounds that a step is extrapolated from
 _RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the terms apart
-_LARGEST = 3.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
+_LARGEST = 1.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
 _SMALLEST = 1e-8  # share of what rounds change that an extrapolation goes by: less would be rounding
 _TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 
