@@ -81,6 +81,8 @@ class Cloud:
         Areas of the points' Voronoi cells.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
+    misfit : ndarray, (m,)
+        Root mean square distance of the neighbours from the quadric.
     roughness : ndarray, (m,)
         Mean squared slope of what is finer than the normals; zero where it is noise.
     boundary : Boundary
@@ -101,6 +103,7 @@ class Cloud:
     gaussian_curvature: np.ndarray
     cell_areas: np.ndarray
     spacing: np.ndarray
+    misfit: np.ndarray
     roughness: np.ndarray
     boundary: Boundary
     pairs: Pairs
@@ -166,6 +169,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         gaussian_curvature=gaussian,
         cell_areas=cells.areas,
         spacing=nearest.spacing,
+        misfit=quadrics.misfit,
         # What sticks out is noise where there is any, and shape where not.
         roughness=np.zeros(count)
         if noise > 0.0 and options.projection == "auto"

@@ -13,6 +13,8 @@ from .areas import NO_AREA, solve_areas
 from .spectrum import Spectrum, correct_eigenvalues, solve_spectrum
 from .stiffness import assemble_stiffness
 
+_FAR, _MISSED = 0.1, 0.5  # residual of the moments, and misfit of quadrics in spacings, at which trust is a half
+_DOUBTFUL = 0.01  # share of the area at which a notice tells
 NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that random points bear
 
 
@@ -46,6 +48,10 @@ class LaplaceBeltrami:
         Unit vector across that boundary, out of the surface; zero where it is not known.
     component : ndarray, (n,) int
         Component of each point, the largest first; -1 for points that were left out.
+    trust : ndarray, (n,)
+        How far the points around carry the answer, from 0 to 1: less than a half where no positive weights have the
+        moments of the kernel within a tenth, or where the neighbours miss a quadric by half their spacing. 0 for points
+        left out.
     smoothing_lengths : ndarray, (n,)
         h of each point [L]; the kernel reaches 3 h.
     kernel_widths : ndarray, (n,)
@@ -74,6 +80,7 @@ class LaplaceBeltrami:
     boundary_distance: np.ndarray
     boundary_direction: np.ndarray
     component: np.ndarray
+    trust: np.ndarray
     smoothing_lengths: np.ndarray
     kernel_widths: np.ndarray
     stiffness: sparse.csr_array
@@ -310,6 +317,13 @@ def build_laplacian(
     assembled = assemble_stiffness(
         cloud, distance, solution.areas, options.curvature_correction, lambda: report("Operator", 0.8)
     )
+    trust = _trust(cloud, assembled.residual)
+    doubtful = np.sum(solution.areas[trust < 0.5]) / np.sum(solution.areas)
+    if doubtful > _DOUBTFUL:
+        notices.append(
+            f"On {doubtful:.0%} of the surface the points tell too little of it: they are too few for its bends, lie in"
+            " rows, or between close sheets. The attribute lb_trust shows where. Add points there."
+        )
     return LaplaceBeltrami(
         points=points,
         surface_points=points + scaled.scatter(cloud.moved * scaled.scale, 0.0),
@@ -322,6 +336,7 @@ def build_laplacian(
         boundary_distance=scaled.scatter(cloud.boundary.distance[:, 0] * scaled.scale, np.inf),
         boundary_direction=scaled.scatter(cloud.boundary.outward[:, 0], 0.0),
         component=scaled.scatter(cloud.component, -1),
+        trust=scaled.scatter(trust, 0.0),
         smoothing_lengths=scaled.scatter(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         kernel_widths=scaled.scatter(assembled.widths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         stiffness=assembled.matrix,
@@ -330,6 +345,11 @@ def build_laplacian(
         options=options,
         notices=notices,
     )
+
+
+def _trust(cloud, residual):
+    """Return how far the points around carry the answer, (m,), from 0 to 1."""
+    return 1.0 / (1.0 + (residual / _FAR) ** 2 + (cloud.misfit / (_MISSED * cloud.spacing)) ** 2)
 
 
 def narrow_laplacian(laplacian, neighbors=NARROW):

@@ -267,6 +267,7 @@ def analysis_arrays(place, laplacian, curvature, spectrum) -> dict:
         "gaussian_curvature": laplacian.gaussian_curvature,
         "boundary": laplacian.boundary,
         "component": laplacian.component,
+        "trust": laplacian.trust,
         "smoothing_lengths": laplacian.smoothing_lengths,
         "eigenvalues": np.empty(0) if spectrum is None else spectrum.eigenvalues,
         "eigenvectors": np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,

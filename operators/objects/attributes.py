@@ -31,6 +31,7 @@ MEAN_CURVATURE = "lb_mean_curvature"
 GAUSSIAN_CURVATURE = "lb_gaussian_curvature"
 BOUNDARY = "lb_boundary"
 COMPONENT = "lb_component"
+TRUST = "lb_trust"
 SEGMENT = "lb_segment"
 FIELD = "lb_field"
 DISTANCE = "lb_distance"
@@ -38,7 +39,15 @@ DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
-RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT  # of every analysis, as in the panel
+RESULTS = (
+    AREA,
+    NORMAL,
+    MEAN_CURVATURE,
+    GAUSSIAN_CURVATURE,
+    BOUNDARY,
+    COMPONENT,
+    TRUST,
+)  # of every analysis, as in the panel
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {  # all others are FLOAT
     **dict.fromkeys((NORMAL, DISPLACEMENT, REST), "FLOAT_VECTOR"),

@@ -13,6 +13,7 @@ from .attributes import (
     MEAN_CURVATURE,
     NORMAL,
     RESULTS,
+    TRUST,
     check_names,
     eigenvector_name,
     point_count,
@@ -79,6 +80,7 @@ def write_result(obj, analysis, write_limit: int):
     write_attribute(mesh, GAUSSIAN_CURVATURE, laplacian.gaussian_curvature)
     write_attribute(mesh, BOUNDARY, laplacian.boundary)
     write_attribute(mesh, COMPONENT, laplacian.component)
+    write_attribute(mesh, TRUST, laplacian.trust)
     for owner in owners:
         _note_analysis(owner, analysis, settings_values(obj.meshfree))
     tag_changed(mesh)

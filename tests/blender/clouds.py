@@ -3,7 +3,15 @@
 import bpy
 import numpy as np
 
-RESULTS = ["lb_area", "lb_boundary", "lb_component", "lb_gaussian_curvature", "lb_mean_curvature", "lb_normal"]
+RESULTS = [
+    "lb_area",
+    "lb_boundary",
+    "lb_component",
+    "lb_gaussian_curvature",
+    "lb_mean_curvature",
+    "lb_normal",
+    "lb_trust",
+]
 _KEYS = {
     "FLOAT_VECTOR": ("vector", 3, np.float32),
     "FLOAT": ("value", 1, np.float32),
