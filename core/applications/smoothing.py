@@ -193,7 +193,7 @@ def fair_points(
     >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
     >>> smooth = core.fair_points(core.build_laplacian(noisy))
     >>> print(np.linalg.norm(noisy, axis=1).std().round(3), np.linalg.norm(smooth, axis=1).std().round(3))
-    0.02 0.004
+    0.02 0.006
     """
     if time is None:
         known = laplacian.component >= 0

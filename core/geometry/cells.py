@@ -11,7 +11,9 @@ from .sheets import on_sheet
 _BLOCK = 1 << 12
 _WIDER = 1, 4, 16  # times the 40 neighbours are looked at where a cell is open: a jump of density has them on one side
 _TURN = 0.15  # most that the turn of two normals counts for an arc's sixth order, as in `distances.arc_length`
+_SAME = 1e-9  # share of the longest cut by which two that differ are one
 _BENT = (-0.5, 3.0)  # bounds of the Gaussian curvature times the squared reach, where the fit is poor
+_OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
 
 
@@ -43,7 +45,7 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
     ----------
     nearest : Nearest
         Of m points. Neighbours on other sheets cut nothing. Where the nearest ones leave a cell open, more of them are
-        looked at; cells that stay open end halfway to the last neighbour, or a spacing away where some were left out.
+        looked at; cells that stay open end half a spacing away.
     normals : ndarray, (m, 3)
         Unit normals of any sign.
     gaussian_curvature : ndarray, (m,)
@@ -56,7 +58,7 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
     count = len(normals)
     cells = Cells(np.empty(count), np.empty(count))
     whole = (nearest.weight[:, :-1] > 0.0).all(axis=1)  # no neighbour was left out: more of them can close a cell
-    rows = np.arange(count)
+    spacing, rows = nearest.spacing, np.arange(count)
     for wider in _WIDER:
         still_open = np.zeros(count, dtype=bool)
         for start in range(0, len(rows), _BLOCK // wider):
@@ -66,8 +68,7 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
             known = np.flatnonzero(closed)
             if wider == 1 and not closed.all():
                 gaps = np.flatnonzero(~closed)
-                end = np.where(whole[block[gaps]], 0.5 * furthest[gaps], nearest.spacing[block[gaps]])
-                capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / end)], axis=1)
+                capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / (_OPEN * spacing[block[gaps]]))], axis=1)
                 areas[gaps], reach[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
                 known = np.arange(len(block))
             cells.areas[block[known]], cells.reach[block[known]] = areas[known], reach[known]
@@ -121,8 +122,8 @@ def _intersect(cuts, gaussian_curvature, furthest):
     """
     count = len(cuts)
     cuts = np.concatenate([cuts, np.zeros((count, 1, 2))], axis=1)
-    first = np.linalg.norm(cuts, axis=2).argmax(axis=1)
-    here = cuts[np.arange(count), first]
+    here = cuts[np.arange(count), np.linalg.norm(cuts, axis=2).argmax(axis=1)]
+    first, same = here, _SAME * np.linalg.norm(here, axis=1)
     ahead = np.stack([-here[:, 1], here[:, 0]], axis=1)
     areas, reach = np.zeros(count), np.zeros(count)
     closed = np.zeros(count, dtype=bool)
@@ -131,8 +132,9 @@ def _intersect(cuts, gaussian_curvature, furthest):
     for _ in range(cuts.shape[1] + 1):
         way = cuts[rows] - here[:, None]
         length = np.linalg.norm(way, axis=2)
-        along = np.einsum("ikc,ic->ik", way, ahead) / np.where(length > 0.0, length, 1.0)
-        chosen = np.where(length > 0.0, along, -np.inf).argmax(axis=1)
+        other = length > same[:, None]
+        along = np.einsum("ikc,ic->ik", way, ahead) / np.where(other, length, 1.0)
+        chosen = np.where(other, along, -np.inf).argmax(axis=1)
         every = np.arange(len(rows))
         there, ahead = cuts[rows, chosen], way[every, chosen] / length[every, chosen, None]
         across = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
@@ -144,11 +146,12 @@ def _intersect(cuts, gaussian_curvature, furthest):
             start = corner
         else:
             areas[rows] += _triangles(before, corner, gaussian_curvature[rows])
-        done = ~out & (chosen == first[rows])
+        done = ~out & (np.linalg.norm(there - first, axis=1) <= same)
         closed[rows[done]] = True
         areas[rows[done]] += _triangles(corner[done], start[done], gaussian_curvature[rows[done]])
         left = ~out & ~done
-        rows, here, ahead, corner, start = (values[left] for values in (rows, there, ahead, corner, start))
+        rows, here, ahead, corner = rows[left], there[left], ahead[left], corner[left]
+        start, first, same = start[left], first[left], same[left]
         if not len(rows):
             break
     return areas, reach, closed & (reach < furthest)

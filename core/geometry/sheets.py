@@ -182,7 +182,9 @@ def sheet_neighbors(nearest, normals, oriented):
         block = np.arange(start, min(start + _BLOCK, len(result)))
         index = nearest.index[block]
         flat = (nearest.points[index] - nearest.points[block, None]) @ frames(normals[block])[:, :, 1:]
-        sector = np.floor(np.arctan2(flat[:, :, 1], flat[:, :, 0]) * (0.5 * _SECTORS / np.pi)) % _SECTORS
+        angle = np.arctan2(flat[:, :, 1], flat[:, :, 0])
+        # Counted from the nearest neighbour, so that they turn with the points.
+        sector = np.round((angle - angle[:, 1:2]) * (0.5 * _SECTORS / np.pi)) % _SECTORS
         same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=_GAP)
         # Across an edge only points that touch are next to each other, others may be so across a gap.
         same &= ((cosine if oriented else np.abs(cosine)) > _LEVEL) | (

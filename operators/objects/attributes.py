@@ -39,15 +39,8 @@ DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
-RESULTS = (
-    AREA,
-    NORMAL,
-    MEAN_CURVATURE,
-    GAUSSIAN_CURVATURE,
-    BOUNDARY,
-    COMPONENT,
-    TRUST,
-)  # of every analysis, as in the panel
+# Of every analysis, as in the panel.
+RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT, TRUST
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {  # all others are FLOAT
     **dict.fromkeys((NORMAL, DISPLACEMENT, REST), "FLOAT_VECTOR"),

@@ -75,7 +75,7 @@ def test_a_source_with_a_mean_is_refused(operators):
         core.solve_poisson(laplacian, laplacian.points[:, 0] + 0.1)
 
 
-@pytest.mark.parametrize(("name", "bound"), [("strip", 2e-3), ("random_strip", 1e-2)])
+@pytest.mark.parametrize(("name", "bound"), [("strip", 2e-3), ("random_strip", 2e-2)])
 def test_harmonic_strip_is_linear(request, name, bound):
     laplacian = request.getfixturevalue(name)
     fixed, exact = ends(laplacian.points)

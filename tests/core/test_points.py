@@ -107,7 +107,6 @@ def test_an_abrupt_change_of_spacing_is_no_component():
     assert laplacian.areas.sum() == pytest.approx(10.0, rel=0.2)
 
 
-@pytest.mark.xfail(reason="adaptive lengths next to the fine grid are too short to reach the coarse one's points")
 def test_the_operator_falls_into_as_many_parts_as_it_has_components():
     laplacian = core.build_laplacian(abrupt_change())
     assert core.check_stability(laplacian).components == laplacian.component.max() + 1
