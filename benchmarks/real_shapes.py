@@ -26,10 +26,10 @@ Eleven shapes (meshes of area 1, from the data of geometry libraries), their poi
 vertices of the mesh, random points, points seen from four places with a density that falls with the squared distance,
 noise of a share of the spacing along the normals, and outliers in a box around. Beside each figure stands that of the
 tufted cover (Sharp and Crane 2020, robust_laplacian) on the same points. Eigenvalues: mean error of the first 20
-above the constant one, against those of the mesh, refined. Face is an open surface, and so is featuretype, whose
-1,722 vertices are those of a technical drawing: too few for any of both. Boundary: points found at one. Doubtful:
-share of the area that `lb_trust` marks. The constants were chosen on rocker-arm, cat, arm, cheburashka and
-screwdriver; on the others the same ones were only run. Seconds are of a machine that did other things, too.
+above the constant one, against those of the mesh, refined. Face is an open surface; the 1,722 vertices of featuretype
+are those of a technical drawing, too few for its walls. Boundary: points found at one. Doubtful: share of the area
+that `lb_trust` marks. The constants were chosen on rocker-arm, cat, arm, cheburashka and screwdriver; on the others
+the same ones were only run. Seconds are of a machine that did other things, too.
 
 Made by `MESHFREE_ZOO=folder python -m benchmarks.real_shapes`; the shapes are not part of the project.
 """

@@ -21,6 +21,7 @@ def expected(core, obj):
         "lb_gaussian_curvature": laplacian.gaussian_curvature,
         "lb_mean_curvature": core.mean_curvature(laplacian),
         "lb_normal": normals / np.linalg.norm(normals, axis=1)[:, None],
+        "lb_trust": laplacian.trust,
     }
 
 

