@@ -13,8 +13,8 @@ from .areas import NO_AREA, solve_areas
 from .spectrum import Spectrum, correct_eigenvalues, solve_spectrum
 from .stiffness import assemble_stiffness
 
-_FAR, _MISSED = 0.1, 0.5  # residual of the moments, and misfit of quadrics in spacings, at which trust is a half
-_DOUBTFUL = 0.01  # share of the area at which a notice tells
+_FAR, _MISSED = 0.1, 1.0  # residual of the moments, and misfit of quadrics in spacings, at which trust is a half
+_DOUBTFUL = 0.02  # share of the area at which a notice tells
 NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that random points bear
 
 
@@ -50,7 +50,7 @@ class LaplaceBeltrami:
         Component of each point, the largest first; -1 for points that were left out.
     trust : ndarray, (n,)
         How far the points around carry the answer, from 0 to 1: less than a half where no positive weights have the
-        moments of the kernel within a tenth, or where the neighbours miss a quadric by half their spacing. 0 for points
+        moments of the kernel within a tenth, or where the neighbours miss a quadric by their spacing. 0 for points
         left out.
     smoothing_lengths : ndarray, (n,)
         h of each point [L]; the kernel reaches 3 h.
@@ -319,7 +319,7 @@ def build_laplacian(
     )
     trust = _trust(cloud, assembled.residual)
     doubtful = np.sum(solution.areas[trust < 0.5]) / np.sum(solution.areas)
-    if doubtful > _DOUBTFUL:
+    if doubtful > _DOUBTFUL and options.bandwidth == "adaptive":  # the width of others is the caller's choice
         notices.append(
             f"On {doubtful:.0%} of the surface the points tell too little of it: they are too few for its bends, lie in"
             " rows, or between close sheets. The attribute lb_trust shows where. Add points there."

@@ -312,9 +312,10 @@ class TestSegment:
         assert labels.max() == 3
 
     def test_fewer_modes_are_resolved_than_wanted(self, rectangle):
+        parts = 35
         with pytest.raises(core.UnresolvedModesError):
-            rectangle.eigenpairs(core.modes_needed(rectangle, 25))
-        assert pieces(core.segment(rectangle, 25), rectangle) == [1] * 25
+            rectangle.eigenpairs(core.modes_needed(rectangle, parts))
+        assert pieces(core.segment(rectangle, parts), rectangle) == [1] * parts
 
     @pytest.mark.parametrize(
         ("parts", "error", "match"),

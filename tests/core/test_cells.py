@@ -1,0 +1,106 @@
+"""Voronoi cells within the surface."""
+
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import (
+    fibonacci_sphere,
+    random_sphere,
+    square_grid,
+    square_random,
+    torus_area,
+    torus_points,
+    uneven_sphere,
+)
+from core.geometry.cells import measure_cells
+from core.geometry.cloud import read_cloud
+from core.geometry.nearest import find_nearest
+from core.options import LaplacianOptions
+
+
+def cell_areas(points, **settings):
+    """Areas of the cells of the caller's points, in their unit."""
+    cloud = read_cloud(points, LaplacianOptions(**settings))
+    return cloud.scaled.scatter(cloud.cell_areas * cloud.scaled.scale**2, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("points", "exact", "most"),
+    [
+        (random_sphere(4000), 4.0 * np.pi, 2e-5),
+        (fibonacci_sphere(4000), 4.0 * np.pi, 2e-5),
+        (uneven_sphere(4000), 4.0 * np.pi, 1e-3),
+        (torus_points(4000), torus_area(), 2e-3),
+        (square_grid(40), 1.0, 1e-3),
+        (square_random(2500), 1.0, 1.5e-2),
+    ],
+    ids=["random sphere", "even sphere", "density jump", "torus", "grid", "random square"],
+)
+def test_cells_tile_the_surface(points, exact, most):
+    areas = cell_areas(points)
+    assert areas.min() > 0.0
+    assert areas.sum() == pytest.approx(exact, rel=most)
+
+
+def test_cells_of_a_grid_are_its_squares():
+    points = square_grid(30)
+    inner = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.4
+    np.testing.assert_allclose(cell_areas(points)[inner], 1.0 / 29.0**2, rtol=1e-3)
+
+
+@pytest.mark.parametrize("ratio", [9, 30])
+def test_a_jump_of_density_leaves_no_gap(ratio):
+    # The forty neighbors of a point next to the jump are all on the denser side.
+    dense, few = random_sphere(18_000, 1), random_sphere(18_000 // ratio, 2)
+    points = np.concatenate([dense[dense[:, 2] < 0.0], few[few[:, 2] > 0.0]])
+    assert cell_areas(points).sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
+
+
+def test_the_reach_is_that_of_the_wider_spacing():
+    # Rows four times finer along than across.
+    x, y = np.meshgrid(np.arange(160) / 4.0, np.arange(40.0))
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    cloud = read_cloud(points, LaplacianOptions())
+    inner = (np.abs(points[:, 0] - 20.0) < 10.0) & (np.abs(points[:, 1] - 20.0) < 10.0)
+    reach = 0.5 * np.hypot(1.0, 0.25)
+    lengths = cloud.scaled.scatter(cloud.pairs.lengths * cloud.scaled.scale, 0.0)
+    np.testing.assert_allclose(lengths[inner], 1.8 * reach, rtol=1e-3)
+
+
+def test_curvature_makes_cells_smaller_than_in_the_plane():
+    points = random_sphere(300)
+    cloud = read_cloud(points, LaplacianOptions())
+    flat = read_cloud(points, LaplacianOptions(curvature_correction=False))
+    unit = cloud.scaled.scale**2
+    assert cloud.cell_areas.sum() * unit == pytest.approx(4.0 * np.pi, rel=2e-3)
+    assert flat.cell_areas.sum() * unit > 4.0 * np.pi * 1.005
+
+
+def test_without_neighbors_a_cell_ends_a_spacing_away():
+    areas = cell_areas(square_grid(20), boundary="off")
+    assert 1.0 < areas.sum() < (1.0 + 2.6 / 19.0) ** 2
+    assert areas.max() < 4.0 / 19.0**2
+
+
+def test_trust_is_low_where_the_points_do_not_tell():
+    sphere = core.build_laplacian(random_sphere(2000))
+    assert sphere.trust.min() > 0.9
+    assert not any("lb_trust" in notice for notice in sphere.notices)
+    # A bar so thin that the neighbors of most points lie on several of its sides.
+    bar = np.random.default_rng(0).uniform(0.0, 1.0, (600, 3))
+    bar[np.arange(600), 1 + np.arange(600) % 2] = np.arange(600) // 2 % 2
+    laplacian = core.build_laplacian(bar * [1.0, 0.03, 0.03])
+    known = laplacian.component >= 0
+    assert np.average(laplacian.trust[known], weights=laplacian.areas[known]) < 0.8
+    assert np.all(laplacian.trust[~known] == 0.0)
+    assert any("lb_trust" in notice for notice in laplacian.notices)
+
+
+def test_measured_alone():
+    cloud = read_cloud(fibonacci_sphere(600), LaplacianOptions())
+    nearest = find_nearest(cloud.pairs.points)
+    cells = measure_cells(nearest, cloud.normals, np.ones(600), cloud.boundary)
+    np.testing.assert_allclose(cells.areas, cloud.cell_areas, rtol=1e-2)
+    assert np.all(cells.reach > 0.5 * nearest.spacing)
+    assert np.all(cells.reach < nearest.spacing)
