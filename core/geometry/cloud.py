@@ -269,17 +269,17 @@ def remove_noise(surface, noise, options):
         method, rounds = "quadric", 0 if noise < LEAST else 1 if noise <= STRONG else 2
     if method == "off" or not rounds:
         return surface
-    result = _project(surface, method, rounds, options.sheets)
+    result = _project(surface, method, noise, rounds, options.sheets)
     if options.projection == "auto" and noise > FILLING:
         while rounds < MOST and result.misfit > LITTLE:
-            result, rounds = _project(result, method, 1, options.sheets), rounds + 1
+            result, rounds = _project(result, method, noise, 1, options.sheets), rounds + 1
     return result
 
 
-def _project(surface, method, rounds, sheets):
+def _project(surface, method, noise, rounds, sheets):
     sample, nearest = surface.sample, surface.sample.nearest
     for _ in range(rounds):
-        nearest = find_nearest(project_points(nearest.points, method, sample.component))
+        nearest = find_nearest(project_points(nearest.points, method, noise, sample.component))
     return fit_surface(replace(sample, nearest=nearest), sheets)
 
 

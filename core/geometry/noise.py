@@ -15,7 +15,8 @@ STRONG = 0.25  # noise above this share is smoothed twice
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would: it is smoothed until little is left
 LITTLE = 0.07  # misfit, as a share of the spacing, that is little
 MOST = 6  # rounds of smoothing
-_NEIGHBORS = 90  # of the fit that points are projected on
+_LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
+_NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round what is shape
 
 
 def noise_level(tree, misfit):
@@ -48,7 +49,7 @@ def noise_level(tree, misfit):
     return level if many < _GROWTH * few or level > FILLING else 0.0
 
 
-def project_points(points, method, component=None):
+def project_points(points, method, noise, component=None):
     """Move points onto the surface that their neighbours describe.
 
     Parameters
@@ -56,7 +57,9 @@ def project_points(points, method, component=None):
     points : ndarray, (m, 3)
         Components stand far apart.
     method : {"quadric", "plane"}
-        Onto a quadric through 90 neighbours, or onto the plane through their mean, as the paper does.
+        Onto a quadric through their neighbours, or onto the plane through the mean of 90, as the paper does.
+    noise : float
+        Their noise as a share of the spacing: little noise needs few neighbours.
     component : ndarray, (m,) int, optional
         Component of each point.
 
@@ -65,7 +68,9 @@ def project_points(points, method, component=None):
     ndarray, (m, 3)
     """
     smallest = len(points) if component is None else np.bincount(component).min()
-    distance, index = cKDTree(points).query(points, k=min(_NEIGHBORS + 1, smallest), workers=-1)
+    # A quadric has six coefficients.
+    many = _NEIGHBORS[1] if method == "plane" else int(np.clip(6.0 * (noise / _LEFT) ** 2, *_NEIGHBORS))
+    distance, index = cKDTree(points).query(points, k=min(many + 1, smallest), workers=-1)
     weight = fading_weights(distance)
     if method == "quadric":
         return points + fit_quadrics(points, index, weight).height

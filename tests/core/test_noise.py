@@ -88,13 +88,13 @@ class TestLevel:
 
 class TestProjection:
     def test_quadrics_bring_the_points_back(self, noisy):
-        once = project_points(noisy, "quadric")
+        once = project_points(noisy, "quadric", 0.3)
         assert off_sphere(once) < 0.35 * off_sphere(noisy)
-        assert off_sphere(project_points(once, "quadric")) < 0.9 * off_sphere(once)
+        assert off_sphere(project_points(once, "quadric", 0.3)) < 0.9 * off_sphere(once)
 
     def test_planes_too_but_they_cut_the_bend(self):
         noisy = 3.0 * noisy_sphere(COUNT, 0.5)
-        flat = project_points(noisy, "plane") / 3.0
+        flat = project_points(noisy, "plane", 0.3) / 3.0
         assert off_sphere(flat) < 0.7 * off_sphere(noisy / 3.0)
         radius = np.linalg.norm(flat, axis=1)
         assert radius.mean() < 1.0 - 3e-3
@@ -102,12 +102,12 @@ class TestProjection:
     @pytest.mark.parametrize("method", ["quadric", "plane"])
     def test_points_of_a_plane_stay_where_they_are(self, method):
         points = square_random(800)
-        np.testing.assert_allclose(project_points(points, method), points, atol=1e-9)
+        np.testing.assert_allclose(project_points(points, method, 0.1), points, atol=1e-9)
 
     def test_a_quadric_hardly_moves_clean_points(self):
         points = torus_points(3000)
         spacing = np.sqrt(4.0 * np.pi**2 * 0.4 / 3000)
-        assert np.linalg.norm(project_points(points, "quadric") - points, axis=1).max() < 0.1 * spacing
+        assert np.linalg.norm(project_points(points, "quadric", 0.3) - points, axis=1).max() < 0.1 * spacing
 
 
 class TestOperator:
