@@ -91,10 +91,10 @@ def _extrapolate(earlier):
     terms, change = earlier[-1]
     result = terms + change
     if len(earlier) > 1:
-        slopes = [(before[1] - after[1]).ravel() for before, after in itertools.pairwise(earlier)]
-        products = np.array([[left @ right for right in slopes] for left in slopes])
+        slopes = np.stack([(before[1] - after[1]).ravel() for before, after in itertools.pairwise(earlier)])
+        products = slopes @ slopes.T
         products += _SMALLEST * np.trace(products) * np.eye(len(slopes))
-        share = np.linalg.solve(products, [slope @ change.ravel() for slope in slopes])
+        share = np.linalg.solve(products, slopes @ change.ravel())
         for (before, after), part in zip(itertools.pairwise(earlier), share, strict=True):
             result = result - part * ((before[0] + before[1]) - (after[0] + after[1]))
     return result
