@@ -45,7 +45,7 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
     ----------
     nearest : Nearest
         Of m points. Neighbours on other sheets cut nothing. Where the nearest ones leave a cell open, more of them are
-        looked at; cells that stay open end half a spacing away.
+        looked at; cells that stay open end a spacing away.
     normals : ndarray, (m, 3)
         Unit normals of any sign.
     gaussian_curvature : ndarray, (m,)
