@@ -4,14 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .distances import arc_squared
+from .distances import ARC, arc_squared
 from .quadrics import frames
 from .sheets import on_sheet
 
 _BLOCK = 1 << 12
 _WIDER = 1, 4, 16  # times the 40 neighbours are looked at where a cell is open: a jump of density has them on one side
-_TURN = 0.15  # most that the turn of two normals counts for an arc's sixth order, as in `distances.arc_length`
-_SAME = 1e-9  # share of the longest cut by which two that differ are one
+_SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
 _BENT = (-0.5, 3.0)  # bounds of the Gaussian curvature times the squared reach, where the fit is poor
 _OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
@@ -95,7 +94,7 @@ def _cuts(nearest, normals, gaussian_curvature, boundary, rows, wider):
     cosine = np.einsum("ikc,ic->ik", other, own)
     other = np.where(cosine < 0.0, -1.0, 1.0)[:, :, None] * other
     turn = np.einsum("ikc,ikc->ik", chord, other) - np.einsum("ikc,ic->ik", chord, own)
-    squared = arc_squared(distance**2, turn, np.minimum(1.0 - np.abs(cosine), _TURN))
+    squared = arc_squared(distance**2, turn, np.minimum(1.0 - np.abs(cosine), ARC))
     # The arc leaves the point along the chord, bent away from it by a third of the turn.
     way = (chord + (turn / 6.0)[:, :, None] * other) @ frame
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -0.25, 0.25))
@@ -138,7 +137,7 @@ def _intersect(cuts, gaussian_curvature, furthest):
         every = np.arange(len(rows))
         there, ahead = cuts[rows, chosen], way[every, chosen] / length[every, chosen, None]
         across = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
-        out = across <= 1e-9 * np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
+        out = across <= _SAME * np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
         before, corner = corner, np.stack([there[:, 1] - here[:, 1], here[:, 0] - there[:, 0]], axis=1)
         corner /= np.where(out, 1.0, across)[:, None]
         reach[rows] = np.maximum(reach[rows], np.where(out, 0.0, np.linalg.norm(corner, axis=1)))

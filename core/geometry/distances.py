@@ -4,7 +4,7 @@ import numpy as np
 
 _BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
 
-_ARC = 0.15  # most that the turn of two normals counts for an arc's sixth order, as 1 - cosine: more is a sharp edge
+ARC = 0.15  # most that the turn of two normals counts for an arc's sixth order, as 1 - cosine: more is a sharp edge
 _STEPS = 8  # nearest neighbours whose chords tell of roughness
 _EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
 
@@ -77,7 +77,7 @@ def arc_length(cloud):
     result = np.empty(len(pairs.first))
     for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, cloud.normals):
         turn = np.where(cosine < 0.0, -right, right) - left
-        result[block] = arc_squared(pairs.distance[block] ** 2, turn, np.minimum(1.0 - np.abs(cosine), _ARC))
+        result[block] = arc_squared(pairs.distance[block] ** 2, turn, np.minimum(1.0 - np.abs(cosine), ARC))
     if cloud.roughness.any():
         least = pairs.mean(cloud.spacing) ** 2
         result += pairs.mean(cloud.roughness) * np.maximum(pairs.distance**2 - least, 0.0)
