@@ -96,5 +96,5 @@ class BoundaryCurve:
         way = points - foot
         other = boundary_normals[index]
         side = np.where(np.einsum("ic,ic->i", normals, other) < 0.0, -1.0, 1.0)
-        turn = np.einsum("ic,ic->i", way, normals - side[:, None] * other)
-        return np.sqrt(arc_squared(np.einsum("ic,ic->i", way, way), turn))
+        heights = np.einsum("ic,ic->i", way, other) * side, np.einsum("ic,ic->i", way, normals)
+        return np.sqrt(arc_squared(np.einsum("ic,ic->i", way, way), *heights))

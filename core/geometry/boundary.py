@@ -246,12 +246,14 @@ class _Course:
         chord = points[block, None] - points[self.rows[seen]]
         other = normals[self.rows[seen]]
         side = np.sign(np.einsum("ic,ikc->ik", normals[block], other))[:, :, None]
-        turn = np.einsum("ikc,ikc->ik", chord, side * normals[block, None] - other)
+        left, height = (
+            np.einsum("ikc,ikc->ik", chord, side * normals[block, None]),
+            np.einsum("ikc,ikc->ik", chord, other),
+        )
         squared = np.maximum(np.einsum("ikc,ikc->ik", chord, chord), 1e-300)
-        stretch = np.sqrt(arc_squared(squared, turn) / squared)
+        stretch = np.sqrt(arc_squared(squared, left, height) / squared)
         t = np.einsum("ikc,ikc->ik", chord, self.along[seen])
         e = np.einsum("ikc,ikc->ik", chord, self.across[seen])
-        height = np.einsum("ikc,ikc->ik", chord, other)
         e = np.where(e < 0.0, -1.0, 1.0) * np.hypot(e, height) * stretch
         a, b, c = np.moveaxis(self.coefficients[seen], 2, 0)
         slope = 1.0 + (b + 2.0 * c * t) ** 2

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .distances import ARC, arc_squared
+from .distances import arc_squared
 from .quadrics import frames
 from .sheets import on_sheet
 
@@ -93,10 +93,10 @@ def _cuts(nearest, normals, gaussian_curvature, boundary, rows, wider):
     own, other = normals[rows], normals[index]
     cosine = np.einsum("ikc,ic->ik", other, own)
     other = np.where(cosine < 0.0, -1.0, 1.0)[:, :, None] * other
-    turn = np.einsum("ikc,ikc->ik", chord, other) - np.einsum("ikc,ic->ik", chord, own)
-    squared = arc_squared(distance**2, turn, np.minimum(1.0 - np.abs(cosine), ARC))
+    left, right = np.einsum("ikc,ic->ik", chord, own), np.einsum("ikc,ikc->ik", chord, other)
+    squared = arc_squared(distance**2, left, right, np.abs(cosine))
     # The arc leaves the point along the chord, bent away from it by a third of the turn.
-    way = (chord + (turn / 6.0)[:, :, None] * other) @ frame
+    way = (chord + ((right - left) / 6.0)[:, :, None] * other) @ frame
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -0.25, 0.25))
     cuts = way * (counted / (np.maximum(np.linalg.norm(way, axis=2), 1e-300) * length))[:, :, None]
     inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])

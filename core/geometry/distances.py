@@ -3,28 +3,27 @@
 import numpy as np
 
 _BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
-
-ARC = 0.15  # most that the turn of two normals counts for an arc's sixth order, as 1 - cosine: more is a sharp edge
 _STEPS = 8  # nearest neighbours whose chords tell of roughness
 _EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
 
 
-def arc_squared(squared, turn, change=0.0):
-    """Return the squared length of circular arcs over chords.
+def arc_squared(squared, left, right, cosine=1.0):
+    """Return the squared length of arcs over chords, from the normals at both ends.
 
-    ``s^2 = r^2 + t^2 (1 / 12 + c / 45)``, exact on spheres and cylinders to fourth order of the arc's angle, and to
-    sixth order with the change of the normals.
+    ``s^2 = r^2 + (e - d)^2 (1 / 12 + c / 45) + (e + d)^2 / 20``, of the cubic that has these normals: the first term
+    for the bend that both ends share, exact on spheres and cylinders to sixth order of the arc's angle; the second for
+    what one end bends more than the other.
 
     Parameters
     ----------
     squared : ndarray
-        r^2, of the chord d.
-    turn : ndarray
-        t = d . (n_j - n_i), of the unit normals at both ends, on one side.
-    change : ndarray, optional
-        c = |n_j - n_i|^2 / 2, which is one minus the cosine between them.
+        r^2, of the chord.
+    left, right : ndarray
+        d and e: heights of the chord along the first and along the second unit normal, both on one side.
+    cosine : ndarray, optional
+        1 - c, between the normals; 1 leaves out what is of sixth order.
     """
-    return squared + turn**2 * (1.0 / 12.0 + change / 45.0)
+    return squared + (right - left) ** 2 * (1.0 / 12.0 + (1.0 - cosine) / 45.0) + (left + right) ** 2 / 20.0
 
 
 def circle_arc(chord, bend):
@@ -58,10 +57,9 @@ def projected_distance(pairs, normals):
 def arc_length(cloud):
     """Return the length of the arc that joins each pair within the surface.
 
-    ``s^2 = r^2 + (d . (n_j - n_i))^2 (1 / 12 + |n_j - n_i|^2 / 90) + g max(r^2 - a^2, 0)``. The second term is exact to
-    sixth order on spheres and cylinders, to fourth order elsewhere and where normals turn by more than 32 degrees. The
-    third one is the way up and down over roughness of mean squared slope g, the mean of both ends' roughness: finer
-    than the normals tell, but shape. Between points one spacing a apart the chord is that way.
+    That of `arc_squared`, and ``g max(r^2 - a^2, 0)`` more: the way up and down over roughness of mean squared slope g,
+    the mean of both ends' roughness, finer than the normals tell, but shape. Between points one spacing a apart the
+    chord is that way.
 
     Parameters
     ----------
@@ -76,8 +74,8 @@ def arc_length(cloud):
     pairs = cloud.pairs
     result = np.empty(len(pairs.first))
     for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, cloud.normals):
-        turn = np.where(cosine < 0.0, -right, right) - left
-        result[block] = arc_squared(pairs.distance[block] ** 2, turn, np.minimum(1.0 - np.abs(cosine), ARC))
+        right = np.where(cosine < 0.0, -right, right)
+        result[block] = arc_squared(pairs.distance[block] ** 2, left, right, np.abs(cosine))
     if cloud.roughness.any():
         least = pairs.mean(cloud.spacing) ** 2
         result += pairs.mean(cloud.roughness) * np.maximum(pairs.distance**2 - least, 0.0)
