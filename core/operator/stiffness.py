@@ -108,10 +108,16 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
 
 
 def _widths(cloud, distance, weights, areas):
-    """Return the smoothing length of the kernel whose fourth moment, 8 mu2 h^2 of the area, the weights have, (m,)."""
+    """Return the smoothing length of the kernel whose fourth moment, 8 mu2 h^2 of the area, the weights have, (m,).
+
+    It is a mean over the neighbours, as the operator would make much of what differs from point to point by chance.
+    """
     pairs = cloud.pairs
-    fourth = pairs.half(weights * distance**4)
-    width = np.sqrt((fourth.sum(axis=0) + fourth.sum(axis=1)) / (8.0 * SECOND_MOMENT * areas))
+    fourth, near = pairs.half(weights * distance**4), pairs.half(weights)
+    moment, unit = fourth.sum(axis=0) + fourth.sum(axis=1), 8.0 * SECOND_MOMENT * areas
+    total = near.sum(axis=0) + near.sum(axis=1)
+    moment, unit = (near @ (values / total) + near.T @ (values / total) for values in (moment, unit))
+    width = np.sqrt(moment / unit)
     return np.where(cloud.boundary.reached(pairs.lengths), pairs.lengths, width)
 
 
