@@ -17,10 +17,9 @@ from .normals import covariance_normals, orient_normals, unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, check_boundary, check_distances, check_points, scale_points
-from .quadrics import Quadrics, fit_nearest
+from .quadrics import Quadrics, check_surface
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
-_ROUNDS = 8  # of leaving out outliers; the first finds most of them, each other one what these had hidden
 _NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
 
 
@@ -88,9 +87,6 @@ class Cloud:
     boundary : Boundary
     pairs : Pairs
         Where the operator takes the points to be, smoothing lengths and pairs.
-    definite : bool
-        The kernel matrix is that of a smooth surface: no noise is in its distances, no pairs within reach were left out
-        because they lie on different sheets, and there are no images in a boundary.
     notices : list of str
         What a user should know.
     """
@@ -207,12 +203,7 @@ def leave_outliers(scaled, needed):
         Too few are left.
     """
     sample = Sample(scaled, np.zeros(len(scaled.points), dtype=int), find_nearest(scaled.points))
-    for _ in range(_ROUNDS):
-        outliers = find_outliers(sample.nearest)
-        if not outliers.any():
-            break
-        sample = _regroup(sample, np.where(outliers, -1, 0), needed)
-    return sample
+    return _regroup(sample, np.where(find_outliers(sample.nearest), -1, 0), needed)
 
 
 def divide_components(sample, needed):
@@ -246,7 +237,8 @@ def fit_surface(sample, sheets):
     """
     nearest = sample.nearest
     if not sheets:
-        return Surface(sample, fit_nearest(nearest))
+        check_surface(nearest.quadrics)
+        return Surface(sample, nearest.quadrics)
     quadrics, nearest = fit_sheets(nearest)
     return Surface(replace(sample, nearest=nearest), quadrics)
 

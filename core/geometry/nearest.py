@@ -1,10 +1,13 @@
 """The nearest neighbours of every point: a fixed number, before any smoothing length is known."""
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
+
+from .quadrics import fit_quadrics
 
 COUNT = 41  # the point itself and 40 others
 
@@ -39,9 +42,18 @@ class Nearest:
         """Distance between points of an even sample as dense as the nearest twelve neighbours, (m,)."""
         return spacing_of(self.distance)
 
+    @functools.cached_property
+    def quadrics(self):
+        """A quadric around every point through its neighbours, fitted once: `Quadrics`."""
+        return fit_quadrics(self.points, self.index, self.weight)
+
     def keep(self, kept):
-        """Return the same neighbours with the weight of those not kept, (m, 41) bool, set to zero."""
-        return replace(self, weight=np.where(kept, self.weight, 0.0))
+        """Return the same neighbours with the weight of those not kept, (m, 41) bool, set to zero.
+
+        A quadric has six coefficients: a point that would keep fewer than a dozen neighbours keeps all of them.
+        """
+        few = np.count_nonzero(kept & (self.weight > 0.0), axis=1) < 12
+        return replace(self, weight=np.where(kept | few[:, None], self.weight, 0.0))
 
     def averaging(self):
         """Return the (m, m) CSR matrix whose product is the weighted mean over the neighbours."""

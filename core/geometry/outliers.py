@@ -11,6 +11,7 @@ _AGREEING = 3  # of them that are enough, as on each of the three faces at a cor
 # off is half its distance from the surface, so that the rule holds at any height.
 _OFF = 0.3
 _SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
+_SEARCHES = 8  # at most; the first finds most outliers, each other one what these had hidden
 _ROUNDS = 2  # in which the quadrics of witnesses let go of what is off them
 _LET_GO, _FINEST = 3.0, 0.1  # by standard deviations, which are at least that share of the spacing
 _SPARSE = 2.5  # median spacings between points whose witnesses must show a surface that thin
@@ -34,21 +35,33 @@ def find_outliers(nearest):
     Returns
     -------
     ndarray, (m,) bool
-        Where there are many, some are only found once others have been left out.
     """
-    surface = fit_quadrics(nearest.points, nearest.index, nearest.weight)
-    spacing = nearest.spacing
-    result = np.zeros(len(spacing), dtype=bool)
+    surface, result = nearest.quadrics, np.zeros(len(nearest.points), dtype=bool)
+    for _ in range(_SEARCHES):
+        found = _off_surface(nearest, surface, result)
+        new = found & ~result
+        if not new.any():
+            break
+        result = found
+        # The quadrics around them go on without them.
+        rows = np.flatnonzero(new[nearest.index].any(axis=1))
+        nearest = nearest.keep(~result[nearest.index])
+        surface = surface.put(rows, fit_quadrics(nearest.points, nearest.index[rows], nearest.weight[rows], rows))
+    return result
+
+
+def _off_surface(nearest, surface, known):
+    """Tell which points lie off the surface, those that are known to among them, (m,) bool."""
+    spacing, result = nearest.spacing, known.copy()
     off = _third(_heights(nearest, surface, np.arange(len(spacing))))
     sparse = spacing > _SPARSE * np.median(spacing)
-    suspects = np.flatnonzero((off > _OFF * spacing) | (sparse & (surface.misfit > _OFF * spacing)))
+    suspects = np.flatnonzero(~known & ((off > _OFF * spacing) | (sparse & (surface.misfit > _OFF * spacing))))
     if not len(suspects):
         return result
     witnesses = _witnesses(nearest, suspects)
     rows = np.unique(witnesses)
-    scatter = np.zeros(len(spacing))
-    scatter[rows] = _let_go(nearest, surface, rows)
-    scatter = scatter[witnesses]
+    surface, scatter = _let_go(nearest, surface, rows)
+    scatter = scatter[np.searchsorted(rows, witnesses)]
     height = _heights(nearest, surface, suspects)
     height /= _OFF * spacing[suspects, None] + _SCATTERS * scatter
     height[sparse[suspects, None] & (scatter > _FILLING * spacing[witnesses])] = np.inf
@@ -78,21 +91,19 @@ def _heights(nearest, surface, rows):
 
 
 def _let_go(nearest, surface, rows):
-    """Fit the quadrics of some points again without the neighbours off them, and return how these scatter, (k,).
+    """Fit the quadrics of some points again without the neighbours off them, and tell how these scatter, (k,).
 
-    The scatter is the standard deviation of normal values with the same median; `surface` is changed.
+    The scatter is the standard deviation of normal values with the same median.
     """
-    points, spacing = nearest.points, nearest.spacing
-    result = np.empty(len(rows))
-    for start in range(0, len(rows), _BLOCK):
-        block = rows[start : start + _BLOCK]
-        index = nearest.index[block]
-        for _ in range(_ROUNDS):
-            height = np.abs(heights_over(surface, points, block[:, None], index))
-            scatter = np.median(height, axis=1) / 0.6745
-            far = height / (_LET_GO * np.maximum(scatter, _FINEST * spacing[block]))[:, None]
-            weight = nearest.weight[block] * np.maximum(1.0 - far**2, 1e-3) ** 2
-            surface.put(block, fit_quadrics(points, index, weight, block))
-        height = np.abs(heights_over(surface, points, block[:, None], index))
-        result[start : start + _BLOCK] = np.median(height, axis=1) / 0.6745
-    return result
+    points, index, spacing = nearest.points, nearest.index[rows], nearest.spacing[rows]
+    for _ in range(_ROUNDS):
+        height, scatter = _scatter(surface, points, rows, index)
+        far = height / (_LET_GO * np.maximum(scatter, _FINEST * spacing))[:, None]
+        weight = nearest.weight[rows] * np.maximum(1.0 - far**2, 1e-3) ** 2
+        surface = surface.put(rows, fit_quadrics(points, index, weight, rows))
+    return surface, _scatter(surface, points, rows, index)[1]
+
+
+def _scatter(surface, points, rows, index):
+    height = np.abs(heights_over(surface, points, rows[:, None], index))
+    return height, np.median(height, axis=1) / 0.6745

@@ -22,8 +22,6 @@ class Quadrics:
         Unit normals.
     gaussian_curvature : ndarray, (m,)
         Gaussian curvature [1 / L^2].
-    max_abs_curvature : ndarray, (m,)
-        The larger of the two principal curvatures, without its sign [1 / L].
     height : ndarray, (m, 3)
         From the point to the quadric, across it [L].
     shape_operator : ndarray, (m, 3, 3)
@@ -37,16 +35,17 @@ class Quadrics:
 
     normals: np.ndarray
     gaussian_curvature: np.ndarray
-    max_abs_curvature: np.ndarray
     height: np.ndarray
     shape_operator: np.ndarray
     misfit: np.ndarray
     curved: np.ndarray
 
     def put(self, rows, others):
-        """Put the quadrics of others, of k points, in the place of those of some rows, (k,) int."""
-        for quantity in fields(self):
-            getattr(self, quantity.name)[rows] = getattr(others, quantity.name)
+        """Return the same but for some rows, (k,) int, with the quadrics of others, of k points, in their place."""
+        result = {quantity.name: getattr(self, quantity.name).copy() for quantity in fields(self)}
+        for name, values in result.items():
+            values[rows] = getattr(others, name)
+        return Quadrics(**result)
 
 
 def fit_quadrics(points, index, weight, rows=None, normals=None):
@@ -73,59 +72,89 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
     rows = np.arange(len(points)) if rows is None else rows
     count = len(rows)
     fitted = Quadrics(
-        *(np.empty(shape) for shape in ((count, 3), count, count, (count, 3), (count, 3, 3), count)),
+        *(np.empty(shape) for shape in ((count, 3), count, (count, 3), (count, 3, 3), count)),
         curved=np.zeros(count, dtype=bool),
     )
     for start in range(0, count, _BLOCK):
         block = slice(start, start + _BLOCK)
-        offset = points[index[block]] - points[rows[block], None]
+        places, here = points[index[block]], points[rows[block]]
+        offset = [places[:, :, axis] - here[:, axis, None] for axis in range(3)]
         share = weight[block] / weight[block].sum(axis=1, keepdims=True)
-        centered = offset - np.einsum("ik,ikc->ic", share, offset)[:, None]
-        covariance = np.swapaxes(share[:, :, None] * centered, 1, 2) @ centered
+        covariance = _covariance(offset, share)
         if normals is None:
             variance, frame = np.linalg.eigh(covariance)
             fitted.curved[block] = variance[:, 1] < _CURVE * variance[:, 2]
         else:
             frame = frames(normals[block])
         unit = 3.0 * np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))  # makes the equations well scaled
-        z, v, u = np.moveaxis(offset @ frame / unit[:, None, None], 2, 0)
-        basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
-        weighted = np.swapaxes(basis * share[:, :, None], 1, 2)
-        fit = np.linalg.solve(weighted @ basis + _RIDGE * np.eye(6), weighted @ z[:, :, None])
-        misfit = (z - (basis @ fit)[:, :, 0]) ** 2
-        fit = fit[:, :, 0]
+        z, v, u = (
+            sum(way * side[:, None] for way, side in zip(offset, axis.T / unit, strict=True))
+            for axis in np.moveaxis(frame, 2, 0)
+        )
+        basis = np.ones_like(u), u, v, u * u, u * v, v * v
+        equations = np.empty((6, 7, len(u)))
+        for row, weighted in enumerate(share * values for values in basis):
+            equations[row, 6] = _sums(weighted, z)
+            for column in range(row + 1):
+                equations[row, column] = equations[column, row] = _sums(weighted, basis[column])
+        fit = _solve(equations).T
+        missed = z - sum(values * part[:, None] for values, part in zip(basis, fit.T, strict=True))
         slope = 1.0 + fit[:, 1] ** 2 + fit[:, 2] ** 2
         local = np.stack([np.ones_like(slope), -fit[:, 2], -fit[:, 1]], axis=1) / np.sqrt(slope)[:, None]
-        mean, turn = fit[:, 3] + fit[:, 5], np.hypot(fit[:, 3] - fit[:, 5], fit[:, 4])
         fitted.normals[block] = np.einsum("iab,ib->ia", frame, local)
         fitted.gaussian_curvature[block] = (4.0 * fit[:, 3] * fit[:, 5] - fit[:, 4] ** 2) / (slope * unit) ** 2
-        fitted.max_abs_curvature[block] = (np.abs(mean) + turn) / unit
         form = np.empty((len(fit), 2, 2))
         form[:, 0, 0], form[:, 1, 1] = -2.0 * fit[:, 3], -2.0 * fit[:, 5]
         form[:, 0, 1] = form[:, 1, 0] = -fit[:, 4]
         tangents = frame[:, :, :0:-1]  # u, v
         fitted.shape_operator[block] = (tangents @ form @ np.swapaxes(tangents, 1, 2)) / unit[:, None, None]
         fitted.height[block] = (fit[:, 0] * unit)[:, None] * frame[:, :, 0]
-        fitted.misfit[block] = np.sqrt((share * misfit).sum(axis=1)) * unit
+        fitted.misfit[block] = np.sqrt(_sums(share * missed, missed)) * unit
     return fitted
 
 
-def fit_nearest(nearest):
-    """Fit a quadric around every point to its nearest neighbours, on which all that is known of the surface rests.
+def _covariance(offset, share):
+    """Return the covariance of offsets, three of (k, neighbors), whose shares sum to one, (k, 3, 3)."""
+    result = np.empty((len(share), 3, 3))
+    centered = [way - _sums(share, way)[:, None] for way in offset]
+    for row, weighted in enumerate(share * way for way in centered):
+        for column in range(row + 1):
+            result[:, row, column] = result[:, column, row] = _sums(weighted, centered[column])
+    return result
+
+
+def _solve(equations):
+    """Solve positive definite equations, (c, c + 1, k) with the right sides last, by elimination; (c, k).
+
+    All k at one time: numpy's own solver takes many times as long for as small ones.
+    """
+    count = len(equations)
+    equations[range(count), range(count)] += _RIDGE
+    for pivot in range(count):
+        equations[pivot] /= equations[pivot, pivot].copy()
+        others = np.arange(count) != pivot
+        equations[others] -= equations[others, pivot, None] * equations[pivot]
+    return equations[:, -1]
+
+
+def _sums(left, right):
+    return np.einsum("ik,ik->i", left, right)
+
+
+def check_surface(quadrics):
+    """Check that the points are those of a surface, for all that is known of it rests on their quadrics.
 
     Raises
     ------
     NotASurfaceError
         The points of many neighbourhoods lie along a curve.
     """
-    fitted = fit_quadrics(nearest.points, nearest.index, nearest.weight)
-    curves, count = np.count_nonzero(fitted.curved), len(fitted.curved)
+    curves, count = np.count_nonzero(quadrics.curved), len(quadrics.curved)
     if curves > _CURVES * count:
         raise NotASurfaceError(
             f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane."
             " Use points of a surface."
         )
-    return fitted
 
 
 def heights_over(quadrics, points, rows, other):

@@ -6,7 +6,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 
 from .components import label_connected, number_by_size
 from .distances import pair_heights
-from .quadrics import fit_nearest, fit_quadrics, frames
+from .quadrics import check_surface, fit_quadrics, frames
 
 _CLOSE = 0.6  # sheets nearer than this many spacings are taken as one
 _GAP = 0.35  # of the spacing: a step along a sheet leads over none that is wider
@@ -97,7 +97,8 @@ def fit_sheets(nearest):
         With the neighbours on other sheets at weight zero.
     """
     points, index = nearest.points, nearest.index
-    surface = fit_nearest(nearest)
+    surface = nearest.quadrics
+    check_surface(surface)
     spacing = nearest.spacing
     mixed = np.flatnonzero(surface.misfit > _MISFIT * spacing)
     if not len(mixed):
@@ -112,12 +113,10 @@ def fit_sheets(nearest):
     touched = np.flatnonzero(touched | touched[index].any(axis=1))
     kept = np.ones(index.shape, dtype=bool)
     kept[touched] = on_sheet(nearest, normals, touched, index[touched], nearest.distance[touched])[0]
-    # A quadric has six coefficients; a point that keeps fewer than a dozen neighbours keeps all of them.
-    kept |= (kept & (nearest.weight > 0.0)).sum(axis=1, keepdims=True) < 12
-    nearest = nearest.keep(kept)
-    again = np.flatnonzero(~kept.all(axis=1))
+    whole, nearest = nearest.weight, nearest.keep(kept)
+    again = np.flatnonzero((nearest.weight != whole).any(axis=1))
     if len(again):
-        surface.put(again, fit_quadrics(points, index[again], nearest.weight[again], again, normals[again]))
+        surface = surface.put(again, fit_quadrics(points, index[again], nearest.weight[again], again, normals[again]))
     return surface, nearest
 
 
