@@ -103,7 +103,6 @@ class Cloud:
     roughness: np.ndarray
     boundary: Boundary
     pairs: Pairs
-    definite: bool
     notices: list
 
 
@@ -153,7 +152,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     own = final_normals(nearest, pairs, given, oriented, options)
 
     report("Neighbors", 0.4)
-    separated = separate_sheets(pairs, nearest, oriented) if options.sheets else pairs
+    pairs = separate_sheets(pairs, nearest, oriented) if options.sheets else pairs
     side = np.sign(np.einsum("ij,ij->i", own, quadrics.normals))
     count = len(own)
     return Cloud(
@@ -171,8 +170,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         if noise > 0.0 and options.projection == "auto"
         else measure_roughness(nearest, quadrics.normals),
         boundary=boundary,
-        pairs=separated,
-        definite=noise == 0.0 and separated is pairs and not np.isfinite(boundary.distance).any(),
+        pairs=pairs,
         notices=_notices(
             duplicates=len(points) - len(scaled.points),
             left_out=len(scaled.points) - len(own),
@@ -184,7 +182,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
 
 def leave_outliers(scaled, needed):
-    """Leave out distinct points that do not lie on the surface of their neighbours, as long as there are new ones.
+    """Leave out distinct points that do not lie on the surface of their neighbours.
 
     Parameters
     ----------

@@ -14,14 +14,9 @@ from .curvature import kernel_integral, uneven
 from .images import image_excess, mirror, own_images
 
 _FLOOR = 0.5  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
-_STEPS = 60, 40, 20, 20, 10, 10  # of the rounds of the fast areas where the kernel matrix is definite
-_INDEFINITE = (  # where it is not: its least eigenvalue, then steps of each round and what eigenvalues it resolves
-    (-0.005, ((80, 5e-3), (80, 5e-3), (20, 5e-2))),
-    (-0.02, ((80, 1e-2), (80, 1e-2), (20, 5e-2))),
-    (-1.0, ((100, 5e-2), (100, 5e-2))),
-)
+_DEGREES = 100, 50  # of the polynomials of two rounds: the second makes up for what the floor changed in the first
+_WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] can tell from zero
 _SMOOTH = 12  # means over the kernel after which the share of cells and areas is one of parts, not of points
-_GROWTH = 4.0  # of a squared residual, that only an eigenvalue below the expected least one can cause
 _EVEN = 1e-9  # changes of h, as a share, that are none
 NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
 
@@ -116,7 +111,7 @@ def solve_areas(cloud, distance, options, report=lambda: None):
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
     if options.curvature_correction:
         target += _gain(matrix, lengths)
-    solution = SOLVERS[options.areas](matrix, target, cloud.cell_areas, cloud.definite, options.regularization)
+    solution = SOLVERS[options.areas](matrix, target, cloud.cell_areas, options.regularization)
     if options.areas != "fast":
         return solution
     return replace(solution, areas=_like_cells(matrix, solution.areas, cloud))
@@ -175,20 +170,16 @@ class KernelMatrix:
         return self._diagonal * values + self._half @ values + self._half.T @ values
 
 
-def fast_areas(matrix, target, cells, definite=True, rho=None):
-    """Solve A v = b by a few projected rounds of polynomials in A, from the areas c of the Voronoi cells.
+def fast_areas(matrix, target, cells, rho=None):
+    """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells.
 
-    M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [0, 1]. Each round adds p(M) times the residual
-    to y in M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue and bounded below
-    it: the smooth part is solved for, and what the kernel cannot see stays near the cells. Between rounds areas below
-    the floor of c / 2 are put on it, held there, and released when the gradient turns inward; the later rounds, which
-    are shorter, make up for what that changes at large. A fixed number of linear steps, unlike conjugate gradients,
-    does not amplify rounding: the result is the same to 1e-10 for any order of the points.
-
-    Where pairs were left out, between close sheets, or images added, next to boundaries, or distances are those of
-    noisy points, M has negative eigenvalues too, most often next to none. What belongs to them, and to positive ones as
-    small, is no smooth part: p leaves it alone. Where they turn out to lie lower than expected, the solution starts
-    anew with less resolved; none lies below -1.
+    M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [-1, 1]; but for pairs left out between close
+    sheets, images in boundaries and noise they would be positive. Each round adds p(M) times the residual to y in
+    M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue, and next to nothing below
+    it: the smooth part is solved for, and what the kernel cannot see stays near the cells. In between, areas below the
+    floor of c / 2 are put on it, held there, and released when the gradient turns inward. A fixed number of linear
+    steps, unlike conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order of the
+    points.
 
     Parameters
     ----------
@@ -198,8 +189,6 @@ def fast_areas(matrix, target, cells, definite=True, rho=None):
         b, the integral that the kernel should have at each point (1 on a flat surface).
     cells : ndarray, (n,)
         Areas of the Voronoi cells.
-    definite : bool
-        There is no noise, no pairs were left out, and no images added.
     rho : float, optional
         Not used: what the kernel cannot see is regularized towards the cells.
 
@@ -208,69 +197,35 @@ def fast_areas(matrix, target, cells, definite=True, rho=None):
     AreaSolution
     """
     root = np.sqrt(cells / (matrix @ cells))
-    right, start = root * target, cells / root
-    floor = _FLOOR * start
-    products = 1
-
-    def multiply(y):
-        nonlocal products
-        products += 1
-        return root * (matrix @ (root * y))
-
-    for least, rounds in _polynomials()[0 if definite else 1 :]:
-        y, held = start, np.zeros(len(target), dtype=bool)
-        for coefficients in rounds:
-            residual = right - multiply(y)
-            held &= residual < 0.0
-            residual[held] = 0.0
-            change = _polynomial(multiply, residual, held, least, coefficients)
-            if change is None:
-                break
-            y = np.maximum(y + change, floor)
-            held = y <= floor
-        else:
-            break
-    return AreaSolution(root * y, products, True)
+    right, y = root * target, cells / root
+    floor = _FLOOR * y
+    held = np.zeros(len(target), dtype=bool)
+    for degree in _DEGREES:
+        residual = right - root * (matrix @ (root * y))
+        held &= residual < 0.0
+        residual[held] = 0.0
+        y = np.maximum(y + _polynomial(matrix, root, residual, held, _inverse(degree)), floor)
+        held = y <= floor
+    return AreaSolution(root * y, sum(_DEGREES) + 1 + len(_DEGREES), True)
 
 
-def _polynomial(multiply, residual, held, least, coefficients):
-    """Evaluate a Chebyshev series in M, over [least, 1], on the free part of a residual; None if M reaches lower."""
-    center, radius = 0.5 * (1.0 + least), 0.5 * (1.0 - least)
+def _polynomial(matrix, root, residual, held, coefficients):
+    """Evaluate a Chebyshev series in M on the free part of a residual."""
     before, now = 0.0, residual
     result = coefficients[0] * residual
     for step, coefficient in enumerate(coefficients[1:]):
-        image = multiply(now)
+        image = root * (matrix @ (root * now))
         image[held] = 0.0
-        before, now = now, (image - center * now) * ((2.0 if step else 1.0) / radius) - before
-        if now @ now > _GROWTH * (residual @ residual):
-            return None
+        before, now = now, image * (2.0 if step else 1.0) - before
         result += coefficient * now
     return result
 
 
 @functools.cache
-def _polynomials():
-    """Return pairs of a least eigenvalue and the Chebyshev series of each round: definite, then ever less so."""
-
-    def semi_iteration(steps, x):
-        """What `steps` of Chebyshev's semi-iteration make of 1 / x; they reduce what they resolve to a ninth."""
-        least = (1.45 / steps) ** 2
-        ends = np.array([0.0, *np.atleast_1d(x)])
-        values = chebyshev.chebval((1.0 + least - 2.0 * ends) / (1.0 - least), [0.0] * steps + [1.0])
-        return (1.0 - values[1:] / values[0]) / x
-
-    def positive(width, x):
-        """1 / x for x well above the width, with little left near zero and next to nothing below."""
-        return expit(2.0 * x / width) * x / (x * x + width * width)
-
-    def series(function, first, least, degree):
-        middle, half = 0.5 * (1.0 + least), 0.5 * (1.0 - least)
-        return chebyshev.chebinterpolate(lambda t: function(first, middle + half * t), degree)
-
-    result = [(0.0, [series(semi_iteration, steps, 0.0, steps - 1) for steps in _STEPS])]
-    for least, rounds in _INDEFINITE:
-        result.append((least, [series(positive, width, least, steps) for steps, width in rounds]))
-    return result
+def _inverse(degree):
+    """Return the Chebyshev series over [-1, 1] of 1 / x for x well above the width; near zero and below, of nothing."""
+    width = _WIDTH / degree
+    return chebyshev.chebinterpolate(lambda x: expit(2.0 * x / width) * x / (x * x + width * width), degree)
 
 
 SOLVERS = {"fast": fast_areas}

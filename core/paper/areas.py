@@ -143,7 +143,7 @@ def algorithm_1(matrix, target, start, rho=1e-3, epsilon=1e-3, nu=1e-4, beta=0.1
     return DescentResult(v, np.array(objective), len(objective) - 1, residual, residual <= epsilon, stalled)
 
 
-def _regularized(matrix, target, cells, definite, rho):
+def _regularized(matrix, target, cells, rho):
     solution = regularized_areas(matrix, target, rho)
     bad = int(np.count_nonzero(solution.areas <= 0.0))
     if bad:
@@ -154,12 +154,12 @@ def _regularized(matrix, target, cells, definite, rho):
     return solution
 
 
-def _uniform(matrix, target, cells, definite, rho):
+def _uniform(matrix, target, cells, rho):
     solution = regularized_areas(matrix, target, rho)
     return replace(solution, areas=np.full(len(target), solution.areas.mean()))
 
 
-def _constrained(matrix, target, cells, definite, rho):
+def _constrained(matrix, target, cells, rho):
     return constrained_areas(matrix, target, rho)
 
 

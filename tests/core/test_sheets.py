@@ -114,7 +114,7 @@ class TestPairs:
         opposite = faces & (face[pairs.first] + face[pairs.second] == 1)
         around = inset[pairs.first] + inset[pairs.second] + 2.0
         # Steps of a way cut the corners of the grid, so that it is up to a quarter shorter.
-        return np.count_nonzero(opposite & (around > 2.0 * pairs.distance * cloud.scaled.scale)), cloud
+        return np.count_nonzero(opposite & (around > 2.0 * pairs.distance * cloud.scaled.scale))
 
     @staticmethod
     def across_the_arms(capsule, options):
@@ -128,28 +128,22 @@ class TestPairs:
         # The way around the bend is shortest on its inside.
         around = (arm - low) + np.pi * (bend - 0.25) + (high - arm - np.pi * bend)
         reach = 3.0 * pairs.mean(pairs.lengths) * cloud.scaled.scale
-        return np.count_nonzero((low < arm) & (high > arm + np.pi * bend) & (around > 1.5 * reach)), cloud
+        return np.count_nonzero((low < arm) & (high > arm + np.pi * bend) & (around > 1.5 * reach))
 
     def test_none_through_a_closed_plate(self, plate):
-        count, cloud = self.through_the_plate(plate, LaplacianOptions())
-        assert count == 0
-        assert not cloud.definite
+        assert self.through_the_plate(plate, LaplacianOptions()) == 0
 
     def test_none_from_arm_to_arm_of_a_bent_capsule(self, capsule):
-        count, cloud = self.across_the_arms(capsule, LaplacianOptions())
-        assert count == 0
-        assert not cloud.definite
+        assert self.across_the_arms(capsule, LaplacianOptions()) == 0
 
     def test_there_would_be_many_without_the_option(self, plate, capsule):
         options = LaplacianOptions(sheets=False)
-        for count, cloud in (self.through_the_plate(plate, options), self.across_the_arms(capsule, options)):
+        for count in (self.through_the_plate(plate, options), self.across_the_arms(capsule, options)):
             assert count > 1000
-            assert cloud.definite
 
     @pytest.mark.parametrize("points", [random_sphere(1500), torus_points(4000)], ids=["sphere", "torus"])
     def test_none_is_left_out_where_no_sheets_are_close(self, points):
         apart = read_cloud(points, LaplacianOptions())
-        assert apart.definite
         assert len(apart.pairs.first) == len(read_cloud(points, LaplacianOptions(sheets=False)).pairs.first)
 
 
