@@ -12,7 +12,7 @@ from .cells import measure_cells
 from .components import label_components, move_apart
 from .distances import measure_roughness
 from .nearest import Nearest, find_nearest
-from .noise import FILLING, LEAST, LITTLE, MOST, STRONG, noise_level, project_points
+from .noise import FILLING, LEFT, MOST, noise_level, project_points
 from .normals import covariance_normals, orient_normals, unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
@@ -20,7 +20,7 @@ from .points import ScaledPoints, check_boundary, check_distances, check_points,
 from .quadrics import Quadrics, check_surface
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
-_NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide, and the share of points that tells of it
+_NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide; the share of points that tells of it
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,14 @@ class Sample:
         Of each point, the largest 0.
     nearest : Nearest
         Neighbours of each point; components stand far apart there, and noisy points are where they were moved to.
+    noise : ndarray, (m,)
+        What was smoothed at each point, as a share of the spacing; zero where nothing was.
     """
 
     scaled: ScaledPoints
     component: np.ndarray
     nearest: Nearest
+    noise: np.ndarray
 
     @property
     def moved(self):
@@ -53,11 +56,6 @@ class Surface:
 
     sample: Sample
     quadrics: Quadrics
-
-    @property
-    def misfit(self):
-        """Median distance of neighbours from their quadric, as a share of the spacing."""
-        return np.median(self.quadrics.misfit / self.sample.nearest.spacing)
 
 
 @dataclass(frozen=True)
@@ -134,8 +132,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     scaled = scale_points(points, needed)
     sample = divide_components(leave_outliers(scaled, needed), needed)
     surface = fit_surface(sample, options.sheets)
-    noise = measure_noise(surface)
-    surface = remove_noise(surface, noise, options)
+    surface = remove_noise(surface, options)
     if options.sheets:
         surface = divide_sheets(surface, needed)
     sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
@@ -154,7 +151,6 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     report("Neighbors", 0.4)
     pairs = separate_sheets(pairs, nearest, oriented) if options.sheets else pairs
     side = np.sign(np.einsum("ij,ij->i", own, quadrics.normals))
-    count = len(own)
     return Cloud(
         scaled=sample.scaled,
         component=sample.component,
@@ -166,16 +162,14 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         spacing=nearest.spacing,
         misfit=quadrics.misfit,
         # What sticks out is noise where there is any, and shape where not.
-        roughness=np.zeros(count)
-        if noise > 0.0 and options.projection == "auto"
-        else measure_roughness(nearest, quadrics.normals),
+        roughness=np.where(sample.noise > 0.0, 0.0, measure_roughness(nearest, quadrics.normals)),
         boundary=boundary,
         pairs=pairs,
         notices=_notices(
             duplicates=len(points) - len(scaled.points),
             left_out=len(scaled.points) - len(own),
             share=1.0 - len(own) / len(scaled.points),
-            noise=noise if options.projection == "auto" else 0.0,
+            noise=sample.noise,
             narrow=np.mean(lengths > _NARROW * depth(nearest, boundary.distance)) > _MANY,
         ),
     )
@@ -200,7 +194,8 @@ def leave_outliers(scaled, needed):
     ComponentError
         Too few are left.
     """
-    sample = Sample(scaled, np.zeros(len(scaled.points), dtype=int), find_nearest(scaled.points))
+    count = len(scaled.points)
+    sample = Sample(scaled, np.zeros(count, dtype=int), find_nearest(scaled.points), np.zeros(count))
     return _regroup(sample, np.where(find_outliers(sample.nearest), -1, 0), needed)
 
 
@@ -241,36 +236,39 @@ def fit_surface(sample, sheets):
     return Surface(replace(sample, nearest=nearest), quadrics)
 
 
-def measure_noise(surface):
-    """Return the noise of a surface as a share of the spacing; see `noise_level`."""
-    return noise_level(surface.sample.nearest.tree, surface.misfit)
-
-
-def remove_noise(surface, noise, options):
-    """Move the points onto the surface that their neighbours describe, where the options or the noise ask for it.
+def remove_noise(surface, options):
+    """Move points onto the surface that their neighbours describe, where the options or the noise ask for it.
 
     Returns
     -------
     Surface
         The same one where nothing is to be done.
     """
-    method, rounds = options.projection, 1
-    if method == "auto":
-        method, rounds = "quadric", 0 if noise < LEAST else 1 if noise <= STRONG else 2
-    if method == "off" or not rounds:
+    method, noise = options.projection, _noise(surface)
+    if method in ("quadric", "plane"):
+        return _project(surface, method, noise, np.ones(len(noise), dtype=bool), options.sheets)
+    noisy = (noise > 0.0) & (method == "auto")
+    if noisy.mean() < _MANY:  # it is the scanner's, and so no matter of a few places
         return surface
-    result = _project(surface, method, noise, rounds, options.sheets)
-    if options.projection == "auto" and noise > FILLING:
-        while rounds < MOST and result.misfit > LITTLE:
-            result, rounds = _project(result, method, noise, 1, options.sheets), rounds + 1
-    return result
+    first, filling = np.where(noisy, noise, 0.0), noise > FILLING
+    for _ in range(MOST):
+        level = np.where(filling, first, noise)
+        surface = _project(surface, "quadric", level, noisy, options.sheets)
+        noise, missed = _noise(surface), surface.quadrics.misfit / surface.sample.nearest.spacing
+        noisy &= np.where(filling, np.median(missed[filling]) if filling.any() else 0.0, noise) > LEFT
+        if not noisy.any():
+            break
+    return replace(surface, sample=replace(surface.sample, noise=first))
 
 
-def _project(surface, method, noise, rounds, sheets):
-    sample, nearest = surface.sample, surface.sample.nearest
-    for _ in range(rounds):
-        nearest = find_nearest(project_points(nearest.points, method, noise, sample.component))
-    return fit_surface(replace(sample, nearest=nearest), sheets)
+def _noise(surface):
+    return noise_level(surface.sample.nearest, surface.quadrics.misfit)
+
+
+def _project(surface, method, noise, moving, sheets):
+    sample, points = surface.sample, surface.sample.nearest.points
+    moved = project_points(points, method, noise, sample.component)
+    return fit_surface(replace(sample, nearest=find_nearest(np.where(moving[:, None], moved, points))), sheets)
 
 
 def divide_sheets(surface, needed):
@@ -303,8 +301,8 @@ def _regroup(sample, component, needed):
             f"{count} of {len(out)} points lie apart from each other, in components of too few points. Use points of a"
             " surface, or delete the lone ones."
         )
-    scaled, component = sample.scaled.leave_out(out), component[~out]
-    return Sample(scaled, component, find_nearest(move_apart(scaled.points, component) + sample.moved[~out]))
+    scaled, component, moved = sample.scaled.leave_out(out), component[~out], sample.moved[~out]
+    return Sample(scaled, component, find_nearest(move_apart(scaled.points, component) + moved), sample.noise[~out])
 
 
 def locate_boundary(sample, oriented, search, boundary=None, boundary_distance=None):
@@ -358,11 +356,13 @@ def final_normals(nearest, pairs, given, oriented, options):
 
 def _notices(duplicates, left_out, share, noise, narrow):
     """Say what a user should know of the walk, where there is something to say."""
+    noisy, filling = noise > 0.0, np.mean(noise > FILLING)
     texts = {
         f"Points that lie exactly on another one: {duplicates}. They share one area.": duplicates,
-        f"Noise of {noise:.2f} of the spacing was smoothed within the operator.": LEAST <= noise <= FILLING,
+        f"Noise of {noise[noisy].mean() if noisy.any() else 0.0:.2f} of the spacing was smoothed within the operator, at"
+        f" {noisy.mean():.0%} of the points.": noisy.mean() > filling,
         "Noise of more than half the spacing was smoothed within the operator, and details with it: areas may be off by"
-        " 10 % and more. Use more exact points.": noise > FILLING,
+        f" 10 % and more. So it is at {filling:.0%} of the points: use more exact ones.": filling > _MANY,
         f"Points that lie apart from the rest or off the surface, left out of the operator: {left_out}"
         f" ({100.0 * share:.2g} %).": left_out,
         "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"

@@ -14,7 +14,6 @@ from core.geometry.cloud import (
     fit_surface,
     leave_outliers,
     locate_boundary,
-    measure_noise,
     read_cloud,
     remove_noise,
 )
@@ -68,16 +67,25 @@ def test_noise_is_removed_where_it_is_measured():
     points = fibonacci_sphere(3000)
     points *= 1.0 + 0.02 * np.random.default_rng(0).standard_normal(len(points))[:, None]
     surface = fit_surface(sample_of(points), True)
-    noise = measure_noise(surface)
-    smooth = remove_noise(surface, noise, core.LaplacianOptions())
-    assert noise > 0.1
+    smooth = remove_noise(surface, core.LaplacianOptions())
+    assert smooth.sample.noise.min() > 0.1
     assert np.std(radii(smooth.sample)) < 0.45 * np.std(radii(surface.sample))
     np.testing.assert_allclose(
         smooth.sample.nearest.points - surface.sample.nearest.points, smooth.sample.moved, atol=1e-15
     )
-    assert remove_noise(surface, noise, core.LaplacianOptions(projection="off")) is surface
-    assert remove_noise(surface, 0.0, core.LaplacianOptions()) is surface
-    assert remove_noise(surface, 0.0, core.LaplacianOptions(projection="plane")) is not surface
+    assert remove_noise(surface, core.LaplacianOptions(projection="off")) is surface
+    clean = fit_surface(sample_of(fibonacci_sphere(3000)), True)
+    assert remove_noise(clean, core.LaplacianOptions()) is clean
+    assert remove_noise(clean, core.LaplacianOptions(projection="plane")) is not clean
+
+
+def test_noise_is_removed_on_the_noisy_side_alone():
+    points = fibonacci_sphere(4000)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(len(points)) * (points[:, 2] > 0.0)
+    smooth = remove_noise(fit_surface(sample_of(points * (1.0 + noise[:, None])), True), core.LaplacianOptions())
+    moved = np.linalg.norm(smooth.sample.moved, axis=1)[np.argsort(smooth.sample.scaled.first)]
+    assert np.all(moved[points[:, 2] < -0.3] == 0.0)
+    assert np.mean(moved[points[:, 2] > 0.3] > 0.0) > 0.99
 
 
 def test_sheets_that_nowhere_meet_become_components():
