@@ -15,6 +15,7 @@ _MEMORY = 5  # earlier rounds that a step is extrapolated from
 _RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the terms apart
 _LARGEST = 1.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
 _SMALLEST = 1e-8  # share of what rounds change that an extrapolation goes by: less would be rounding
+_BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 _TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 
 
@@ -117,36 +118,38 @@ class _Moments:
     """The moments of weights around every point, in units of those that the kernel has."""
 
     def __init__(self, cloud, distance, weights, unit, report):
-        pairs, normals = cloud.pairs, cloud.normals
+        pairs = cloud.pairs
         self._pairs, self._weights, self._unit, self._report = pairs, weights, unit, report
         self._ends = pairs.first, pairs.second
-        i, j = self._ends
-        places = np.ascontiguousarray(pairs.points.T)
-        tangents = np.moveaxis(frames(normals)[:, :, 1:], 2, 0)
-        left, right = ([values[ends] for values in np.ascontiguousarray(normals.T)] for ends in (i, j))
-        chord = [values[j] - values[i] for values in places]
-        side = np.where(_dot(left, right) < 0.0, -1.0, 1.0)
-        # How far the geodesic bends away from the chord, to third order, within the tangent plane.
-        turn = (side * _dot(chord, right) - _dot(chord, left)) / 6.0
-        ways = (
-            [d + side * turn * n for d, n in zip(chord, right, strict=True)],
-            [turn * n - d for d, n in zip(chord, left, strict=True)],
-        )
-        self._basis = []
-        for ends, way in zip(self._ends, ways, strict=True):
+        self._blocks = [slice(start, start + _BLOCK) for start in range(0, len(weights), _BLOCK)]
+        self._basis = np.empty((2, _TERMS, len(weights)))
+        places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
+        tangents = frames(cloud.normals)[:, :, 1:].transpose(2, 1, 0).copy()
+        for block in self._blocks:
             report()
-            x, y = (_dot(way, [values[ends] for values in np.ascontiguousarray(axes.T)]) for axes in tangents)
-            size = distance / (np.maximum(np.sqrt(x * x + y * y), 1e-300) * pairs.lengths[ends])
-            x, y = x * size, y * size
-            self._basis.append((x * x + y * y, x, y, x * x - y * y, 2.0 * x * y))
+            i, j = ends = [index[block] for index in self._ends]
+            chord, left, right = places[:, j] - places[:, i], normals[:, i], normals[:, j]
+            right *= np.where(_dot(left, right) < 0.0, -1.0, 1.0)
+            # How far the geodesic bends away from the chord, to third order, within the tangent plane.
+            turn = (_dot(chord, right) - _dot(chord, left)) / 6.0
+            ways = chord + turn * right, turn * left - chord
+            for basis, end, way in zip(self._basis[:, :, block], ends, ways, strict=True):
+                x, y = (_dot(way, axis[:, end]) for axis in tangents)
+                size = distance[block] / (np.maximum(np.hypot(x, y), 1e-300) * pairs.lengths[end])
+                x, y = x * size, y * size
+                basis[:] = x * x + y * y, x, y, x * x - y * y, 2.0 * x * y
 
     def factor(self, terms):
         """Return the factor of each pair's weight, (p,)."""
-        power = np.zeros(len(self._weights))
-        for ends, basis in zip(self._ends, self._basis, strict=True):
-            for column, values in enumerate(basis):
-                power += np.ascontiguousarray(terms[:, column])[ends] * values
-        return np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST, out=power), out=power)
+        result, terms = np.empty(len(self._weights)), terms.T.copy()
+        for block in self._blocks:
+            power = sum(
+                values[end[block]] * part[block]
+                for end, basis in zip(self._ends, self._basis, strict=True)
+                for values, part in zip(terms, basis, strict=True)
+            )
+            np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST), out=result[block])
+        return result
 
     def of(self, terms):
         """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
@@ -170,4 +173,4 @@ class _Moments:
 
 
 def _dot(left, right):
-    return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
+    return np.einsum("cp,cp->p", left, right)
