@@ -288,17 +288,17 @@ def _weights(laplacian, fixed, values):
     boundary = np.flatnonzero(laplacian.boundary)
     near = np.flatnonzero(laplacian.near_boundary)
     nothing = np.zeros(count)
-    if not fixed[boundary].any() or not laplacian.dirichlet_images.nnz:
+    if not fixed[boundary].any() or not laplacian.images.nnz:
         return weights.tocsr(), nothing, nothing
     nearest = boundary[cKDTree(laplacian.points[boundary]).query(laplacian.points[near], workers=-1)[1]]
     chosen, c = np.zeros(count), np.zeros(count)
     chosen[near] = fixed[nearest]
     c[near] = values[nearest]
     only = sparse.diags_array(chosen)
-    plain = (weights - only @ laplacian.neumann_images @ only).tocsr()
+    plain = (weights - only @ laplacian.images @ only).tocsr()
     plain.setdiag(0.0)
     # An image is no nearer than its point, but for the curvature of the boundary.
-    image = (only @ laplacian.dirichlet_images @ only).tocsr()
+    image = (only @ laplacian.images @ only).tocsr()
     image = image.minimum(plain + sparse.diags_array(image.diagonal()))
     total = image.sum(axis=1)
     return (plain - (image - sparse.diags_array(image.diagonal()))).tocsr(), 2.0 * total, total * c + image @ c

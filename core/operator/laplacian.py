@@ -60,9 +60,8 @@ class LaplaceBeltrami:
     stiffness : csr_array, (n, n)
         Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the Neumann one: no flow
         across.
-    neumann_images, dirichlet_images : csr_array, (n, n)
-        Weights of the mirror images in the boundary that `stiffness` holds, and of those that `dirichlet` puts in their
-        place; symmetric, not negative.
+    images : csr_array, (n, n)
+        Weights of the mirror images in the boundary that `stiffness` holds; symmetric, not negative.
     options : LaplacianOptions
         The settings it was built with.
     notices : list of str
@@ -84,8 +83,7 @@ class LaplaceBeltrami:
     smoothing_lengths: np.ndarray
     kernel_widths: np.ndarray
     stiffness: sparse.csr_array
-    neumann_images: sparse.csr_array
-    dirichlet_images: sparse.csr_array
+    images: sparse.csr_array
     options: LaplacianOptions
     notices: list
 
@@ -102,9 +100,8 @@ class LaplaceBeltrami:
             ``stiffness @ f = areas * source + pull @ c`` solves -Delta f = source with the values c at the boundary; c
             (n,) holds at every point the value at the nearest boundary point.
         """
-        natural = sparse.diags_array(self.neumann_images.sum(axis=1)) - self.neumann_images
-        pull = sparse.diags_array(self.dirichlet_images.sum(axis=1)) + self.dirichlet_images
-        return (self.stiffness - natural + pull).tocsr(), pull.tocsr()
+        pull = sparse.diags_array(self.images.sum(axis=1)) + self.images
+        return (self.stiffness + 2.0 * self.images).tocsr(), pull.tocsr()
 
     def apply(self, values, raw=False):
         """Apply the operator in its strong form.
@@ -340,8 +337,7 @@ def build_laplacian(
         smoothing_lengths=scaled.scatter(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         kernel_widths=scaled.scatter(assembled.widths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         stiffness=assembled.matrix,
-        neumann_images=assembled.neumann_images,
-        dirichlet_images=assembled.dirichlet_images,
+        images=assembled.images,
         options=options,
         notices=notices,
     )

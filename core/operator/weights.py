@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import frames
-from ..kernel import SECOND_MOMENT
+from ..kernel import SECOND_MOMENT, SUPPORT
 from .curvature import second_moment, uneven
 
 _ROUNDS = 12  # of the solver, at most
@@ -28,7 +28,7 @@ class Balance:
     factor : ndarray, (p,)
         By which each pair's weight is multiplied, positive.
     residual : ndarray, (m,)
-        What the moments of each point are off by, relatively; zero next to boundaries, where they are not balanced.
+        What the moments of each point are off by, relatively.
     """
 
     factor: np.ndarray
@@ -46,6 +46,9 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     polynomial p_i without a constant for each point. Its coefficients solve a convex problem, whose gradient is what
     the moments are off by.
 
+    Next to a boundary images complete the sums, and functions do not change across it: quadratic are the square of the
+    distance to it, and what they are along it. A pair and its image take one factor.
+
     It is solved by Newton's method point by point, the other ends of the pairs held, and Anderson's extrapolation from
     the last rounds. Where a few points lie in a row, or on one side, no weights have these moments: the residual says
     so.
@@ -53,11 +56,11 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     Parameters
     ----------
     cloud : Cloud
-        Of m points, with p pairs. Next to boundaries, where images complete the sums, points keep their weights.
+        Of m points, with p pairs.
     distance : ndarray, (p,)
         Distance of each pair along the surface.
     weights : ndarray, (p,)
-        Pair weights, areas of both ends included.
+        Pair weights, areas of both ends included, and those of the images in boundaries added to the pairs they are of.
     areas : ndarray, (m,)
         Area elements.
     report : callable
@@ -68,16 +71,13 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     Balance
     """
     lengths = cloud.pairs.lengths
-    free = ~cloud.boundary.reached(lengths)
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
     inverse = np.linalg.inv(moments.curvature() + _RIDGE * np.eye(_TERMS))
-    inverse[~free] = 0.0
     goal = np.zeros((len(areas), _TERMS))
     goal[:, 0] = 1.0
     terms, earlier = np.zeros_like(goal), []
     for step in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
-        missing[~free] = 0.0
         residual = np.linalg.norm(missing, axis=1)
         if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
@@ -114,6 +114,31 @@ def _trace(cloud, weights, areas):
     return second_moment(lengths, cloud.gaussian_curvature) * (1.0 + uneven(gain))
 
 
+class _Edges:
+    """The terms of points next to boundaries, where the images make even what is odd across them."""
+
+    def __init__(self, cloud, tangents):
+        boundary, lengths = cloud.boundary, cloud.pairs.lengths[:, None]
+        across = np.einsum("tci,isc->sti", tangents, boundary.outward)
+        self._across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+        self._inside = np.minimum(boundary.distance / lengths, SUPPORT).T
+        self._corner = self._inside[1] < SUPPORT
+
+    def terms(self, rows, x, y):
+        """Return the terms of the ways (x, y) from some points, (5, k).
+
+        What counts is the square of the distance n to the boundary: it grows by ``s^2 - 2 n s`` on a way that leads by
+        s towards it. Next to a corner, where there are two of them, that is all.
+        """
+        (to_x, to_y), (other_x, other_y) = self._across[:, :, rows]
+        along = to_x * y - to_y * x
+        step, other = to_x * x + to_y * y, other_x * x + other_y * y
+        first = step * (step - 2.0 * self._inside[0, rows])
+        second = np.where(self._corner[rows], other * (other - 2.0 * self._inside[1, rows]), along**2)
+        none = np.zeros_like(x)
+        return first + second, np.where(self._corner[rows], 0.0, along), none, second - first, none
+
+
 class _Moments:
     """The moments of weights around every point, in units of those that the kernel has."""
 
@@ -125,6 +150,7 @@ class _Moments:
         self._basis = np.empty((2, _TERMS, len(weights)))
         places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
         tangents = frames(cloud.normals)[:, :, 1:].transpose(2, 1, 0).copy()
+        near, edges = cloud.boundary.reached(pairs.lengths), _Edges(cloud, tangents)
         for block in self._blocks:
             report()
             i, j = ends = [index[block] for index in self._ends]
@@ -138,6 +164,9 @@ class _Moments:
                 size = distance[block] / (np.maximum(np.hypot(x, y), 1e-300) * pairs.lengths[end])
                 x, y = x * size, y * size
                 basis[:] = x * x + y * y, x, y, x * x - y * y, 2.0 * x * y
+                rows = np.flatnonzero(near[end])
+                if len(rows):
+                    basis[:, rows] = edges.terms(end[rows], x[rows], y[rows])
 
     def factor(self, terms):
         """Return the factor of each pair's weight, (p,)."""
