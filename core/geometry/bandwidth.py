@@ -2,15 +2,14 @@
 
 import numpy as np
 
-_WIDTH = 1.8  # h over the reach of the cells: the narrowest at which weights have their moments on random points
+_WIDTH = 0.18  # h over the reach of the cells, by the root of the neighbours of the options, 100: the narrowest kernel
+# at which the weights of random points have their moments
 _POWER = 8  # of the mean over the neighbourhood: the longest cells decide
-_ROUNDS, _SLOW, _LAST = 4, 40, 2  # of averaging over the 40 nearest neighbours: of what is there, chance away, the rest
-_LEAST = 0.95  # of the length that the closer neighbourhood asks for is kept
-_USUAL = 100  # neighbours of the options for which the width above holds
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
+_ROUNDS = 12  # of averaging over the 40 nearest neighbours, as h must not vary by chance
 
 
-def smoothing_lengths(nearest, options, component=None, reach=None):
+def smoothing_lengths(nearest, options, component=None, gaps=None):
     """Choose h for every point.
 
     Parameters
@@ -21,8 +20,8 @@ def smoothing_lengths(nearest, options, component=None, reach=None):
         Its bandwidth, neighbors and bandwidth_factor.
     component : ndarray, (m,) int, optional
         Component of each point; neighbours are counted within one.
-    reach : ndarray, (m,), optional
-        How far each point's Voronoi cell reaches; for "adaptive".
+    gaps : ndarray, (m,), optional
+        From `mean_gaps`, for "adaptive".
 
     Returns
     -------
@@ -33,15 +32,26 @@ def smoothing_lengths(nearest, options, component=None, reach=None):
         points there are in the others: even points have some 45 inside it then, random ones 115.
     """
     if options.bandwidth == "adaptive":
-        scale = _WIDTH * np.sqrt(options.neighbors / _USUAL)
-        averaging = nearest.averaging()
-        local = np.log(_repeat(averaging, reach**_POWER, _ROUNDS)) / _POWER
-        length = np.maximum(_repeat(averaging, local, _SLOW), local + np.log(_LEAST))
-        return options.bandwidth_factor * scale * np.exp(_repeat(averaging, length, _LAST))
+        return options.bandwidth_factor * _WIDTH * np.sqrt(options.neighbors) * gaps
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
         return np.full(len(distance), options.bandwidth_factor * distance.mean())
     return options.bandwidth_factor * _repeat(nearest.averaging(), distance, 2)
+
+
+def mean_gaps(nearest, reach, power=_POWER):
+    """Return how wide the gaps around every point are, (m,): how far the Voronoi cells reach, in the mean.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    reach : ndarray, (m,)
+        How far each point's cell reaches.
+    power : int
+        Of the mean: in the eighth the widest gaps decide.
+    """
+    return _repeat(nearest.averaging(), reach**power, _ROUNDS) ** (1.0 / power)
 
 
 def depth(nearest, inside):

@@ -17,11 +17,11 @@ _BLOCK = 1 << 13  # points looked at at one time
 _LOPSIDED = 0.15  # mean offset of the neighbours over their mean distance; less than half of it at a straight boundary
 _NEIGHBORS = 30  # looked at around a candidate
 _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
-_PROBE, _EMPTY = 6.0, 0.6  # no point within 0.6 of 6 spacings of the place 6 spacings further out
+_PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 _FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
 _BESIDE = 16  # the nearest of them tell what faces elsewhere: on coarse balls more reach around
 _FACING = 0.7  # cosine of its normal and those of neighbours that face elsewhere, at most
-_LINK = 4.0  # spacings between candidates of the same boundary
+_LINK = 6.0  # gaps between candidates of the same boundary
 _SHORTEST = 16  # candidates of a boundary that is found
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _SAME = 0.5  # spacings between the measured and the given distance to a boundary, near a corner
@@ -84,7 +84,7 @@ def no_boundary(count):
     )
 
 
-def find_boundary(nearest, oriented):
+def find_boundary(nearest, oriented, gaps):
     """Find the points at which the surface ends.
 
     Candidates are points around which the directions of the neighbours leave a wide gap, and far into which there is
@@ -97,6 +97,8 @@ def find_boundary(nearest, oriented):
         Of m points.
     oriented : ndarray, (m, 3)
         Unit normals whose signs agree.
+    gaps : ndarray, (m,)
+        How wide the gaps between points are: no boundary is found around those that are not much wider.
 
     Returns
     -------
@@ -123,12 +125,12 @@ def find_boundary(nearest, oriented):
     if not len(rows):
         return result
     rows = rows[~_bends_away(nearest, oriented, rows)]
-    spacing = nearest.spacing[rows]
-    probe = points[rows] + _PROBE * spacing[:, None] * outward_directions(nearest, oriented, rows)
-    rows = rows[nearest.tree.query(probe, workers=-1)[0] > _EMPTY * _PROBE * spacing]
+    ahead = _PROBE * gaps[rows]
+    probe = points[rows] + ahead[:, None] * outward_directions(nearest, oriented, rows)
+    rows = rows[nearest.tree.query(probe, workers=-1)[0] > _EMPTY * ahead]
     if len(rows) < _SHORTEST:
         return result
-    result[rows[_row_sizes(points[rows], _LINK * nearest.spacing[rows]) >= _SHORTEST]] = True
+    result[rows[_row_sizes(points[rows], _LINK * gaps[rows]) >= _SHORTEST]] = True
     return result
 
 

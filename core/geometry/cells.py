@@ -33,7 +33,7 @@ class Cells:
     reach: np.ndarray
 
 
-def measure_cells(nearest, normals, gaussian_curvature, boundary):
+def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None):
     """Measure the cell of every point in geodesic polar coordinates around it.
 
     A neighbour at the distance d cuts the plane at d / 2; next to a boundary the cell ends there. On a surface of
@@ -49,12 +49,15 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
         Unit normals of any sign.
     gaussian_curvature : ndarray, (m,)
     boundary : Boundary
+    component : ndarray, (m,) int, optional
+        Component of each point; those of others cut nothing.
 
     Returns
     -------
     Cells
     """
     count = len(normals)
+    component = np.zeros(count, dtype=int) if component is None else component
     cells = Cells(np.empty(count), np.empty(count))
     whole = (nearest.weight[:, :-1] > 0.0).all(axis=1)  # no neighbour was left out: more of them can close a cell
     spacing, rows = nearest.spacing, np.arange(count)
@@ -62,7 +65,7 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
         still_open = np.zeros(count, dtype=bool)
         for start in range(0, len(rows), _BLOCK // wider):
             block = rows[start : start + _BLOCK // wider]
-            cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, block, wider)
+            cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, wider)
             areas, reach, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
             known = np.flatnonzero(closed)
             if wider == 1 and not closed.all():
@@ -76,7 +79,7 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary):
     return cells
 
 
-def _cuts(nearest, normals, gaussian_curvature, boundary, rows, wider):
+def _cuts(nearest, normals, gaussian_curvature, boundary, component, rows, wider):
     """Return the cuts of some points, (k, cuts, 2), and how far the last of their neighbours is.
 
     A cut is the vector across it, as long as one over its distance; one that does not count is zero.
@@ -87,6 +90,7 @@ def _cuts(nearest, normals, gaussian_curvature, boundary, rows, wider):
         many = min(wider * nearest.index.shape[1], len(normals))
         distance, index = nearest.tree.query(nearest.points[rows], k=many, workers=-1)
         counted = on_sheet(nearest, normals, rows, index, distance)[0]
+        counted &= component[index] == component[rows, None]
     index, distance, counted = index[:, 1:], distance[:, 1:], counted[:, 1:]
     frame = frames(normals[rows])[:, :, 1:]
     chord = nearest.points[index] - nearest.points[rows, None]

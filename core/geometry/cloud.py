@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import ComponentError
 from ..options import LaplacianOptions
-from .bandwidth import depth, smoothing_lengths
+from .bandwidth import depth, mean_gaps, smoothing_lengths
 from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
 from .cells import measure_cells
 from .components import label_components, move_apart
@@ -20,7 +20,10 @@ from .points import ScaledPoints, check_boundary, check_distances, check_points,
 from .quadrics import Quadrics, check_surface
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
-_NARROW, _MANY = 0.6, 0.1  # h over the depth of the surface that is too wide; the share of points that tells of it
+_NARROW = 0.6  # h over the depth of the surface that is too wide
+_MANY = (
+    0.1  # share of the points that tells of noise, which is the scanner's and no matter of a few places, or of depth
+)
 
 
 @dataclass(frozen=True)
@@ -139,12 +142,16 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
     given = None if normals is None else unit_normals(normals, len(points))[sample.scaled.first]
     oriented = orient_normals(nearest, quadrics.normals if given is None else given)
-    boundary = locate_boundary(sample, oriented, options.boundary == "auto", boundary, boundary_distance)
 
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature if options.curvature_correction else np.zeros(len(oriented))
-    cells = measure_cells(nearest, oriented, gaussian, boundary)
-    lengths = smoothing_lengths(nearest, options, sample.component, cells.reach)
+    cells = measure_cells(nearest, oriented, gaussian, no_boundary(len(oriented)), sample.component)
+    gaps = mean_gaps(nearest, cells.reach, 1) if options.boundary == "auto" else None
+    boundary = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
+    if np.isfinite(boundary.distance).any():
+        cells = measure_cells(nearest, oriented, gaussian, boundary, sample.component)
+    gaps = mean_gaps(nearest, cells.reach)
+    lengths = smoothing_lengths(nearest, options, sample.component, gaps)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
     own = final_normals(nearest, pairs, given, oriented, options)
 
@@ -248,7 +255,7 @@ def remove_noise(surface, options):
     if method in ("quadric", "plane"):
         return _project(surface, method, noise, np.ones(len(noise), dtype=bool), options.sheets)
     noisy = (noise > 0.0) & (method == "auto")
-    if noisy.mean() < _MANY:  # it is the scanner's, and so no matter of a few places
+    if noisy.mean() < _MANY:
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
     for _ in range(MOST):
@@ -305,7 +312,7 @@ def _regroup(sample, component, needed):
     return Sample(scaled, component, find_nearest(move_apart(scaled.points, component) + moved), sample.noise[~out])
 
 
-def locate_boundary(sample, oriented, search, boundary=None, boundary_distance=None):
+def locate_boundary(sample, oriented, gaps=None, boundary=None, boundary_distance=None):
     """Find where the surface ends, or take what the caller knows of it.
 
     Parameters
@@ -314,8 +321,8 @@ def locate_boundary(sample, oriented, search, boundary=None, boundary_distance=N
         Of m points.
     oriented : ndarray, (m, 3)
         Unit normals whose signs agree.
-    search : bool
-        Look for the boundary where neither of the others is given.
+    gaps : ndarray, (m,), optional
+        From `mean_gaps`, to look for the boundary where neither of the others is given.
     boundary, boundary_distance
         The caller's, see `build_laplacian`.
 
@@ -336,8 +343,8 @@ def locate_boundary(sample, oriented, search, boundary=None, boundary_distance=N
             return given_boundary(nearest, oriented, distance)
     if boundary is not None:
         at_boundary = check_boundary(boundary, len(scaled.inverse), scaled.first)
-    elif search:
-        at_boundary = find_boundary(nearest, oriented)
+    elif gaps is not None:
+        at_boundary = find_boundary(nearest, oriented, gaps)
     else:
         return no_boundary(len(oriented))
     measured = measure_boundary(nearest, oriented, at_boundary)
@@ -356,11 +363,12 @@ def final_normals(nearest, pairs, given, oriented, options):
 
 def _notices(duplicates, left_out, share, noise, narrow):
     """Say what a user should know of the walk, where there is something to say."""
-    noisy, filling = noise > 0.0, np.mean(noise > FILLING)
+    noisy, filling = np.mean(noise > 0.0), np.mean(noise > FILLING)
+    level = noise.mean() / max(noisy, 1e-300)
     texts = {
         f"Points that lie exactly on another one: {duplicates}. They share one area.": duplicates,
-        f"Noise of {noise[noisy].mean() if noisy.any() else 0.0:.2f} of the spacing was smoothed within the operator, at"
-        f" {noisy.mean():.0%} of the points.": noisy.mean() > filling,
+        f"Noise of {level:.2f} of the spacing was smoothed within the operator, at {noisy:.0%} of the points.": noisy
+        > filling,
         "Noise of more than half the spacing was smoothed within the operator, and details with it: areas may be off by"
         f" 10 % and more. So it is at {filling:.0%} of the points: use more exact ones.": filling > _MANY,
         f"Points that lie apart from the rest or off the surface, left out of the operator: {left_out}"

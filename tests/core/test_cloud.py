@@ -7,6 +7,9 @@ import pytest
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere
+from core.geometry.bandwidth import mean_gaps
+from core.geometry.boundary import no_boundary
+from core.geometry.cells import measure_cells
 from core.geometry.cloud import (
     divide_components,
     divide_sheets,
@@ -21,6 +24,13 @@ from core.geometry.normals import orient_normals
 from core.geometry.points import scale_points
 
 NEEDED = 101
+
+
+def gaps_of(surface, oriented):
+    """How wide the gaps between points are, before a boundary is known."""
+    nearest, count = surface.sample.nearest, len(oriented)
+    gaussian = surface.quadrics.gaussian_curvature
+    return mean_gaps(nearest, measure_cells(nearest, oriented, gaussian, no_boundary(count)).reach, 1)
 
 
 def sample_of(points):
@@ -107,7 +117,8 @@ class TestBoundary:
     def located(self, points, search=True, **given):
         surface = fit_surface(sample_of(points), True)
         oriented = orient_normals(surface.sample.nearest, surface.quadrics.normals)
-        return surface.sample, locate_boundary(surface.sample, oriented, search, **given)
+        gaps = gaps_of(surface, oriented) if search else None
+        return surface.sample, locate_boundary(surface.sample, oriented, gaps, **given)
 
     def test_a_closed_surface_has_none(self):
         _, boundary = self.located(random_sphere(1500))
@@ -153,6 +164,6 @@ def test_the_walk_is_these_stages():
     cloud = read_cloud(points, options)
     np.testing.assert_array_equal(cloud.component, surface.sample.component)
     np.testing.assert_array_equal(cloud.normals, oriented)
-    located = locate_boundary(surface.sample, oriented, True)
+    located = locate_boundary(surface.sample, oriented, gaps_of(surface, oriented))
     np.testing.assert_array_equal(cloud.boundary.distance, located.distance)
     assert read_cloud(points, replace(options, sheets=False)).component.max() == 0
