@@ -95,7 +95,7 @@ class TestRelief:
         assert abs(error(cloud.roughness)) < 0.01
 
     def test_is_its_slope_where_normals_are_smooth(self):
-        rough, _ = rough_sphere(fibonacci_sphere(4000), 3, 0.2)
+        rough, _ = rough_sphere(fibonacci_sphere(4000), 4, 0.2)
         measured = read_cloud(rough, LaplacianOptions()).roughness.mean()
         assert 0.4 < measured / (0.5 * 0.2**2) < 1.0  # along a chord it is half of the squared slope
 
@@ -108,7 +108,7 @@ class TestRelief:
         box, _, _, area = closed_plate(side, thickness)
         assert core.estimate_areas(box).sum() == pytest.approx(area, rel=most)
 
-    @pytest.mark.parametrize("level", [0.02, 0.04, 0.2])
+    @pytest.mark.parametrize("level", [0.05, 0.2])
     def test_noise_is_none(self, level):
         noisy = noisy_sphere(2000, level)
         assert not read_cloud(noisy, LaplacianOptions()).roughness.any()
