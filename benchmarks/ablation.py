@@ -1,0 +1,226 @@
+"""What each constant and each correction between the coordinates and the stiffness matrix does.
+
+    MESHFREE_ZOO=folder python -m benchmarks.ablation [constant or correction ...]
+
+The table goes to docs/ablation.md.
+"""
+
+import inspect
+import itertools
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import core
+from core.geometry import bandwidth, boundary, cells, cloud, components, distances, noise, outliers, quadrics, sheets
+from core.operator import areas, curvature, images, stiffness, weights
+
+from .real_shapes import (
+    MODES,
+    SAMPLINGS,
+    eigenvalue_error,
+    noisy_points,
+    random_points,
+    seen_points,
+    shapes,
+    with_outliers,
+)
+from .samplings import fibonacci_sphere, random_sphere
+from .tables import Table
+
+MODULES = (
+    *(outliers, components, quadrics, sheets, noise, boundary, cells, bandwidth, distances, cloud),
+    *(areas, weights, images, stiffness),
+)
+UNTUNED = "_BLOCK", "_SOURCES", "_SAME", "_EVEN", "_SMALLEST", "_TERMS", "NO_AREA", "_WIDER"  # memory, rounding, counts
+DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"
+GROUPS = "zoo", "awkward", "smooth"
+LEAST = {"area": 1e-3, "eigenvalues": 1e-3, "boundary": 1.0}  # errors below these are none, on smooth shapes a tenth
+
+
+def constants():
+    """Yield the module, name and place in its tuple, if it is one, of every number that somebody chose."""
+    for module in MODULES:
+        for name, value in vars(module).items():
+            own = (
+                f"\n{name} = " in (source := inspect.getsource(module))
+                or f", {name} = " in source
+                or f"\n{name}, " in source
+            )
+            if name.lstrip("_").isupper() and own and name not in UNTUNED:
+                if isinstance(value, int | float):
+                    yield module, name, None
+                elif isinstance(value, tuple) and all(isinstance(part, int | float) for part in value):
+                    yield from ((module, name, place) for place in range(len(value)))
+
+
+def change(value, factor):
+    """A constant larger or smaller; whole numbers by one at least."""
+    if isinstance(value, int):
+        return max(round(value * factor), value + 1) if factor > 1.0 else min(round(value * factor), value - 1)
+    return value * factor
+
+
+def jump(ratio, count=3000):
+    """A sphere whose lower half is denser."""
+    many = random_sphere(20 * count, 2)
+    dense = round(count * ratio / (1.0 + ratio))
+    return np.concatenate([many[many[:, 2] <= 0.0][:dense], many[many[:, 2] > 0.0][: count - dense]])
+
+
+def globe(rings, sides):
+    """Points of a unit sphere on circles of latitude."""
+    height, around = np.meshgrid((np.arange(rings) + 0.5) * np.pi / rings, np.arange(sides) * 2.0 * np.pi / sides)
+    parts = np.sin(height) * np.cos(around), np.sin(height) * np.sin(around), np.cos(height)
+    return np.stack(parts, axis=2).reshape(-1, 3)
+
+
+def cases():
+    """Points, their area, their eigenvalues, and whether they have a boundary, by group and name."""
+    zoo = shapes()
+    sphere = np.repeat(np.arange(7) * (np.arange(7) + 1.0), 2 * np.arange(7) + 1)[:MODES]
+    whole = 4.0 * np.pi
+    samplings = {
+        "random": lambda v, f: random_points(v, f, 3_000)[0],
+        "vertices": SAMPLINGS["vertices"],
+        "seen": lambda v, f: seen_points(v, f, 4_000),
+        "noise": lambda v, f: noisy_points(v, f, 4_000, 0.3),
+        "outliers": lambda v, f: with_outliers(v, f, 4_000, 0.05),
+    }
+    for name in ("rocker-arm", "cat", "arm", "cheburashka", "screwdriver", "fandisk", "face"):
+        vertices, faces, exact = zoo[name]
+        yield "zoo", name, samplings["random"](vertices, faces), 1.0, exact, name == "face"
+    for name, sampling in (
+        *(("screwdriver", "vertices"), ("cheburashka", "vertices"), ("spot", "vertices"), ("rocker-arm", "seen")),
+        *(("cat", "noise"), ("arm", "outliers")),
+    ):
+        vertices, faces, exact = zoo[name]
+        yield "zoo", f"{name} {sampling}", samplings[sampling](vertices, faces), 1.0, exact, False
+    yield "awkward", "jump", jump(30.0), whole, sphere, False
+    yield "awkward", "globe", globe(40, 80), whole, sphere, False
+    yield "smooth", "random sphere", random_sphere(2_000), whole, sphere, False
+    yield "smooth", "even sphere", fibonacci_sphere(2_000), whole, sphere, False
+    half = random_sphere(4_000, 1)
+    degree = np.repeat(np.arange(12), np.arange(12) + 1)[:MODES]  # l + 1 of the modes of degree l are even in z
+    yield "smooth", "half sphere", half[half[:, 2] > 0.0], 0.5 * whole, degree * (degree + 1.0), True
+
+
+def measure(points, area, exact, has_boundary):
+    """Errors of area and eigenvalues, and how many points are wrongly at a boundary."""
+    try:
+        laplacian = core.build_laplacian(points)
+        error = eigenvalue_error(laplacian.eigenpairs(MODES).eigenvalues, exact)[0]
+    except core.PointCloudError:
+        return {"area": 1.0, "eigenvalues": 1.0, "boundary": 1.0}
+    found = laplacian.boundary.sum()
+    return {
+        "area": abs(laplacian.areas.sum() / area - 1.0),
+        "eigenvalues": error,
+        "boundary": float(not found) if has_boundary else float(found),
+    }
+
+
+def changes(before, after):
+    """Mean factors of the errors of each group, and the worst one of eigenvalues with its case."""
+
+    def factor(case, kind):
+        least = LEAST[kind] * (0.1 if case[0] == "smooth" and kind != "boundary" else 1.0)
+        return max(after[case][kind], least) / max(before[case][kind], least)
+
+    means = [
+        np.exp(np.mean([np.log(factor(case, kind)) for case in before if case[0] == group]))
+        for group in GROUPS
+        for kind in LEAST
+    ]
+    worst = max(before, key=lambda case: factor(case, "eigenvalues"))
+    return [*(f"{mean:.2f}" for mean in means), f"{factor(worst, 'eigenvalues'):.2f} {worst[1]}"]
+
+
+def constants_changed(names):
+    """Yield every constant that is named a third larger and a quarter smaller: labels, and what to set."""
+    for (module, name, place), factor in itertools.product(constants(), (0.75, 4.0 / 3.0)):
+        if names and name not in names:
+            continue
+        value = getattr(module, name)
+        one = value if place is None else value[place]
+        new = change(one, factor)
+        label = f"{module.__name__.split('.')[-1]}.{name}" + ("" if place is None else f"[{place}]")
+        changed = new if place is None else (*value[:place], new, *value[place + 1 :])
+        yield [label, f"{one:.4g}", f"{new:.4g}"], ((module, name, changed),)
+
+
+def corrections_off(names):
+    """Yield every correction that is named, switched off: labels, and what to set."""
+
+    def plain_arc(squared, left, right, cosine=1.0):
+        return squared + (right - left) ** 2 / 12.0
+
+    def even_arc(squared, left, right, cosine=1.0):
+        return squared + (right - left) ** 2 * (1.0 / 12.0 + (1.0 - cosine) / 45.0)
+
+    def linear(lengths, gaussian, first, second):
+        return _bent(lengths, gaussian, first, 0.0)
+
+    def without_corners(images):
+        def changed(*args):
+            nearest, second, across = images(*args)
+            return [nearest, second, tuple(part[:0] for part in across)]
+
+        return changed
+
+    _bent = curvature._bent
+    mirrors = [
+        (module, name, without_corners(getattr(images, name)))
+        for module in (areas, stiffness)
+        for name in ("mirror", "own_images")
+    ]
+    corrections = {
+        "arcs of sixth order": [(module, "arc_squared", plain_arc) for module in (distances, cells, boundary)],
+        "arcs that bend unevenly": [(module, "arc_squared", even_arc) for module in (distances, cells, boundary)],
+        "square of the Gaussian curvature": [(curvature, "_bent", linear)],
+        "Gaussian curvature": [(curvature, "_bent", lambda lengths, *_: np.ones(len(lengths)))],
+        "relief": [(cloud, "measure_roughness", lambda nearest, _: np.zeros(len(nearest.points)))],
+        "h that varies": [(areas, "uneven", np.zeros_like), (weights, "uneven", np.zeros_like)],
+        "images across corners": mirrors,
+        "excess of images": [(areas, "image_excess", lambda lengths, _: 0.0 * lengths)],
+        "areas of the kernel": [
+            (areas, "SOLVERS", {"fast": lambda _, __, cell, ___: areas.AreaSolution(cell, 0, True)})
+        ],
+        "areas of the cells": [(areas, "_like_cells", lambda _, values, __: values)],
+        "balance of the weights": [(weights, "_ROUNDS", 0)],
+        "width of the weights": [(stiffness, "_widths", lambda pairs, *_: pairs.lengths)],
+        "outliers": [(cloud, "find_outliers", lambda nearest: np.zeros(len(nearest.points), dtype=bool))],
+        "noise": [(cloud, "noise_level", lambda nearest, misfit: np.zeros(len(misfit)))],
+        "sheets apart": [(cloud, "separate_sheets", lambda pairs, *_: pairs)],
+    }
+    for label, changed in corrections.items():
+        if not names or label in names:
+            yield [label, "on", "off"], changed
+
+
+def ablation(names=()):
+    """Every constant and every correction, or those named, changed."""
+    every = list(cases())
+    before = {case[:2]: measure(*case[2:]) for case in every}
+    rows = []
+    for label, changed in itertools.chain(constants_changed(names), corrections_off(names)):
+        as_it_was = [(module, name, getattr(module, name)) for module, name, _ in changed]
+        _set(changed)
+        after = {case[:2]: measure(*case[2:]) for case in every}
+        _set(as_it_was)
+        rows.append([*label, *changes(before, after)])
+        print(" | ".join(rows[-1]), flush=True)
+    header = ["constant or correction", "value", "changed"]
+    header += [f"{group} {kind}" for group in GROUPS for kind in LEAST]
+    return Table("Ablation", [*header, "worst eigenvalues"], rows)
+
+
+def _set(values):
+    for module, name, value in values:
+        setattr(module, name, value)
+    areas._inverse.cache_clear()
+
+
+if __name__ == "__main__":
+    DOCUMENT.write_text(ablation(sys.argv[1:]).markdown().replace("## ", "# ", 1), encoding="utf-8")
