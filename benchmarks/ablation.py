@@ -159,9 +159,6 @@ def corrections_off(names):
     def even_arc(squared, left, right, cosine=1.0):
         return squared + (right - left) ** 2 * (1.0 / 12.0 + (1.0 - cosine) / 45.0)
 
-    def linear(lengths, gaussian, first, second):
-        return _bent(lengths, gaussian, first, 0.0)
-
     def without_corners(images):
         def changed(*args):
             nearest, second, across = images(*args)
@@ -169,7 +166,6 @@ def corrections_off(names):
 
         return changed
 
-    _bent = curvature._bent
     mirrors = [
         (module, name, without_corners(getattr(images, name)))
         for module in (areas, stiffness)
@@ -178,12 +174,10 @@ def corrections_off(names):
     corrections = {
         "arcs of sixth order": [(module, "arc_squared", plain_arc) for module in (distances, cells, boundary)],
         "arcs that bend unevenly": [(module, "arc_squared", even_arc) for module in (distances, cells, boundary)],
-        "square of the Gaussian curvature": [(curvature, "_bent", linear)],
         "Gaussian curvature": [(curvature, "_bent", lambda lengths, *_: np.ones(len(lengths)))],
         "relief": [(cloud, "measure_roughness", lambda nearest, _: np.zeros(len(nearest.points)))],
         "h that varies": [(areas, "uneven", np.zeros_like), (weights, "uneven", np.zeros_like)],
         "images across corners": mirrors,
-        "excess of images": [(areas, "image_excess", lambda lengths, _: 0.0 * lengths)],
         "areas of the kernel": [
             (areas, "SOLVERS", {"fast": lambda _, __, cell, ___: areas.AreaSolution(cell, 0, True)})
         ],

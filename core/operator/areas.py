@@ -11,7 +11,7 @@ from ..geometry import arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
 from .curvature import kernel_integral, uneven
-from .images import image_excess, mirror, own_images
+from .images import mirror, own_images
 
 _FLOOR = 0.5  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
 _DEGREES = 100, 50  # of the polynomials of two rounds: the second makes up for what the floor changed in the first
@@ -107,7 +107,7 @@ def solve_areas(cloud, distance, options, report=lambda: None):
         Eq. (7), which has no bound, gave areas that are not positive.
     """
     lengths = cloud.pairs.lengths
-    target = kernel_integral(lengths, cloud.gaussian_curvature) + image_excess(lengths, cloud.boundary)
+    target = kernel_integral(lengths, cloud.gaussian_curvature)
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
     if options.curvature_correction:
         target += _gain(matrix, lengths)

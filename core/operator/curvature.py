@@ -2,40 +2,38 @@
 
 import numpy as np
 
-from ..kernel import FOURTH_MOMENT, SECOND_MOMENT
+from ..kernel import SECOND_MOMENT
 
 _UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which it is known
 _LARGEST = 0.3  # most that curvature may change an area or a weight, where the fit is poor
 
 
 def kernel_integral(lengths, gaussian):
-    """Return the integral of the kernel over the surface around each point, (m,).
+    """Return the integral of the kernel over the surface around each point, (m,): ``1 - mu2 h^2 K / 6``.
 
-    ``1 - mu2 x / 6 + mu4 x^2 / 120`` with x = h^2 K; clipped, as all terms of curvature here. Those of x^2 are exact
-    where K does not change.
+    Clipped, as all terms of curvature here.
     """
-    return _bent(lengths, gaussian, -SECOND_MOMENT / 6.0, FOURTH_MOMENT / 120.0)
+    return _bent(lengths, gaussian, -SECOND_MOMENT / 6.0)
 
 
 def weight_factor(lengths, gaussian):
-    """Return the factor of the pair weights, (m,), ``1 + mu2 x / 4 + (mu2^2 / 16 - mu4 / 80) x^2``.
+    """Return the factor of the pair weights, (m,): ``1 + mu2 h^2 K / 4``.
 
     With it slow functions have the right Laplacian. A pair takes its ends' mean.
     """
-    return _bent(lengths, gaussian, SECOND_MOMENT / 4.0, SECOND_MOMENT**2 / 16.0 - FOURTH_MOMENT / 80.0)
+    return _bent(lengths, gaussian, SECOND_MOMENT / 4.0)
 
 
 def second_moment(lengths, gaussian):
     """Return the trace of the second moment of weights with that factor over 4 areas, (m,).
 
-    The factor times ``1 - mu2 x / 3 + mu4 x^2 / 40``.
+    The factor times ``1 - mu2 h^2 K / 3``.
     """
-    return weight_factor(lengths, gaussian) * _bent(lengths, gaussian, -SECOND_MOMENT / 3.0, FOURTH_MOMENT / 40.0)
+    return weight_factor(lengths, gaussian) * _bent(lengths, gaussian, -SECOND_MOMENT / 3.0)
 
 
-def _bent(lengths, gaussian, first, second):
-    x = lengths**2 * gaussian
-    return 1.0 + np.clip(first * x + second * x * x, -_LARGEST, _LARGEST)
+def _bent(lengths, gaussian, factor):
+    return 1.0 + np.clip(factor * lengths**2 * gaussian, -_LARGEST, _LARGEST)
 
 
 def uneven(excess):

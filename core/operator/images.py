@@ -1,12 +1,8 @@
 """The method of images: past a boundary the surface goes on as in a mirror."""
 
-import functools
-
 import numpy as np
-from scipy.integrate import trapezoid
-from scipy.interpolate import PchipInterpolator
 
-from ..kernel import SUPPORT, kernel
+from ..kernel import SUPPORT
 
 _SHARED = 0.7  # cosine of the directions across the boundaries of two points, at least, if they are one boundary
 _BEND = 0.5  # most that the curvature of a boundary may change an image
@@ -81,27 +77,3 @@ def _images(seen, distance, d, e, curvature, lengths, rows):
     reached = seen.all(axis=1) & (further < (SUPPORT * lengths) ** 2)
     result.append((rows[reached], np.sqrt(further[reached]), larger[reached]))
     return result
-
-
-def image_excess(lengths, boundary):
-    """Return what images change in the integral of the kernel at every point, to first order of the boundary's
-    curvature.
-
-    The mean of both ends stands for the image's own area factor and distance, so that the matrix is symmetric: the
-    integral gains ``k h / 2 integral_0^3 w(a + b) (a - b) db`` at the distance a h from the boundary, w being the
-    kernel's projection on a line.
-    """
-    ratio = np.minimum(boundary.distance / lengths[:, None], SUPPORT)
-    near = ratio[:, 0] < SUPPORT
-    result = np.zeros(len(lengths))
-    excess = 0.5 * boundary.curvature[near] * lengths[near, None] * _excess()(ratio[near])
-    result[near] = np.clip(excess, -0.2, 0.2).sum(axis=1)
-    return result
-
-
-@functools.cache
-def _excess():
-    grid = np.linspace(0.0, SUPPORT, 601)
-    line = np.array([trapezoid(kernel(np.hypot(t, grid)), grid) for t in grid]) * 2.0
-    table = [trapezoid(np.interp(a + grid, grid, line, right=0.0) * (a - grid), grid) for a in grid[::10]]
-    return PchipInterpolator(grid[::10], table)

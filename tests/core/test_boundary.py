@@ -29,7 +29,6 @@ from core.geometry.cloud import read_cloud
 from core.geometry.distances import arc_length
 from core.geometry.nearest import find_nearest
 from core.operator.areas import KernelMatrix
-from core.operator.images import image_excess
 from core.options import LaplacianOptions
 
 CLOSED = {
@@ -226,13 +225,13 @@ class TestImages:
     @pytest.fixture(scope="class")
     @classmethod
     def disc_sums(cls):
-        """Integrals of the kernel with exact areas, their expected excess, and which points lie near the boundary."""
+        """Integrals of the kernel with exact areas around the points near the boundary."""
         points, areas, distance = disc_of_rings(25)
         cloud = read_cloud(points, LaplacianOptions(), boundary_distance=distance)
         matrix = KernelMatrix(cloud.pairs, cloud.pairs.distance, cloud.boundary)
         sums = matrix @ (areas[cloud.scaled.first] / cloud.scaled.scale**2)
         near = cloud.boundary.distance[:, 0] < 3.0 * cloud.pairs.lengths
-        return sums, image_excess(cloud.pairs.lengths, cloud.boundary), near
+        return sums[near]
 
     def test_they_complete_the_kernel_at_straight_boundaries_and_at_corners(self):
         cloud = read_cloud(square_grid(60), LaplacianOptions())
@@ -249,24 +248,12 @@ class TestImages:
         assert sums.max() == pytest.approx(1.0, abs=4e-2)
 
     def test_they_nearly_complete_it_at_curved_boundaries(self, disc_sums):
-        sums, excess, near = disc_sums
-        np.testing.assert_allclose(sums[near], 1.0 + excess[near], atol=0.03)
-
-    def test_the_excess_is_what_they_add_there(self, disc_sums):
-        sums, excess, near = disc_sums
-        error, plain = (np.sqrt(np.mean((sums[near] - target) ** 2)) for target in (1.0 + excess[near], 1.0))
-        assert plain > 3e-4
-        assert error < 0.95 * plain
+        np.testing.assert_allclose(disc_sums, 1.0, atol=0.03)
 
     @pytest.mark.parametrize("wide", [6, 10, 14])
     def test_both_boundaries_of_a_strip(self, wide):
         points = grid_points(np.arange(wide + 1.0), np.arange(80.0), [0.0])
         assert core.estimate_areas(points).sum() == pytest.approx(79.0 * wide, rel=0.12)
-
-    def test_no_excess_without_boundaries_or_with_straight_ones(self):
-        assert np.all(image_excess(np.ones(5), no_boundary(5)) == 0.0)
-        cloud = read_cloud(square_grid(30), LaplacianOptions())
-        assert np.abs(image_excess(cloud.pairs.lengths, cloud.boundary)).max() < 1e-6
 
     @pytest.mark.parametrize(
         "points", [square_random(900), hemisphere_random(900)], ids=["corners and straight", "curved"]
