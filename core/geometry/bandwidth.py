@@ -10,7 +10,7 @@ _FURTHEST = 2.5  # spacings that a gap may be wide, as in rows 25 times denser a
 _ROUNDS = 12  # of averaging over the 40 nearest neighbours, as h must not vary by chance
 
 
-def smoothing_lengths(nearest, options, component=None, gaps=None):
+def smoothing_lengths(nearest, options, component=None, reach=None):
     """Choose h for every point.
 
     Parameters
@@ -21,8 +21,8 @@ def smoothing_lengths(nearest, options, component=None, gaps=None):
         Its bandwidth, neighbors and bandwidth_factor.
     component : ndarray, (m,) int, optional
         Component of each point; neighbours are counted within one.
-    gaps : ndarray, (m,), optional
-        From `mean_gaps`, for "adaptive".
+    reach : ndarray, (m,), optional
+        How far each point's Voronoi cell reaches, for "adaptive".
 
     Returns
     -------
@@ -33,14 +33,15 @@ def smoothing_lengths(nearest, options, component=None, gaps=None):
         points there are in the others: even points have some 45 inside it then, random ones 115.
     """
     if options.bandwidth == "adaptive":
-        return options.bandwidth_factor * _WIDTH * np.sqrt(options.neighbors) * gaps
+        scale = options.bandwidth_factor * _WIDTH * np.sqrt(options.neighbors)
+        return scale * mean_gaps(nearest, reach, _POWER)
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
         return np.full(len(distance), options.bandwidth_factor * distance.mean())
     return options.bandwidth_factor * _repeat(nearest.averaging(), distance, 2)
 
 
-def mean_gaps(nearest, reach, power=_POWER):
+def mean_gaps(nearest, reach, power):
     """Return how wide the gaps around every point are, (m,): how far the Voronoi cells reach, in the mean.
 
     Parameters

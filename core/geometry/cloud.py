@@ -150,8 +150,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     boundary = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
     if np.isfinite(boundary.distance).any():
         cells = measure_cells(nearest, oriented, gaussian, boundary, sample.component)
-    gaps = mean_gaps(nearest, cells.reach)
-    lengths = smoothing_lengths(nearest, options, sample.component, gaps)
+    lengths = smoothing_lengths(nearest, options, sample.component, cells.reach)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
     own = final_normals(nearest, pairs, given, oriented, options)
 

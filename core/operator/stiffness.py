@@ -97,8 +97,9 @@ def _widths(pairs, weights, fourth, own_fourth, areas):
     fourth, near = pairs.half(fourth), pairs.half(weights)
     moment, unit = fourth.sum(axis=0) + fourth.sum(axis=1) + own_fourth, 8.0 * SECOND_MOMENT * areas
     total = near.sum(axis=0) + near.sum(axis=1)
+    total[total == 0.0] = 1.0  # of points without pairs
     moment, unit = (near @ (values / total) + near.T @ (values / total) for values in (moment, unit))
-    return np.sqrt(moment / unit)
+    return np.where(unit > 0.0, np.sqrt(moment / np.where(unit > 0.0, unit, 1.0)), pairs.lengths)
 
 
 def _for_callers_points(cloud, weights, own):

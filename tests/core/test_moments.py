@@ -118,6 +118,15 @@ class TestBalancedWeights:
         assert balanced[0] < 0.7 * plain[0]
         assert balanced[1] < 0.5 * plain[1]
 
+    def test_of_points_without_pairs_are_none(self, monkeypatch):
+        monkeypatch.setattr(
+            "core.geometry.cloud.find_outliers", lambda nearest: np.zeros(len(nearest.points), dtype=bool)
+        )
+        lone = np.random.default_rng(0).uniform(-1.4, 1.4, (100, 3))
+        laplacian = core.build_laplacian(np.concatenate([random_sphere(2000), lone]))
+        assert np.any(laplacian.stiffness.diagonal() == 0.0)
+        assert np.all(laplacian.kernel_widths > 0.0)
+
     def test_make_the_operator_right_on_random_points(self):
         # Without them these are 2e-3 and 1.5e-3; a peer that is not symmetric (GMLS of degree 2) has 8e-4 and 1e-2.
         laplacian = core.build_laplacian(random_sphere(8000))
