@@ -24,7 +24,7 @@ def noise_level(nearest, misfit):
     nearest : Nearest
         Of m points.
     misfit : ndarray, (m,)
-        Of quadrics that keep close sheets apart: the noise is hardly more than that.
+        Of quadrics that keep close sheets apart: where it is much less, there are several sheets and no noise.
 
     Returns
     -------
@@ -45,9 +45,8 @@ def noise_level(nearest, misfit):
     for _ in range(_ROUNDS):
         logarithms = averaging @ logarithms
     few, many, own = np.exp(logarithms.T)
-    level = np.minimum(few, _SHAPE * own)
-    noisy = (level > FILLING) | ((level > _LEAST) & (many < _SHAPE * few))
-    return np.where(averaging @ noisy.astype(float) > 0.5, level, 0.0)
+    noisy = (few > _LEAST) & (few < _SHAPE * own) & ((few > FILLING) | (many < _SHAPE * few))
+    return np.where(averaging @ noisy.astype(float) > 0.5, few, 0.0)
 
 
 def project_points(points, method, noise, component=None):
