@@ -21,9 +21,7 @@ from .quadrics import Quadrics, check_surface
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
 _NARROW = 0.6  # h over the depth of the surface that is too wide
-_MANY = (
-    0.1  # share of the points that tells of noise, which is the scanner's and no matter of a few places, or of depth
-)
+_MANY = 0.1  # share of the points that tells of depth, or of noise: that is the scanner's, not of a few places
 
 
 @dataclass(frozen=True)
