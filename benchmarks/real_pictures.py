@@ -20,7 +20,7 @@ from matplotlib import pyplot
 FOLDER = Path(__file__).parents[1] / "docs" / "pictures" / "results"
 SHAPES = "rocker-arm", "fandisk", "cat", "turtle", "cheburashka", "screwdriver"
 CLOUDS = "cgm_man", "vtk_horse", "ml_brain", "vtk_Human", "cg_kitten", "icp_bunny_part1"
-MOST = 9000  # points that are drawn
+MOST = 25_000  # points that are drawn of a shape
 
 
 def area_error(vertices, faces, count=10_000):
@@ -38,7 +38,7 @@ def draw(axes, points, values, title, low, high, colors):
     centered = points - points.mean(axis=0)
     flat = centered @ np.linalg.eigh(centered.T @ centered)[1][:, ::-1]
     order = np.argsort(flat[:, 2])  # the nearer ones last
-    order = order[-MOST * 2 :: 2] if len(order) > 2 * MOST else order[len(order) // 2 :]
+    order = order[:: -(-len(order) // MOST)]
     drawn = axes.scatter(flat[order, 0], flat[order, 1], 2.0, values[order], cmap=colors, vmin=low, vmax=high, lw=0)
     axes.set_title(title, fontsize=8)
     axes.set_aspect("equal")
