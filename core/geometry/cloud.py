@@ -143,10 +143,12 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature if options.curvature_correction else np.zeros(len(oriented))
-    cells = measure_cells(nearest, oriented, gaussian, no_boundary(len(oriented)), sample.component)
-    gaps = mean_gaps(nearest, cells.reach, 1) if options.boundary == "auto" else None
+    gaps = None
+    if options.boundary == "auto" and boundary is None and boundary_distance is None:
+        cells = measure_cells(nearest, oriented, gaussian, no_boundary(len(oriented)), sample.component)
+        gaps = mean_gaps(nearest, cells.reach, 1)
     boundary = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
-    if np.isfinite(boundary.distance).any():
+    if gaps is None or np.isfinite(boundary.distance).any():
         cells = measure_cells(nearest, oriented, gaussian, boundary, sample.component)
     lengths = smoothing_lengths(nearest, options, sample.component, cells.reach)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
@@ -248,10 +250,12 @@ def remove_noise(surface, options):
     Surface
         The same one where nothing is to be done.
     """
-    method, noise = options.projection, _noise(surface)
-    if method in ("quadric", "plane"):
-        return _project(surface, method, noise, np.ones(len(noise), dtype=bool), options.sheets)
-    noisy = (noise > 0.0) & (method == "auto")
+    if options.projection == "off":
+        return surface
+    noise = _noise(surface)
+    if options.projection != "auto":
+        return _project(surface, options.projection, noise, np.ones(len(noise), dtype=bool), options.sheets)
+    noisy = noise > 0.0
     if noisy.mean() < _MANY:
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING

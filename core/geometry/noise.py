@@ -74,7 +74,7 @@ def project_points(points, method, noise, component=None):
     )
     many = np.minimum(many.astype(int), smallest - 1)
     distance, index = cKDTree(points).query(points, k=many.max() + 1, workers=-1)
-    weight = np.maximum(1.0 - (distance / distance[np.arange(len(many)), many, None]) ** 2, 0.0) ** 2
+    weight = fading_weights(np.minimum(distance, distance[np.arange(len(many)), many, None]))
     if method == "quadric":
         return points + fit_quadrics(points, index, weight).height
     weight /= weight.sum(axis=1, keepdims=True)
