@@ -8,37 +8,25 @@ from scipy.spatial import cKDTree
 from ..kernel import SUPPORT
 from .components import label_connected
 from .distances import arc_squared
-from .nearest import fading_weights
+from .nearest import ON, SMOOTH, fading_weights
 from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
-_LOPSIDED = 0.15  # mean offset of the neighbours over their mean distance; less than half of it at a straight boundary
-_NEIGHBORS = 30  # looked at around a candidate
 _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 _FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
-_BESIDE = 16  # the nearest of them tell what faces elsewhere: on coarse balls more reach around
-_FACING = 0.7  # cosine of its normal and those of neighbours that face elsewhere, at most
 _LINK = 6.0  # gaps between candidates of the same boundary
 _SHORTEST = 16  # candidates of a boundary that is found
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
-_SAME = 0.5  # spacings between the measured and the given distance to a boundary, near a corner
-_CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at least, at most
+_CURVE = 34  # candidates that the boundary's course is fitted to, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
-_LEANING = 0.3  # what normals may be off by, as a share of the distance
-_OPPOSITE = -0.3  # cosine of the directions across two courses of the boundary that do not belong together
-_HALF = (4, 6)  # a fit to one side of a corner needs more candidates than that: of a short boundary, of a long one
-_KINK = (2.0, 0.1)  # a fit to one side of a corner must scatter so much less, and by so much of the spacing
-_KINKED = 1.3  # scatter over that of the neighbours at which a corner is near
-_CHANCE = 3.0  # variances of a curvature that may be chance
-_VIEWS = 48  # nearest candidates that a point looks at
-_FEW = 5  # candidates that make a second boundary
-_FURTHER = 1.5, 3.0  # times the measured distance, and spacings, within which a point of the boundary must lie
+_KINK = 2.0, 0.1  # a fit to one side of a corner must scatter so much less, and by so much of the spacing
+_VIEWS = 24  # nearest candidates that a point looks at
 _AVERAGED = 8  # the nearest of them on one side of a corner, whose measures of the distance are averaged
-_STRAIGHT, _CORNER = 0.8, 0.75  # cosine of the directions across the boundary: of one course, at least; of two, at most
+_FURTHER = 2.0  # times the measured distance, and spacings more, within which a point of the boundary must lie
 
 
 @dataclass(frozen=True)
@@ -70,7 +58,7 @@ class Boundary:
         nearer = np.argmin(self.distance, axis=1)[:, None]
         measured = np.take_along_axis(self.distance, nearer, axis=1)[:, 0]
         # Around a corner that the surface fills, the nearest place is the corner, which mirrors nothing.
-        low, high = (measured + side * _SAME * spacing for side in (-1.0, 1.0))
+        low, high = (measured + side * ON * spacing for side in (-1.0, 1.0))
         same = np.isinf(self.distance[:, 1]) | ((low < distance) & (distance < high))
         result = self.distance.copy()
         np.put_along_axis(result, nearer, np.where(same, distance, measured)[:, None], axis=1)
@@ -111,16 +99,13 @@ def find_boundary(nearest, oriented, gaps):
         block = np.arange(start, min(start + _BLOCK, len(points)))
         offset = points[nearest.index[block]] - points[block, None]
         flat = offset @ frames(oriented[block])[:, :, 1:]
-        weight = nearest.weight[block]
-        mean = np.einsum("ik,ikc->ic", weight, flat)
-        lopsided = np.linalg.norm(mean, axis=1) > _LOPSIDED * np.sum(weight * np.linalg.norm(flat, axis=2), axis=1)
-        flat, weight = flat[lopsided, 1 : _NEIGHBORS + 1], weight[lopsided, 1 : _NEIGHBORS + 1]
-        angle = np.sort(np.where(weight > 0.0, np.arctan2(flat[:, :, 1], flat[:, :, 0]), np.nan), axis=1)
+        known = nearest.weight[block, 1:] > 0.0
+        angle = np.sort(np.where(known, np.arctan2(flat[:, 1:, 1], flat[:, 1:, 0]), np.nan), axis=1)
         around = np.concatenate([angle, angle[:, :1] + 2.0 * np.pi], axis=1)
         gap = np.fmax.reduce(np.diff(around, axis=1), axis=1)
         # Neighbours left out sort last, as NaN: the gap over the end is counted from the last known angle.
         gap = np.fmax(gap, angle[:, 0] + 2.0 * np.pi - np.fmax.reduce(angle, axis=1))
-        rows.append(block[lopsided][gap > _GAP])
+        rows.append(block[gap > _GAP])
     rows = np.concatenate(rows)
     if not len(rows):
         return result
@@ -136,10 +121,8 @@ def find_boundary(nearest, oriented, gaps):
 
 def _bends_away(nearest, oriented, rows):
     """Tell around which points neighbours lie off their sheet or face elsewhere: it goes on there, past an edge."""
-    other = nearest.index[rows, 1:_NEIGHBORS]
-    beside = np.abs(np.einsum("ikc,ic->ik", oriented[other], oriented[rows])) < _FACING
-    beside[:, _BESIDE:] = False
-    beside |= nearest.weight[rows, 1:_NEIGHBORS] <= 0.0
+    cosine = np.einsum("ikc,ic->ik", oriented[nearest.index[rows]], oriented[rows])
+    beside = (np.abs(cosine) < SMOOTH) | nearest.apart[rows]
     return np.count_nonzero(beside, axis=1) > _FOLDED
 
 
@@ -194,33 +177,42 @@ def measure_boundary(nearest, normals, at_boundary):
         block = close[start : start + _BLOCK]
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
-        doubt = (near + 2.0 * spacing) * np.where(course.kinked[seen], 10.0, 1.0)
+        # Near candidates tell best, and those whose course scatters least: it turns at no corner.
+        doubt = (near + _FURTHER * spacing) * (course.scatter[seen] ** 2 + (ON * spacing) ** 2)
         distance, curvature = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
         eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
         for side in (0, 1):
             best = np.argmin(np.where(eligible, doubt, np.inf), axis=1)
             ahead = course.outward[seen[every, best]]
-            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > _STRAIGHT)
+            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > SMOOTH)
             rank = np.argsort(np.argsort(np.where(same, doubt, np.inf), axis=1, kind="stable"), axis=1, kind="stable")
             trust = np.where(same & (rank < _AVERAGED), 1.0 / doubt, 0.0)
             total = trust.sum(axis=1)
-            known = np.count_nonzero(same, axis=1) >= (_FEW if side else 1)
+            known = same.any(axis=1)
             total[~known] = 1.0
             measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
             # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
-            known &= np.where(same, near, np.inf).min(axis=1) <= _FURTHER[0] * measured + _FURTHER[1] * spacing[:, 0]
+            known &= np.where(same, near, np.inf).min(axis=1) <= _FURTHER * (measured + spacing[:, 0])
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
-            boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
+            outward = np.einsum("ik,ikc->ic", trust, course.outward[seen])
+            boundary.outward[block, side] = outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
+            boundary.outward[block[~known], side] = 0.0
             if side == 0:
                 # Around a corner that the surface fills, the second boundary turns away and lies inside the first.
                 chosen = seen[every, best][:, None]
                 apart, expected = course.ahead(nearest.points, chosen, seen)
-                turned = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _CORNER
-                eligible = turned & (apart < 0.25 * spacing) & (near < reach[block, None])
-                eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > 0.5
-    return replace(boundary, at_boundary=at_boundary)
+                turned = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < SMOOTH
+                eligible = turned & (apart < ON * spacing) & (near < reach[block, None])
+                eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > SMOOTH
+    nearer = np.argsort(boundary.distance, axis=1, kind="stable")
+    return Boundary(
+        at_boundary,
+        np.take_along_axis(boundary.distance, nearer, axis=1),
+        np.take_along_axis(boundary.curvature, nearer, axis=1),
+        np.take_along_axis(boundary.outward, nearer[:, :, None], axis=1),
+    )
 
 
 @dataclass(frozen=True)
@@ -232,7 +224,7 @@ class _Course:
     across: np.ndarray
     outward: np.ndarray
     coefficients: np.ndarray
-    kinked: np.ndarray
+    scatter: np.ndarray
 
     def ahead(self, points, chosen, seen):
         """Return how far other boundary points lie outside a parabola's tangent, and its direction across there."""
@@ -264,9 +256,9 @@ class _Course:
 
 def _fit_course(nearest, normals, rows):
     points = nearest.points
-    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
+    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE + 1, len(rows)), workers=-1)
     # A boundary that is given may be sparse, so that its rows are found without a reach.
-    fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, *_CURVE)[:, None]
+    fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, FEWEST, _CURVE)[:, None]
     across = outward_directions(nearest, normals, rows)
     near = other[:, :9]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
@@ -277,28 +269,25 @@ def _fit_course(nearest, normals, rows):
     offset = (points[rows[other]] - points[rows, None]) / unit[:, :, None]
     t, e = np.einsum("ikc,ic->ik", offset, along), np.einsum("ikc,ic->ik", offset, across)
     # The boundary on the other side of a ribbon or a slit faces the other way.
-    facing = np.einsum("ikc,ic->ik", across[other], across) > _OPPOSITE
+    facing = np.einsum("ikc,ic->ik", across[other], across) > 0.0
     facing &= _on_sheet(nearest, normals, rows, rows[other], distance)
     weight = np.where(facing, fading_weights(np.minimum(distance, unit)), 0.0)
     fit, scatter = _parabola(t, e, weight)
     spacing = nearest.spacing[rows] / unit[:, 0]
-    for half in (t < 0.25 * spacing[:, None], t > -0.25 * spacing[:, None]):
-        enough = np.count_nonzero(half & (weight > 0.0), axis=1) > np.clip(fitted[:, 0] // 5, *_HALF)
+    for half in (t < ON * spacing[:, None], t > -ON * spacing[:, None]):
+        enough = np.count_nonzero(half & (weight > 0.0), axis=1) >= FEWEST
         other_fit, other_scatter = _parabola(t, e, np.where(half | ~enough[:, None], weight, 0.0))
         better = enough & (scatter > _KINK[0] * other_scatter + _KINK[1] * spacing)
         fit[better], scatter[better] = other_fit[better], other_scatter[better]
-    close = np.where(np.arange(other.shape[1]) < fitted // 2, scatter[other] * unit[other, 0], np.nan)
-    usual = np.nanmedian(close, axis=1) / unit[:, 0]
-    kinked = scatter > _KINKED * usual + 0.1 * spacing
-    fit[:, 0] += _LEVEL * np.where(kinked, usual, scatter)
+    fit[:, 0] += _LEVEL * scatter
     fit *= np.concatenate([unit, np.ones_like(unit), 1.0 / unit], axis=1)
     outward = across - fit[:, 1:2] * along
-    return _Course(rows, along, across, outward / np.linalg.norm(outward, axis=1)[:, None], fit, kinked)
+    return _Course(rows, along, across, outward / np.linalg.norm(outward, axis=1)[:, None], fit, scatter * unit[:, 0])
 
 
 def _on_sheet(nearest, normals, rows, other, distance):
     """Tell which of other points lie on the sheet of some points, and face the same way, (k, views) each."""
-    same, cosine = on_sheet(nearest, normals, rows, other, distance, _LEANING)
+    same, cosine = on_sheet(nearest, normals, rows, other, distance)
     return same & (cosine > 0.0)
 
 
@@ -314,7 +303,7 @@ def _parabola(t, e, weight):
     scatter = np.sqrt((weight * residual**2).sum(axis=1) / (total * freedom))
     spread = inverse[:, 2:] @ weighted
     chance = scatter**2 * (spread**2).sum(axis=(1, 2))
-    kept = np.maximum(1.0 - _CHANCE * chance / np.maximum(fit[:, 2] ** 2, 1e-300), 0.0)
+    kept = np.maximum(1.0 - chance / np.maximum(fit[:, 2] ** 2, 1e-300), 0.0)
     fit += (inverse[:, :, 2] / inverse[:, 2:, 2]) * ((kept - 1.0) * fit[:, 2])[:, None]
     return fit, scatter
 

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from .nearest import SMOOTH
+
 _BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
 _STEPS = 8  # nearest neighbours whose chords tell of roughness
-_EDGE, _ACROSS = 0.9, 3  # cosine of normals at two ends of a chord across a sharp edge, and how many next to a point
+_ACROSS = 3  # of these chords lead across a sharp edge: it is no roughness there
 
 
 def arc_squared(squared, left, right, cosine=1.0):
@@ -105,7 +107,7 @@ def measure_roughness(nearest, normals):
     cosine = np.einsum("ikc,ic->ik", normals[index], normals)
     side = np.where(cosine < 0.0, -1.0, 1.0)
     height = np.einsum("ikc,ic->ik", chord, normals) + side * np.einsum("ikc,ikc->ik", chord, normals[index])
-    across = counted & (np.abs(cosine) < _EDGE)
+    across = counted & (np.abs(cosine) < SMOOTH)
     smooth = counted & ~across & (across.sum(axis=1) < _ACROSS)[:, None]
     slope = np.where(smooth, (0.5 * height / nearest.distance[:, near]) ** 2, 0.0)
     return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))

@@ -10,6 +10,8 @@ from scipy.spatial import cKDTree
 from .quadrics import fit_quadrics
 
 COUNT = 41  # the point itself and 40 others
+ON = 0.3  # spacings from a surface within which a point lies on it
+SMOOTH = 0.75  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,11 @@ class Nearest:
     def spacing(self):
         """Distance between points of an even sample as dense as the nearest twelve neighbours, (m,)."""
         return spacing_of(self.distance)
+
+    @property
+    def apart(self):
+        """Which neighbours were left out, as they lie on another sheet, (m, 41) bool."""
+        return (self.weight == 0.0) & (fading_weights(self.distance) > 0.0)
 
     @functools.cached_property
     def quadrics(self):

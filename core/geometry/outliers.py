@@ -2,18 +2,13 @@
 
 import numpy as np
 
+from .nearest import ON
 from .quadrics import fit_quadrics, heights_over
 
 # Neighbours asked: near ones, and some further away, where the density may be another.
 _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
 _AGREEING = 3  # of them that are enough, as on each of the three faces at a corner
-# A point nearer than this share of its own spacing to the surface of a neighbour is on it. The spacing of a point far
-# off is half its distance from the surface, so that the rule holds at any height.
-_OFF = 0.3
 _SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
-_SEARCHES = 8  # at most; the first finds most outliers, each other one what these had hidden
-_ROUNDS = 2  # in which the quadrics of witnesses let go of what is off them
-_LET_GO, _FINEST = 3.0, 0.1  # by standard deviations, which are at least that share of the spacing
 _SPARSE = 2.5  # median spacings between points whose witnesses must show a surface that thin
 _FILLING = 0.6  # scatter over spacing, where points fill a volume about 1, at noise of half a spacing 0.45
 _BLOCK = 1 << 13  # points looked at at one time
@@ -24,7 +19,8 @@ def find_outliers(nearest):
 
     Twelve neighbours are the witnesses of a point. Each of them describes the surface by a quadric through its own
     neighbours, which lets go of those off it. The point is on the surface where three of these pass by it: nearer than
-    a share of its spacing and what the witness' own neighbours scatter. Outliers are no witnesses; nor are, for
+    a share of its spacing and what the witness' own neighbours scatter. (The spacing of a point far off is half its
+    distance from the surface, so that the rule holds at any height.) Outliers are no witnesses; nor are, for
     sparse points, those whose neighbours fill a volume.
 
     Parameters
@@ -37,12 +33,9 @@ def find_outliers(nearest):
     ndarray, (m,) bool
     """
     surface, result = nearest.quadrics, np.zeros(len(nearest.points), dtype=bool)
-    for _ in range(_SEARCHES):
-        found = _off_surface(nearest, surface, result)
-        new = found & ~result
-        if not new.any():
-            break
-        result = found
+    # The first search finds most outliers, each other one what these had hidden.
+    while (new := _off_surface(nearest, surface, result) & ~result).any():
+        result |= new
         # The quadrics around them go on without them.
         rows = np.flatnonzero(new[nearest.index].any(axis=1))
         nearest = nearest.keep(~result[nearest.index])
@@ -55,7 +48,7 @@ def _off_surface(nearest, surface, known):
     spacing, result = nearest.spacing, known.copy()
     off = _third(_heights(nearest, surface, np.arange(len(spacing))))
     sparse = spacing > _SPARSE * np.median(spacing)
-    suspects = np.flatnonzero(~known & ((off > _OFF * spacing) | (sparse & (surface.misfit > _OFF * spacing))))
+    suspects = np.flatnonzero(~known & ((off > ON * spacing) | (sparse & (surface.misfit > ON * spacing))))
     if not len(suspects):
         return result
     witnesses = _witnesses(nearest, suspects)
@@ -63,7 +56,7 @@ def _off_surface(nearest, surface, known):
     surface, scatter = _let_go(nearest, surface, rows)
     scatter = scatter[np.searchsorted(rows, witnesses)]
     height = _heights(nearest, surface, suspects)
-    height /= _OFF * spacing[suspects, None] + _SCATTERS * scatter
+    height /= ON * spacing[suspects, None] + _SCATTERS * scatter
     height[sparse[suspects, None] & (scatter > _FILLING * spacing[witnesses])] = np.inf
     found = -1
     while np.count_nonzero(result) > found:
@@ -96,11 +89,10 @@ def _let_go(nearest, surface, rows):
     The scatter is the standard deviation of normal values with the same median.
     """
     points, index, spacing = nearest.points, nearest.index[rows], nearest.spacing[rows]
-    for _ in range(_ROUNDS):
-        height, scatter = _scatter(surface, points, rows, index)
-        far = height / (_LET_GO * np.maximum(scatter, _FINEST * spacing))[:, None]
-        weight = nearest.weight[rows] * np.maximum(1.0 - far**2, 1e-3) ** 2
-        surface = surface.put(rows, fit_quadrics(points, index, weight, rows))
+    height, scatter = _scatter(surface, points, rows, index)
+    far = height / np.maximum(_SCATTERS * scatter, ON * spacing)[:, None]
+    weight = nearest.weight[rows] * np.maximum(1.0 - far**2, 1e-3) ** 2
+    surface = surface.put(rows, fit_quadrics(points, index, weight, rows))
     return surface, _scatter(surface, points, rows, index)[1]
 
 

@@ -6,25 +6,18 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 
 from .components import label_connected, number_by_size
 from .distances import pair_heights
+from .nearest import ON, SMOOTH
 from .quadrics import check_surface, fit_quadrics, frames
 
-_CLOSE = 0.6  # sheets nearer than this many spacings are taken as one
-_GAP = 0.35  # of the spacing: a step along a sheet leads over none that is wider
-LEANING = 0.1  # what normals may be off by, as a share of the distance
-_MISFIT = 0.2  # a quadric that misses its points by more than this share of the spacing may mix two sheets
-_PATIENCE = 0.3  # of the spacing: neighbours of a plane through nearby points count as near it
+_LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
 _BLOCK = 1 << 11
 _SECTORS = 8  # directions in which a sheet is followed from every point
-_TOUCH = 1.5  # spacings within which points touch
-_AROUND = 1.55  # the way along a sheet over the chord: sqrt(2) across a right angle, 8 % for steps in eight directions
-_TURN = 0.5  # cosine of normals on one smooth sheet, at least: the kernel reaches no further around a bend
-_LEVEL = 0.8  # the same for a step between points that do not touch
-_HOLLOW = 0.5  # turn of two normals towards each other, in radians, that a gap may make
+_AROUND = 1.5  # way along a sheet over the chord, at most: across a right angle; points that many spacings apart touch
 _SOURCES = 1 << 7  # points from which ways are followed at one time
 
 
-def same_sheet(left, right, dot, distance, spacing, leaning=LEANING, close=_CLOSE):
+def same_sheet(left, right, dot, distance, spacing, close=2.0):
     """Tell which pairs lie on one sheet: their chord is orthogonal to their mean normal, within what may be off.
 
     Parameters
@@ -35,19 +28,17 @@ def same_sheet(left, right, dot, distance, spacing, leaning=LEANING, close=_CLOS
         Cosine of the two normals; its sign flips the second one.
     distance, spacing : ndarray
         Of the pair.
-    leaning : float
-        What normals may be off by, as a share of the distance.
     close : float
-        How far apart the sheets may be that are taken as one, in spacings.
+        How far apart the sheets may be that are taken as one, in units of what a point on a surface may be off.
 
     Returns
     -------
     ndarray of bool
     """
-    return np.abs(left + np.where(dot < 0.0, -right, right)) <= 2.0 * (close * spacing + leaning * distance)
+    return np.abs(left + np.where(dot < 0.0, -right, right)) <= 2.0 * (close * ON * spacing + _LEANING * distance)
 
 
-def on_sheet(nearest, normals, rows, other, distance, leaning=LEANING, close=_CLOSE):
+def on_sheet(nearest, normals, rows, other, distance, close=2.0):
     """Tell which of other points lie on the sheet of some points.
 
     Parameters
@@ -61,7 +52,7 @@ def on_sheet(nearest, normals, rows, other, distance, leaning=LEANING, close=_CL
     other : ndarray, (k, views) int
         Points that each of them is compared with.
     distance : ndarray, (k, views)
-    leaning, close : float
+    close : float
         See `same_sheet`.
 
     Returns
@@ -74,7 +65,7 @@ def on_sheet(nearest, normals, rows, other, distance, leaning=LEANING, close=_CL
     cosine = np.einsum("ikc,ic->ik", normals[other], normals[rows])
     left = np.einsum("ikc,ic->ik", chord, normals[rows])
     right = np.einsum("ikc,ikc->ik", chord, normals[other])
-    return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], leaning, close), cosine
+    return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], close), cosine
 
 
 def fit_sheets(nearest):
@@ -100,7 +91,7 @@ def fit_sheets(nearest):
     surface = nearest.quadrics
     check_surface(surface)
     spacing = nearest.spacing
-    mixed = np.flatnonzero(surface.misfit > _MISFIT * spacing)
+    mixed = np.flatnonzero(surface.misfit > ON * spacing)
     if not len(mixed):
         return surface, nearest
     normals = surface.normals.copy()
@@ -128,11 +119,11 @@ def _own_plane(offset, weight, spacing):
     length = np.linalg.norm(normal, axis=2)
     narrow = length < 0.25 * np.linalg.norm(a, axis=2) * np.linalg.norm(b, axis=2)
     normal /= np.where(length > 0.0, length, 1.0)[:, :, None]
-    height = (normal @ np.swapaxes(nearby, 1, 2)) / (_PATIENCE * spacing)[:, None, None]
+    height = (normal @ np.swapaxes(nearby, 1, 2)) / (ON * spacing)[:, None, None]
     cost = np.minimum(height**2, 1.0).sum(axis=2) + np.where(narrow, offset.shape[1], 0.0)
     normal = normal[np.arange(len(normal)), cost.argmin(axis=1)]
     for _ in range(4):
-        height = np.einsum("ikc,ic->ik", offset, normal) / (_PATIENCE * spacing)[:, None]
+        height = np.einsum("ikc,ic->ik", offset, normal) / (ON * spacing)[:, None]
         near = weight / (1.0 + height**2) ** 2
         normal = np.linalg.eigh(np.swapaxes(near[:, :, None] * offset, 1, 2) @ offset)[1][:, :, 0]
     return normal
@@ -157,7 +148,7 @@ def label_sheets(nearest, normals, component):
     """
     sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)))
     # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
-    touching = nearest.distance <= _TOUCH * nearest.spacing[nearest.index]
+    touching = nearest.distance <= _AROUND * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
     while len(lost):
         sheet[lost] = np.where(touching[lost], sheet[nearest.index[lost]], -1).max(axis=1)
@@ -184,10 +175,10 @@ def sheet_neighbors(nearest, normals, oriented):
         angle = np.arctan2(flat[:, :, 1], flat[:, :, 0])
         # Counted from the nearest neighbour, so that they turn with the points.
         sector = np.round((angle - angle[:, 1:2]) * (0.5 * _SECTORS / np.pi)) % _SECTORS
-        same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=_GAP)
+        same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=1.0)
         # Across an edge only points that touch are next to each other, others may be so across a gap.
-        same &= ((cosine if oriented else np.abs(cosine)) > _LEVEL) | (
-            nearest.distance[block] < _TOUCH * nearest.spacing[block, None]
+        same &= ((cosine if oriented else np.abs(cosine)) > SMOOTH) | (
+            nearest.distance[block] < _AROUND * nearest.spacing[block, None]
         )
         same[:, 0] = False
         rows = np.arange(len(block))
@@ -234,9 +225,7 @@ def _plainly_on_one_sheet(pairs, oriented, spacing):
     result = np.empty(len(pairs.first), dtype=bool)
     for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, oriented):
         mean = 0.5 * (spacing[pairs.first[block]] + spacing[pairs.second[block]])
-        level = same_sheet(left, right, cosine, pairs.distance[block], mean)
-        # In a hollow two sheets may face each other across a gap.
-        result[block] = level & (cosine > _TURN) & (right - left > -_HOLLOW * pairs.distance[block])
+        result[block] = same_sheet(left, right, cosine, pairs.distance[block], mean) & (cosine > SMOOTH)
     return result
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from ..geometry import SMOOTH
 from ..kernel import SUPPORT
 
-_SHARED = 0.7  # cosine of the directions across the boundaries of two points, at least, if they are one boundary
 _BEND = 0.5  # most that the curvature of a boundary may change an image
 
 
@@ -50,7 +50,7 @@ def mirror(pairs, distance, boundary):
     e[swapped] = e[swapped, ::-1]
     curvature[swapped] = 0.5 * (boundary.curvature[first[swapped]] + boundary.curvature[second[swapped], ::-1])
     agreed = np.where(swapped[:, None], np.stack([cosine[:, 0, 1], cosine[:, 1, 0]], axis=1), cosine[:, [0, 1], [0, 1]])
-    seen = np.isfinite(d) & np.isfinite(e) & (alone[:, None] | (agreed > _SHARED))
+    seen = np.isfinite(d) & np.isfinite(e) & (alone[:, None] | (agreed > SMOOTH))
     return _images(seen, distance[rows], d, e, curvature, 0.5 * (lengths[first] + lengths[second]), rows)
 
 
