@@ -3,6 +3,6 @@
 from .cloud import estimate_normals, read_cloud
 from .components import SMALLEST
 from .distances import arc_length, arc_squared, circle_arc, pair_heights, projected_distance
-from .nearest import SMOOTH, find_nearest
+from .nearest import ROUNDS, SMOOTH, find_nearest
 from .points import FEWEST, as_indices, as_mask, check_points, check_values
 from .quadrics import frames

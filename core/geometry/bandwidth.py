@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from .nearest import ROUNDS
+
 _WIDTH = 0.18  # h over the reach of the cells, by the root of the neighbours of the options, 100: the narrowest kernel
 # at which the weights of random points have their moments
 _POWER = 8  # of the mean over the neighbourhood: the longest cells decide
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
 _FURTHEST = 2.5  # spacings that a gap may be wide, as in rows 25 times denser along than across: it is a hole otherwise
-_ROUNDS = 12  # of averaging over the 40 nearest neighbours, as h must not vary by chance
 
 
 def smoothing_lengths(nearest, options, component=None, reach=None):
@@ -54,7 +55,7 @@ def mean_gaps(nearest, reach, power):
         Of the mean: in the eighth the widest gaps decide.
     """
     reach = np.minimum(reach, _FURTHEST * nearest.spacing)
-    return _repeat(nearest.averaging(), reach**power, _ROUNDS) ** (1.0 / power)
+    return _repeat(nearest.averaging(), reach**power, ROUNDS) ** (1.0 / power)
 
 
 def depth(nearest, inside):

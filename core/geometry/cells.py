@@ -11,7 +11,7 @@ from .sheets import on_sheet
 _BLOCK = 1 << 12
 _WIDER = 1, 4, 16  # times the 40 neighbours are looked at where a cell is open: a jump of density has them on one side
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
-_BENT = (-0.5, 3.0)  # bounds of the Gaussian curvature times the squared reach, where the fit is poor
+_BENT = -0.5  # least Gaussian curvature times the squared reach, where the fit is poor
 _OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
 
@@ -164,5 +164,5 @@ def _triangles(corner, other, gaussian_curvature):
     """Return the areas of triangles with one corner at the point, on a surface of that curvature."""
     plane = 0.5 * (corner[:, 0] * other[:, 1] - corner[:, 1] * other[:, 0])
     squared = np.einsum("ic,ic->i", corner, corner) + np.einsum("ic,ic->i", other, corner + other)
-    bent = np.clip(gaussian_curvature * squared / 3.0, *_BENT) + 1e-12  # of the mean squared distance along the edge
+    bent = np.maximum(gaussian_curvature * squared / 3.0, _BENT) + 1e-12  # of the mean squared distance along the edge
     return plane * 2.0 * (1.0 - 1.0 / np.sqrt(1.0 + bent)) / bent

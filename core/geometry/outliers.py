@@ -3,6 +3,7 @@
 import numpy as np
 
 from .nearest import ON
+from .noise import FILLING
 from .quadrics import fit_quadrics, heights_over
 
 # Neighbours asked: near ones, and some further away, where the density may be another.
@@ -10,7 +11,6 @@ _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
 _AGREEING = 3  # of them that are enough, as on each of the three faces at a corner
 _SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
 _SPARSE = 2.5  # median spacings between points whose witnesses must show a surface that thin
-_FILLING = 0.6  # scatter over spacing, where points fill a volume about 1, at noise of half a spacing 0.45
 _BLOCK = 1 << 13  # points looked at at one time
 
 
@@ -57,7 +57,7 @@ def _off_surface(nearest, surface, known):
     scatter = scatter[np.searchsorted(rows, witnesses)]
     height = _heights(nearest, surface, suspects)
     height /= ON * spacing[suspects, None] + _SCATTERS * scatter
-    height[sparse[suspects, None] & (scatter > _FILLING * spacing[witnesses])] = np.inf
+    height[sparse[suspects, None] & (scatter > FILLING * spacing[witnesses])] = np.inf
     found = -1
     while np.count_nonzero(result) > found:
         found = np.count_nonzero(result)

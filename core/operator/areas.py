@@ -7,7 +7,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.special import expit
 
-from ..geometry import arc_length, read_cloud
+from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
 from .curvature import kernel_integral, uneven
@@ -16,7 +16,6 @@ from .images import mirror, own_images
 _FLOOR = 0.5  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
 _DEGREES = 100, 50  # of the polynomials of two rounds: the second makes up for what the floor changed in the first
 _WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] can tell from zero
-_SMOOTH = 12  # means over the kernel after which the share of cells and areas is one of parts, not of points
 _EVEN = 1e-9  # changes of h, as a share, that are none
 NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
 
@@ -126,7 +125,7 @@ def _like_cells(matrix, areas, cloud):
     """
     mean = 1.0 / (matrix @ areas)
     ratio = cloud.cell_areas / areas
-    for _ in range(_SMOOTH):
+    for _ in range(ROUNDS):
         ratio = mean * (matrix @ (areas * ratio))
     areas = areas * ratio
     total, found = (np.bincount(cloud.component, values) for values in (cloud.cell_areas, areas))
