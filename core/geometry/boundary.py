@@ -17,15 +17,19 @@ _BLOCK = 1 << 13  # points looked at at one time
 _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 _FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
+_BESIDE = 16  # the nearest of them tell what faces elsewhere: on coarse balls more reach around
 _LINK = 6.0  # gaps between candidates of the same boundary
 _SHORTEST = 16  # candidates of a boundary that is found
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
-_CURVE = 34  # candidates that the boundary's course is fitted to, at most
+_CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at least, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
-_KINK = 2.0, 0.1  # a fit to one side of a corner must scatter so much less, and by so much of the spacing
-_VIEWS = 24  # nearest candidates that a point looks at
+_KINK = 2.0  # a fit to one side of a corner must scatter so many times less
+_KINKED = 1.3  # scatter over that of the neighbours at which a corner is near
+_EXACT = 0.1  # of the spacing: candidates that scatter less about the boundary's course lie on it
+_VIEWS = 48  # nearest candidates that a point looks at
 _AVERAGED = 8  # the nearest of them on one side of a corner, whose measures of the distance are averaged
+_STRAIGHT = 0.8  # cosine of the directions across one course of the boundary, at least
 _FURTHER = 2.0  # times the measured distance, and spacings more, within which a point of the boundary must lie
 
 
@@ -122,7 +126,8 @@ def find_boundary(nearest, oriented, gaps):
 def _bends_away(nearest, oriented, rows):
     """Tell around which points neighbours lie off their sheet or face elsewhere: it goes on there, past an edge."""
     cosine = np.einsum("ikc,ic->ik", oriented[nearest.index[rows]], oriented[rows])
-    beside = (np.abs(cosine) < SMOOTH) | nearest.apart[rows]
+    beside = nearest.apart[rows]
+    beside[:, :_BESIDE] |= np.abs(cosine[:, :_BESIDE]) < SMOOTH
     return np.count_nonzero(beside, axis=1) > _FOLDED
 
 
@@ -177,15 +182,15 @@ def measure_boundary(nearest, normals, at_boundary):
         block = close[start : start + _BLOCK]
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
-        # Near candidates tell best, and those whose course scatters least: it turns at no corner.
-        doubt = (near + _FURTHER * spacing) * (course.scatter[seen] ** 2 + (ON * spacing) ** 2)
+        # Near candidates tell best, but none whose course turns at a corner while there are others.
+        doubt = (near + _FURTHER * spacing) * np.where(course.kinked[seen], 10.0, 1.0)
         distance, curvature = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
         eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
         for side in (0, 1):
             best = np.argmin(np.where(eligible, doubt, np.inf), axis=1)
             ahead = course.outward[seen[every, best]]
-            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > SMOOTH)
+            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > _STRAIGHT)
             rank = np.argsort(np.argsort(np.where(same, doubt, np.inf), axis=1, kind="stable"), axis=1, kind="stable")
             trust = np.where(same & (rank < _AVERAGED), 1.0 / doubt, 0.0)
             total = trust.sum(axis=1)
@@ -196,14 +201,12 @@ def measure_boundary(nearest, normals, at_boundary):
             known &= np.where(same, near, np.inf).min(axis=1) <= _FURTHER * (measured + spacing[:, 0])
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
-            outward = np.einsum("ik,ikc->ic", trust, course.outward[seen])
-            boundary.outward[block, side] = outward / np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
-            boundary.outward[block[~known], side] = 0.0
+            boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
             if side == 0:
                 # Around a corner that the surface fills, the second boundary turns away and lies inside the first.
                 chosen = seen[every, best][:, None]
                 apart, expected = course.ahead(nearest.points, chosen, seen)
-                turned = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < SMOOTH
+                turned = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _STRAIGHT
                 eligible = turned & (apart < ON * spacing) & (near < reach[block, None])
                 eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > SMOOTH
     nearer = np.argsort(boundary.distance, axis=1, kind="stable")
@@ -224,7 +227,7 @@ class _Course:
     across: np.ndarray
     outward: np.ndarray
     coefficients: np.ndarray
-    scatter: np.ndarray
+    kinked: np.ndarray
 
     def ahead(self, points, chosen, seen):
         """Return how far other boundary points lie outside a parabola's tangent, and its direction across there."""
@@ -256,9 +259,9 @@ class _Course:
 
 def _fit_course(nearest, normals, rows):
     points = nearest.points
-    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE + 1, len(rows)), workers=-1)
+    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
     # A boundary that is given may be sparse, so that its rows are found without a reach.
-    fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, FEWEST, _CURVE)[:, None]
+    fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, *_CURVE)[:, None]
     across = outward_directions(nearest, normals, rows)
     near = other[:, :9]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
@@ -277,12 +280,15 @@ def _fit_course(nearest, normals, rows):
     for half in (t < ON * spacing[:, None], t > -ON * spacing[:, None]):
         enough = np.count_nonzero(half & (weight > 0.0), axis=1) >= FEWEST
         other_fit, other_scatter = _parabola(t, e, np.where(half | ~enough[:, None], weight, 0.0))
-        better = enough & (scatter > _KINK[0] * other_scatter + _KINK[1] * spacing)
+        better = enough & (scatter > _KINK * other_scatter + _EXACT * spacing)
         fit[better], scatter[better] = other_fit[better], other_scatter[better]
-    fit[:, 0] += _LEVEL * scatter
+    close = np.where(np.arange(other.shape[1]) < fitted // 2, scatter[other] * unit[other, 0], np.nan)
+    usual = np.nanmedian(close, axis=1) / unit[:, 0]
+    kinked = scatter > _KINKED * usual + _EXACT * spacing
+    fit[:, 0] += _LEVEL * usual
     fit *= np.concatenate([unit, np.ones_like(unit), 1.0 / unit], axis=1)
     outward = across - fit[:, 1:2] * along
-    return _Course(rows, along, across, outward / np.linalg.norm(outward, axis=1)[:, None], fit, scatter * unit[:, 0])
+    return _Course(rows, along, across, outward / np.linalg.norm(outward, axis=1)[:, None], fit, kinked)
 
 
 def _on_sheet(nearest, normals, rows, other, distance):

@@ -9,10 +9,11 @@ from .quadrics import fit_quadrics
 _FEW = 20  # neighbours of the fit that tells noise from shape, by that to all 40
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
 _ROUNDS = 4  # of averaging over the neighbourhood
-LEFT = 0.08  # of the spacing: noise that is left alone, and that a fit leaves, less with the root of its neighbours
+_LEAST = 0.02  # noise below this share of the spacing is left alone
+LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
-_MANY = 90  # neighbours of the fit that points are projected on, at most: more would round what is shape
+_NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round what is shape
 
 
 def noise_level(nearest, misfit):
@@ -44,7 +45,7 @@ def noise_level(nearest, misfit):
     for _ in range(_ROUNDS):
         logarithms = averaging @ logarithms
     few, many, own = np.exp(logarithms.T)
-    noisy = (few > LEFT) & (few < _SHAPE * own) & ((few > FILLING) | (many < _SHAPE * few))
+    noisy = (few > _LEAST) & (few < _SHAPE * own) & ((few > FILLING) | (many < _SHAPE * few))
     return np.where(averaging @ noisy.astype(float) > 0.5, few, 0.0)
 
 
@@ -68,7 +69,9 @@ def project_points(points, method, noise, component=None):
     """
     smallest = len(points) if component is None else np.bincount(component).min()
     # A quadric has six coefficients.
-    many = np.clip(6.0 * (noise / LEFT) ** 2, _FEW, _MANY) if method == "quadric" else np.full(len(noise), _MANY)
+    many = (
+        np.clip(6.0 * (noise / LEFT) ** 2, *_NEIGHBORS) if method == "quadric" else np.full(len(noise), _NEIGHBORS[1])
+    )
     many = np.minimum(many.astype(int), smallest - 1)
     distance, index = cKDTree(points).query(points, k=many.max() + 1, workers=-1)
     weight = fading_weights(np.minimum(distance, distance[np.arange(len(many)), many, None]))
