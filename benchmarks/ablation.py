@@ -13,7 +13,19 @@ from pathlib import Path
 import numpy as np
 
 import core
-from core.geometry import bandwidth, boundary, cells, cloud, components, distances, noise, outliers, quadrics, sheets
+from core.geometry import (
+    bandwidth,
+    boundary,
+    cells,
+    cloud,
+    components,
+    distances,
+    nearest,
+    noise,
+    outliers,
+    quadrics,
+    sheets,
+)
 from core.operator import areas, curvature, images, stiffness, weights
 
 from .real_shapes import (
@@ -30,10 +42,13 @@ from .samplings import fibonacci_sphere, random_sphere
 from .tables import Table
 
 MODULES = (
-    *(outliers, components, quadrics, sheets, noise, boundary, cells, bandwidth, distances, cloud),
-    *(areas, weights, images, stiffness),
+    *(nearest, outliers, components, quadrics, sheets, noise, boundary, cells, bandwidth, distances, cloud),
+    *(areas, weights, images, curvature, stiffness),
 )
-UNTUNED = "_BLOCK", "_SOURCES", "_SAME", "_EVEN", "_SMALLEST", "_TERMS", "NO_AREA", "_WIDER"  # memory, rounding, counts
+UNTUNED = (  # memory, rounding, counts, and what only notices go by
+    *("_BLOCK", "_SOURCES", "_SAME", "_EVEN", "_SMALLEST", "_TERMS", "NO_AREA", "_WIDER", "COUNT", "_MEMORY"),
+    *("_RIDGE", "_NARROW", "bandwidth._STEPS", "boundary._REACH", "_AT_BOUNDARY"),
+)
 DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"
 GROUPS = "zoo", "awkward", "smooth"
 LEAST = {"area": 1e-3, "eigenvalues": 1e-3, "boundary": 1.0}  # errors below these are none, on smooth shapes a tenth
@@ -48,7 +63,11 @@ def constants():
                 or f", {name} = " in source
                 or f"\n{name}, " in source
             )
-            if name.lstrip("_").isupper() and own and name not in UNTUNED:
+            if (
+                name.lstrip("_").isupper()
+                and own
+                and not {name, f"{module.__name__.split('.')[-1]}.{name}"} & set(UNTUNED)
+            ):
                 if isinstance(value, int | float):
                     yield module, name, None
                 elif isinstance(value, tuple) and all(isinstance(part, int | float) for part in value):
@@ -212,7 +231,9 @@ def ablation(names=()):
 
 def _set(values):
     for module, name, value in values:
-        setattr(module, name, value)
+        for user in MODULES if not name.startswith("_") else [module]:  # others may have imported it
+            if hasattr(user, name):
+                setattr(user, name, value)
     areas._inverse.cache_clear()
 
 

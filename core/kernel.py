@@ -10,6 +10,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.special import j0
 
+from .blocks import blocks, on_all_cores
+
 SUPPORT = 3.0
 """Radius of the kernel's support in units of h."""
 
@@ -38,8 +40,11 @@ def _in_blocks(function):
             return function(q)
         result = np.empty(q.size)
         flat = q.reshape(-1)
-        for start in range(0, q.size, _BLOCK):
-            result[start : start + _BLOCK] = function(flat[start : start + _BLOCK])
+
+        def fill(block):
+            result[block] = function(flat[block])
+
+        on_all_cores(fill, blocks(q.size, _BLOCK))
         return result.reshape(q.shape)
 
     return evaluate

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..blocks import blocks, on_all_cores
 from .distances import arc_squared
 from .quadrics import frames
 from .sheets import on_sheet
@@ -63,8 +64,9 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None
     spacing, rows = nearest.spacing, np.arange(count)
     for wider in _WIDER:
         still_open = np.zeros(count, dtype=bool)
-        for start in range(0, len(rows), _BLOCK // wider):
-            block = rows[start : start + _BLOCK // wider]
+
+        def measure(part, rows=rows, wider=wider, still_open=still_open):
+            block = rows[part]
             cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, wider)
             areas, reach, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
             known = np.flatnonzero(closed)
@@ -75,6 +77,8 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None
                 known = np.arange(len(block))
             cells.areas[block[known]], cells.reach[block[known]] = areas[known], reach[known]
             still_open[block] = ~closed & whole[block]
+
+        on_all_cores(measure, blocks(len(rows), _BLOCK // wider))
         rows = np.flatnonzero(still_open)
     return cells
 

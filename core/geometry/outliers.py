@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..blocks import blocks, on_all_cores
 from .nearest import ON
 from .noise import FILLING
 from .quadrics import fit_quadrics, heights_over
@@ -76,10 +77,13 @@ def _third(values):
 def _heights(nearest, surface, rows):
     """Return how far some points are off the quadrics of their witnesses, (k, 12)."""
     result = np.empty((len(rows), len(_WITNESSES)))
-    for start in range(0, len(rows), _BLOCK):
-        block = rows[start : start + _BLOCK]
+
+    def measure(part):
+        block = rows[part]
         witnesses = _witnesses(nearest, block)
-        result[start : start + _BLOCK] = np.abs(heights_over(surface, nearest.points, witnesses, block[:, None]))
+        result[part] = np.abs(heights_over(surface, nearest.points, witnesses, block[:, None]))
+
+    on_all_cores(measure, blocks(len(rows), _BLOCK))
     return result
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ..blocks import blocks, on_all_cores
 from ..errors import NotASurfaceError
 
 _BLOCK = 1 << 13  # points fitted at one time
@@ -75,8 +76,8 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
         *(np.empty(shape) for shape in ((count, 3), count, (count, 3), (count, 3, 3), count)),
         curved=np.zeros(count, dtype=bool),
     )
-    for start in range(0, count, _BLOCK):
-        block = slice(start, start + _BLOCK)
+
+    def fit_block(block):
         places, here = points[index[block]], points[rows[block]]
         offset = [places[:, :, axis] - here[:, axis, None] for axis in range(3)]
         share = weight[block] / weight[block].sum(axis=1, keepdims=True)
@@ -110,6 +111,8 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
         fitted.shape_operator[block] = (tangents @ form @ np.swapaxes(tangents, 1, 2)) / unit[:, None, None]
         fitted.height[block] = (fit[:, 0] * unit)[:, None] * frame[:, :, 0]
         fitted.misfit[block] = np.sqrt(_sums(share * missed, missed)) * unit
+
+    on_all_cores(fit_block, blocks(count, _BLOCK))
     return fitted
 
 

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
+from ..blocks import blocks, on_all_cores
 from .components import label_connected, number_by_size
 from .distances import pair_heights
 from .nearest import ON, SMOOTH
@@ -95,10 +96,13 @@ def fit_sheets(nearest):
     if not len(mixed):
         return surface, nearest
     normals = surface.normals.copy()
-    for start in range(0, len(mixed), _BLOCK):
-        rows = mixed[start : start + _BLOCK]
+
+    def find(part):
+        rows = mixed[part]
         offset = points[index[rows]] - points[rows, None]
         normals[rows] = _own_plane(offset, nearest.weight[rows], spacing[rows])
+
+    on_all_cores(find, blocks(len(mixed), _BLOCK))
     touched = np.zeros(len(points), dtype=bool)
     touched[mixed] = True
     touched = np.flatnonzero(touched | touched[index].any(axis=1))
@@ -168,8 +172,9 @@ def sheet_neighbors(nearest, normals, oriented):
     Unlike a number of nearest neighbours, they lie all around a point where points crowd along lines, too.
     """
     result = np.zeros(nearest.index.shape, dtype=bool)
-    for start in range(0, len(result), _BLOCK):
-        block = np.arange(start, min(start + _BLOCK, len(result)))
+
+    def find(part):
+        block = np.arange(part.start, part.stop)
         index = nearest.index[block]
         flat = (nearest.points[index] - nearest.points[block, None]) @ frames(normals[block])[:, :, 1:]
         angle = np.arctan2(flat[:, :, 1], flat[:, :, 0])
@@ -186,6 +191,8 @@ def sheet_neighbors(nearest, normals, oriented):
             ahead = same & (sector == side)
             first = ahead.argmax(axis=1)
             result[block, first] |= ahead[rows, first]
+
+    on_all_cores(find, blocks(len(result), _BLOCK))
     return result
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..blocks import blocks, on_all_cores
 from ..geometry import frames
 from ..kernel import SECOND_MOMENT, SUPPORT
 from .curvature import second_moment, uneven
@@ -146,13 +147,13 @@ class _Moments:
         pairs = cloud.pairs
         self._pairs, self._weights, self._unit, self._report = pairs, weights, unit, report
         self._ends = pairs.first, pairs.second
-        self._blocks = [slice(start, start + _BLOCK) for start in range(0, len(weights), _BLOCK)]
+        self._blocks = blocks(len(weights), _BLOCK)
         self._basis = np.empty((2, _TERMS, len(weights)))
         places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
         tangents = frames(cloud.normals)[:, :, 1:].transpose(2, 1, 0).copy()
         near, edges = cloud.boundary.reached(pairs.lengths), _Edges(cloud, tangents)
-        for block in self._blocks:
-            report()
+
+        def describe(block):
             i, j = ends = [index[block] for index in self._ends]
             chord, left, right = places[:, j] - places[:, i], normals[:, i], normals[:, j]
             right *= np.where(_dot(left, right) < 0.0, -1.0, 1.0)
@@ -168,36 +169,45 @@ class _Moments:
                 if len(rows):
                     basis[:, rows] = edges.terms(end[rows], x[rows], y[rows])
 
+        on_all_cores(describe, self._blocks, report)
+
     def factor(self, terms):
         """Return the factor of each pair's weight, (p,)."""
         result, terms = np.empty(len(self._weights)), terms.T.copy()
-        for block in self._blocks:
+
+        def evaluate(block):
             power = sum(
                 values[end[block]] * part[block]
                 for end, basis in zip(self._ends, self._basis, strict=True)
                 for values, part in zip(terms, basis, strict=True)
             )
             np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST), out=result[block])
+
+        on_all_cores(evaluate, self._blocks, self._report)
         return result
 
     def of(self, terms):
         """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
         weights = self._weights * self.factor(terms)
-        return np.stack([self._sum(*(weights * basis[k] for basis in self._basis)) for k in range(_TERMS)], axis=1)
+        here, there = self._basis
+        sums = on_all_cores(lambda k: self._sum(weights * here[k], weights * there[k]), range(_TERMS), self._report)
+        return np.stack(sums, axis=1)
 
     def curvature(self):
         """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
         result = np.empty((len(self._unit), _TERMS, _TERMS))
-        weighted = [[self._weights * values for values in basis] for basis in self._basis]
-        for a in range(_TERMS):
-            for b in range(a + 1):
-                parts = (left[a] * right[b] for left, right in zip(weighted, self._basis, strict=True))
-                result[:, a, b] = result[:, b, a] = self._sum(*parts)
+
+        def entry(place):
+            a, b = place
+            result[:, a, b] = result[:, b, a] = self._sum(
+                *(self._weights * basis[a] * basis[b] for basis in self._basis)
+            )
+
+        on_all_cores(entry, [(a, b) for a in range(_TERMS) for b in range(a + 1)], self._report)
         return result
 
     def _sum(self, here, there):
         """Sum quantities of pairs, as their first and their second point see them, at both ends, in the unit."""
-        self._report()
         return (self._pairs.half(here).sum(axis=1) + self._pairs.half(there).sum(axis=0)) / self._unit
 
 

@@ -1,0 +1,36 @@
+"""Work in blocks that fit the cache, on all cores: numpy and scipy let other threads run while they work on arrays."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+
+def blocks(count, size):
+    """Return the slices that divide a number of rows into blocks of one size."""
+    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+
+
+def on_all_cores(function, parts, report=lambda: None):
+    """Call a function with each of some parts, on all cores.
+
+    Parameters
+    ----------
+    function : callable
+        Writes to places of its own for each part, so that results do not depend on the number of cores.
+    parts : sequence
+    report : callable
+        Called before each part; may raise `Cancelled`, after which no further part is begun.
+
+    Returns
+    -------
+    list
+        What the function returned, in the order of the parts.
+    """
+    report()
+    if len(parts) < 2:
+        return [function(part) for part in parts]
+    results = []
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, len(parts))) as pool:
+        for result in pool.map(function, parts):
+            results.append(result)
+            report()
+    return results
