@@ -63,11 +63,8 @@ def constants():
                 or f", {name} = " in source
                 or f"\n{name}, " in source
             )
-            if (
-                name.lstrip("_").isupper()
-                and own
-                and not {name, f"{module.__name__.split('.')[-1]}.{name}"} & set(UNTUNED)
-            ):
+            tuned = not {name, f"{module.__name__.rpartition('.')[2]}.{name}"} & set(UNTUNED)
+            if name.lstrip("_").isupper() and own and tuned:
                 if isinstance(value, int | float):
                     yield module, name, None
                 elif isinstance(value, tuple) and all(isinstance(part, int | float) for part in value):
