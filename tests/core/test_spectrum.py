@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import fibonacci_sphere, icosahedral_sphere, marching_cubes_sphere, sphere_eigenvalues
+from benchmarks.samplings import (
+    fibonacci_sphere,
+    icosahedral_sphere,
+    marching_cubes_sphere,
+    random_sphere,
+    sphere_eigenvalues,
+)
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +58,33 @@ def test_the_lowest_are_found(laplacian):
 def test_ascending_from_the_constant(spectrum):
     assert np.all(np.diff(spectrum.eigenvalues) >= 0.0)
     assert spectrum.eigenvectors[:, 0].std() < 1e-9 * np.abs(spectrum.eigenvectors[:, 0]).mean()
+
+
+def two_spheres():
+    return np.concatenate([random_sphere(1500), 0.5 * random_sphere(700, 1) + [3.0, 0.0, 0.0]])
+
+
+def cube():
+    rng = np.random.default_rng(0)
+    points, face = rng.random((2500, 3)), rng.integers(0, 6, 2500)
+    points[np.arange(2500), face % 3] = face // 3
+    return points
+
+
+def bar():
+    return cube() * [1.0, 0.15, 0.15]
+
+
+@pytest.mark.parametrize(
+    ("points", "components"), [(random_sphere(2000), 1), (two_spheres(), 2), (cube(), 1), (bar(), 1)]
+)
+def test_no_mode_but_the_constant_of_each_component_is_zero_and_none_lives_on_few_points(points, components):
+    laplacian = core.build_laplacian(points)
+    spectrum = laplacian.eigenpairs(20, raw=True)
+    assert laplacian.component.max() + 1 == components
+    assert np.count_nonzero(spectrum.eigenvalues < 1e-6 * spectrum.eigenvalues[-1]) == components
+    participation = 1.0 / (laplacian.areas @ spectrum.eigenvectors**4) / laplacian.areas.sum()
+    assert participation.min() > 0.01
 
 
 def test_signs_are_deterministic(laplacian, spectrum):
