@@ -77,7 +77,7 @@ class TestCopiesOfBoundObjects:
         copy.location.y += 3.0
         lift(empty_of(bound), 0.5)
         assert_allclose(displacement(copy), before, atol=1e-6)
-        assert displacement(bound)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
+        assert displacement(bound)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
         reason = module("operators.deform.binding").stale_reason
         assert reason(bound) == ""
         assert 'has no handles of its own, "Cloud" has them' in reason(copy)
@@ -93,14 +93,14 @@ class TestCopiesOfBoundObjects:
         assert empty_of(bound).parent == bound
         assert_allclose(displacement(copy), before, atol=1e-4)
         lift(empty_of(copy), 0.5)
-        assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
+        assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
         assert_allclose(displacement(bound), before, atol=1e-4)
 
     def test_a_copy_together_with_its_handle_works_on_its_own(self, bound, module):
         before = displacement(bound)
         copy = duplicate(bound, empty_of(bound))
         lift(empty_of(copy), 0.5)
-        assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
+        assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
         assert_allclose(displacement(bound), before)
         assert [module("operators.deform.binding").stale_reason(obj) for obj in (bound, copy)] == ["", ""]
 
@@ -116,7 +116,7 @@ class TestCopiesOfBoundObjects:
         else:
             assert "lb_displacement" not in copy.data.attributes
         lift(empty_of(bound), 0.5)
-        assert displacement(bound)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
+        assert displacement(bound)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
 
     def test_the_last_of_the_copies_removes_the_handle(self, bound):
         copy = duplicate(bound)
@@ -130,7 +130,7 @@ class TestCopiesOfBoundObjects:
     def test_a_linked_copy_shows_what_the_original_shows(self, bound, module):
         copy = duplicate(bound, linked=True)
         lift(empty_of(bound), 0.5)
-        assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
+        assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
         reason = module("operators.deform.binding").stale_reason
         assert reason(bound) == ""
         assert 'shares its mesh with "Cloud", whose handles move both' in reason(copy)
@@ -148,7 +148,7 @@ class TestCopiesOfBoundObjects:
         appended = bpy.data.objects["Cloud"]
         assert module("operators.deform.binding").stale_reason(appended) == ""
         lift(empty_of(appended), 0.5)
-        assert displacement(appended)[:, 2].max() == pytest.approx(1.5, abs=1e-4)
+        assert displacement(appended)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
 
     def test_linked_from_another_file_it_is_shown_and_refused(self, bound, tmp_path):
         path = str(tmp_path / "bound.blend")

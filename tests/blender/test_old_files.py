@@ -145,7 +145,7 @@ def test_bindings_follow(stale_reason):
     get("Bound Handle").location.z += 0.2
     bpy.context.view_layer.update()
     # The binding is made anew, with today's operator.
-    assert evaluated(bound) == pytest.approx((1504.51002, 3550.70228, 0.0, 0.988941789), rel=3e-3, abs=1e-3)
+    assert evaluated(bound) == pytest.approx((1504.51002, 3550.70228, 0.0, 0.988941789), rel=5e-3, abs=1e-3)
     softly.meshfree.boundary = "AUTO"
     assert stale_reason(softly) == "Settings changed. Bind again"
 
