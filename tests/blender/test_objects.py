@@ -160,7 +160,7 @@ class TestCopiesOfBoundObjects:
             bpy.ops.meshfree.deform_bind()
         evaluated = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
         heights = np.array([vertex.co.z for vertex in evaluated.data.vertices])
-        assert heights.max() == pytest.approx(1.0, abs=1e-4)
+        assert heights.max() == pytest.approx(1.0, abs=5e-3)
 
 
 class TestGroupColors:
