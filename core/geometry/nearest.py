@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from .quadrics import fit_quadrics
 
 COUNT = 41  # the point itself and 40 others
-ROUNDS = 12  # of averaging over neighbours, after which what is left is of the place and not of single points
+ROUNDS = 9  # of averaging over neighbours, after which what is left is of the place and not of single points
 ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
 
