@@ -9,7 +9,7 @@ def blocks(count, size):
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def on_all_cores(function, parts, report=lambda: None):
+def on_all_cores(function, parts, report=lambda: None, most=None):
     """Call a function with each of some parts, on all cores.
 
     Parameters
@@ -19,6 +19,8 @@ def on_all_cores(function, parts, report=lambda: None):
     parts : sequence
     report : callable
         Called before each part; may raise `Cancelled`, after which no further part is begun.
+    most : int, optional
+        How many parts are worked on at one time at most, where each takes much memory.
 
     Returns
     -------
@@ -29,7 +31,7 @@ def on_all_cores(function, parts, report=lambda: None):
     if len(parts) < 2:
         return [function(part) for part in parts]
     results = []
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, len(parts))) as pool:
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, most or len(parts))) as pool:
         for result in pool.map(function, parts):
             results.append(result)
             report()

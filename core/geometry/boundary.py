@@ -59,14 +59,11 @@ class Boundary:
 
     def with_nearest(self, distance, spacing):
         """Return the same with given distances to the nearest boundary, (m,), but for measured ones next to corners."""
-        nearer = np.argmin(self.distance, axis=1)[:, None]
-        measured = np.take_along_axis(self.distance, nearer, axis=1)[:, 0]
+        measured = self.distance[:, 0]
         # Around a corner that the surface fills, the nearest place is the corner, which mirrors nothing.
         low, high = (measured + side * ON * spacing for side in (-1.0, 1.0))
         same = np.isinf(self.distance[:, 1]) | ((low < distance) & (distance < high))
-        result = self.distance.copy()
-        np.put_along_axis(result, nearer, np.where(same, distance, measured)[:, None], axis=1)
-        return replace(self, distance=result)
+        return replace(self, distance=np.column_stack([np.where(same, distance, measured), self.distance[:, 1]]))
 
 
 def no_boundary(count):

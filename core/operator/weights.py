@@ -17,6 +17,7 @@ _RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the te
 _LARGEST = 1.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
 _SMALLEST = 1e-8  # share of what rounds change that an extrapolation goes by: less would be rounding
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
+_AT_ONCE = 4  # sums over all pairs, each of which holds two numbers of each pair
 _TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 
 
@@ -190,8 +191,7 @@ class _Moments:
         """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
         weights = self._weights * self.factor(terms)
         here, there = self._basis
-        sums = on_all_cores(lambda k: self._sum(weights * here[k], weights * there[k]), range(_TERMS), self._report)
-        return np.stack(sums, axis=1)
+        return np.stack(self._each(lambda k: self._sum(weights * here[k], weights * there[k]), range(_TERMS)), axis=1)
 
     def curvature(self):
         """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
@@ -203,8 +203,12 @@ class _Moments:
                 *(self._weights * basis[a] * basis[b] for basis in self._basis)
             )
 
-        on_all_cores(entry, [(a, b) for a in range(_TERMS) for b in range(a + 1)], self._report)
+        self._each(entry, [(a, b) for a in range(_TERMS) for b in range(a + 1)])
         return result
+
+    def _each(self, function, parts):
+        """Call a function that works on all pairs with each of some parts."""
+        return on_all_cores(function, parts, self._report, _AT_ONCE)
 
     def _sum(self, here, there):
         """Sum quantities of pairs, as their first and their second point see them, at both ends, in the unit."""
