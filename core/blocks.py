@@ -18,7 +18,7 @@ def on_all_cores(function, parts, report=lambda: None, most=None):
         Writes to places of its own for each part, so that results do not depend on the number of cores.
     parts : sequence
     report : callable
-        Called before each part; may raise `Cancelled`, after which no further part is begun.
+        Called before the first part and after each; may raise `Cancelled`, after which no further part is begun.
     most : int, optional
         How many parts are worked on at one time at most, where each takes much memory.
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..blocks import blocks, on_all_cores
 from ..kernel import SUPPORT
 from .components import label_connected
 from .distances import arc_squared
@@ -95,9 +96,9 @@ def find_boundary(nearest, oriented, gaps):
     """
     points = nearest.points
     result = np.zeros(len(points), dtype=bool)
-    rows = []
-    for start in range(0, len(points), _BLOCK):
-        block = np.arange(start, min(start + _BLOCK, len(points)))
+
+    def facing_a_gap(part):
+        block = np.arange(part.start, part.stop)
         offset = points[nearest.index[block]] - points[block, None]
         flat = offset @ frames(oriented[block])[:, :, 1:]
         known = nearest.weight[block, 1:] > 0.0
@@ -106,8 +107,9 @@ def find_boundary(nearest, oriented, gaps):
         gap = np.fmax.reduce(np.diff(around, axis=1), axis=1)
         # Neighbours left out sort last, as NaN: the gap over the end is counted from the last known angle.
         gap = np.fmax(gap, angle[:, 0] + 2.0 * np.pi - np.fmax.reduce(angle, axis=1))
-        rows.append(block[gap > _GAP])
-    rows = np.concatenate(rows)
+        return block[gap > _GAP]
+
+    rows = np.concatenate(on_all_cores(facing_a_gap, blocks(len(points), _BLOCK)))
     if not len(rows):
         return result
     rows = rows[~_bends_away(nearest, oriented, rows)]
@@ -175,8 +177,9 @@ def measure_boundary(nearest, normals, at_boundary):
     tree = cKDTree(nearest.points[rows])
     span, view = tree.query(nearest.points, k=min(_VIEWS, len(rows)), workers=-1)
     close = np.flatnonzero(span[:, 0] < reach)
-    for start in range(0, len(close), _BLOCK):
-        block = close[start : start + _BLOCK]
+
+    def measure(part):
+        block = close[part]
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
         # Near candidates tell best, but none whose course turns at a corner while there are others.
@@ -206,6 +209,8 @@ def measure_boundary(nearest, normals, at_boundary):
                 turned = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _STRAIGHT
                 eligible = turned & (apart < ON * spacing) & (near < reach[block, None])
                 eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > SMOOTH
+
+    on_all_cores(measure, blocks(len(close), _BLOCK))
     nearer = np.argsort(boundary.distance, axis=1, kind="stable")
     return Boundary(
         at_boundary,
@@ -331,8 +336,9 @@ def given_boundary(nearest, normals, distance):
     boundary.distance[:, 0] = distance
     known = np.isfinite(distance)
     rows = np.flatnonzero(known & known[nearest.index].all(axis=1))
-    for start in range(0, len(rows), _BLOCK):
-        block = rows[start : start + _BLOCK]
+
+    def measure(part):
+        block = rows[part]
         index = nearest.index[block]
         unit = nearest.distance[block, -1]
         offset = (nearest.points[index] - nearest.points[block, None]) / unit[:, None, None]
@@ -345,4 +351,6 @@ def given_boundary(nearest, normals, distance):
         level = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
         boundary.curvature[block, 0] = level / np.maximum(1.0 + level * distance[block], 0.5)
         boundary.outward[block, 0] = _tangents(-np.einsum("ick,ik->ic", tangents, fit[:, 1:3]), normals[block])
+
+    on_all_cores(measure, blocks(len(rows), _BLOCK))
     return replace(boundary, at_boundary=distance < 0.5 * nearest.spacing)

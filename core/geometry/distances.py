@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..blocks import blocks
 from .nearest import SMOOTH
 
 _BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
@@ -122,8 +123,7 @@ def pair_heights(points, first, second, normals):
     first, second : ndarray, (p,) int
         The ends of the pairs.
     """
-    for start in range(0, len(first), _BLOCK):
-        block = slice(start, start + _BLOCK)
+    for block in blocks(len(first), _BLOCK):
         i, j = first[block], second[block]
         left, right = normals[i], normals[j]
         chord = points[j] - points[i]
