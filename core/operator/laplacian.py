@@ -10,7 +10,7 @@ from ..geometry import arc_length, check_points, projected_distance, read_cloud
 from ..kernel import SECOND_MOMENT
 from ..options import LaplacianOptions
 from .areas import NO_AREA, solve_areas
-from .spectrum import Spectrum, correct_eigenvalues, solve_spectrum
+from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
 from .stiffness import assemble_stiffness
 
 _FAR, _MISSED = 0.1, 1.0  # residual of the moments, and misfit of quadrics in spacings, at which trust is a half
@@ -157,7 +157,7 @@ class LaplaceBeltrami:
             return result
         return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (widths**2 * result)) / areas
 
-    def eigenpairs(self, count, raw=False, *, dirichlet=False, progress=None):
+    def eigenpairs(self, count, raw=False, *, dirichlet=False, tolerance=TOLERANCE, progress=None):
         """Compute the lowest eigenpairs of the negated operator, eq. (12).
 
         Parameters
@@ -168,6 +168,9 @@ class LaplaceBeltrami:
             Leave out the symbol correction of the eigenvalues.
         dirichlet : bool
             Dirichlet modes, which vanish at the boundary, instead of Neumann modes, which meet it level.
+        tolerance : float
+            Largest residual, see `Spectrum`. Errors of eigenvectors go by it, over the relative gap to the next
+            eigenvalue; those of eigenvalues by its square.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -205,7 +208,7 @@ class LaplaceBeltrami:
         [0. 2. 2. 2. 6. 6. 6. 6. 6.]
         """
         stiffness = self.dirichlet[0] if dirichlet else self.stiffness
-        spectrum = solve_spectrum(self, stiffness, count, progress)
+        spectrum = solve_spectrum(self, stiffness, count, tolerance, progress)
         return spectrum if raw else self.corrected(spectrum)
 
     def corrected(self, spectrum):
@@ -229,7 +232,7 @@ class LaplaceBeltrami:
         if not self.options.symbol_correction:
             return spectrum
         values, vectors = spectrum.eigenvalues, spectrum.eigenvectors
-        return Spectrum(correct_eigenvalues(self, values, vectors), vectors)
+        return Spectrum(correct_eigenvalues(self, values, vectors), vectors, spectrum.residuals)
 
 
 def build_laplacian(

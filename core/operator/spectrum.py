@@ -3,14 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_symbol, symbol
+from .davidson import coarse_to_fine
+from .lanczos import lift_lowest
 
-_DEGREE = 6  # of the polynomial that the Lanczos steps work on, at least
+TOLERANCE = 2e-7  # leaves eigenvalues right to ten digits and more, for their errors go by its square
+
+_FEW = 0.01  # modes over points up to which coarse versions pay: of 6,000 to 50,000 random points
 _FLAT = 4.0  # the symbol hardly rises beyond
 
 
@@ -24,13 +27,17 @@ class Spectrum:
         Ascending, non-negative [1 / L^2].
     eigenvectors : ndarray, (n, count)
         Orthonormal for the areas: ``phi.T @ (areas * phi)`` is the identity. The entry of largest size is positive.
+    residuals : ndarray, (count,), or None
+        ``|A y - lambda y|`` of the raw pairs, y of length one, over the last eigenvalue, or over what Weyl's law makes
+        of it, ``4 pi count / area``, where that is more.
     """
 
     eigenvalues: np.ndarray
     eigenvectors: np.ndarray
+    residuals: np.ndarray | None = None
 
 
-def solve_spectrum(laplacian, stiffness, count, progress=None):
+def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=None):
     """Compute raw eigenpairs; see `LaplaceBeltrami.eigenpairs`."""
     areas = laplacian.areas
     n = len(areas)
@@ -38,21 +45,55 @@ def solve_spectrum(laplacian, stiffness, count, progress=None):
         raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
     if count > n // 3:
         raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
+    count, done = int(count), 0.0
+
+    def report(fraction=0.0):
+        nonlocal done
+        done = max(done, fraction)
+        if progress is not None:
+            progress("Spectrum", done)
+
+    report()
+    order, root, matrix = symmetric_form(laplacian, stiffness, report)
+    pairs = coarse_to_fine(matrix, 1.0 / root, count, tolerance, report) if count <= _FEW * len(order) else None
     try:
-        values, vectors = lowest_eigenpairs(
-            laplacian, stiffness, int(count), progress or (lambda stage, fraction: None)
-        )
+        values, vectors = pairs or lift_lowest(matrix, count, _cut(laplacian, count), report)
     except ArpackNoConvergence as error:
         raise SolverError(
             f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
         ) from error
-    largest = np.argmax(np.abs(vectors), axis=0)
-    vectors *= np.sign(vectors[largest, np.arange(count)])
-    return Spectrum(values, vectors)
+    report()
+    scale = max(values[-1], 4.0 * np.pi * count / laplacian.areas.sum())
+    residuals = np.linalg.norm(matrix @ vectors - vectors * values, axis=0) / scale
+    if not residuals.max() <= tolerance:
+        raise SolverError(
+            f"The eigenvalue solver found {np.sum(residuals <= tolerance)} of {count} modes on {n} points to a residual"
+            f" of {tolerance:g}. Ask for fewer modes, or raise the tolerance."
+        )
+    result = np.zeros((n, count))
+    result[order] = root[:, None] * vectors
+    largest = np.argmax(np.abs(result), axis=0)
+    result *= np.sign(result[largest, np.arange(count)])
+    return Spectrum(np.maximum(values, 0.0), result, residuals)
 
 
-def symmetric_form(laplacian, stiffness):
+def _cut(laplacian, count):
+    """Return what the wide kernel makes of twice Weyl's estimate 4 pi count / area of the highest eigenvalue wanted."""
+    squared = np.mean(laplacian.smoothing_lengths**2)
+    frequency = 8.0 * np.pi * count / laplacian.areas.sum() * squared
+    return symbol(np.sqrt(min(frequency, _FLAT**2))) / squared
+
+
+def symmetric_form(laplacian, stiffness, report=lambda: None):
     """Return a matrix with the eigenvalues of the negated operator whose eigenvectors are orthonormal.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+    stiffness : csr_array, (n, n)
+        Its own, or that of Dirichlet's problem.
+    report : callable
+        Called without arguments between the steps; may raise `Cancelled`.
 
     Returns
     -------
@@ -66,92 +107,13 @@ def symmetric_form(laplacian, stiffness):
     known = np.flatnonzero(laplacian.component >= 0)
     order = known[cKDTree(laplacian.points[known]).indices]
     root = 1.0 / np.sqrt(laplacian.areas[order])
-    scale = sparse.diags_array(root, format="csr")
-    return order, root, (scale @ stiffness[order][:, order] @ scale).tocsr()
-
-
-def lowest_eigenpairs(laplacian, stiffness, count, progress):
-    """Solve ``K phi = lambda areas phi`` for the lowest pairs by Lanczos steps on a Chebyshev polynomial.
-
-    The polynomial lifts the eigenvalues below a cut, about twice Weyl's estimate 4 pi count / area of the highest one
-    wanted, and keeps all others within [-1, 1]. Lanczos then needs a sixth of the steps for about the same products,
-    and the work between products, which would be half of the time, shrinks as much. Where a wanted eigenvalue turns out
-    to lie above the cut, the cut is raised.
-
-    Returns
-    -------
-    values : ndarray, (count,)
-        Ascending, not negative.
-    vectors : ndarray, (n, count)
-        Orthonormal for the areas.
-    """
-    progress("Spectrum", 0.0)
-    order, root, matrix = symmetric_form(laplacian, stiffness)
-    n = len(order)
-    random = np.random.default_rng(0)
-    products = 0
-
-    def multiply(y):
-        nonlocal products
-        if products % 20 == 0:
-            progress("Spectrum", products / (products + 30.0 * count))  # the number of products is not known before
-        products += 1
-        return matrix @ y.ravel()
-
-    def solve(function, maxiter=500, **settings):
-        operator = LinearOperator((n, n), matvec=function, dtype=np.float64)
-        return eigsh(operator, which="LA", v0=random.standard_normal(n), maxiter=maxiter, **settings)
-
-    top = 1.02 * solve(multiply, k=1, tol=1e-2, return_eigenvectors=False)[0]
-    # What the wide kernel makes of twice Weyl's estimate, where many modes are asked for.
-    squared = np.mean(laplacian.smoothing_lengths**2)
-    frequency = 8.0 * np.pi * count / laplacian.areas.sum() * squared
-    cut = symbol(np.sqrt(min(frequency, _FLAT**2))) / squared
-    while True:
-        if cut < 0.7 * top:
-            degree = max(_DEGREE, round(np.sqrt(top / cut)))
-            center, radius = 0.5 * (top + cut), 0.5 * (top - cut)
-        else:  # too few points for a polynomial: a shift to [1, 2], right wherever the cut lies
-            degree, center, radius = 1, 2.0 * top, top
-
-        def polynomial(y, degree=degree, center=center, radius=radius):
-            before, now = y.ravel(), (center * y.ravel() - multiply(y)) / radius
-            for _ in range(degree - 1):
-                before, now = now, (2.0 / radius) * (center * now - multiply(now)) - before
-            return now
-
-        try:
-            ncv, restarts = min(n, max(2 * count + 1, 40)), 20 if degree > 1 else 500
-            lifted, vectors = solve(polynomial, k=count, ncv=ncv, tol=1e-13, maxiter=restarts)
-            if degree == 1 or lifted.min() > 1.0:
-                break
-        except ArpackNoConvergence:
-            if degree == 1:
-                raise
-        cut *= 4.0
-
-    # Of an eigenvalue that a symmetric cloud has several times, Lanczos steps from one start may miss copies: look for
-    # any above the least one found, orthogonal to all found.
-    while True:
-
-        def remainder(y, found=vectors):
-            return project(found, polynomial(project(found, y.ravel())))
-
-        if solve(remainder, k=1, tol=1e-3, return_eigenvectors=False)[0] <= lifted.min() * (1.0 + 1e-6):
-            break
-        missed, vector = solve(remainder, k=1, tol=1e-13)
-        best = np.argsort(-np.append(lifted, missed))[:count]
-        lifted, vectors = np.append(lifted, missed)[best], np.column_stack([vectors, vector])[:, best]
-    values = np.einsum("ij,ij->j", vectors, matrix @ vectors)
-    ascending = np.argsort(values)
-    result = np.zeros((len(laplacian.points), count))
-    result[order] = root[:, None] * vectors[:, ascending]
-    return np.maximum(values[ascending], 0.0), result
-
-
-def project(vectors, y):
-    """Take the orthonormal vectors out of y."""
-    return y - vectors @ (vectors.T @ y)
+    report()
+    matrix = stiffness[order]
+    report()
+    matrix = matrix[:, order]
+    report()
+    matrix.data *= np.repeat(root, np.diff(matrix.indptr)) * root[matrix.indices]
+    return order, root, matrix
 
 
 def correct_eigenvalues(laplacian, values, vectors):

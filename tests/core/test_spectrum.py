@@ -3,6 +3,7 @@ import pytest
 
 import core
 from benchmarks.samplings import (
+    disc_random,
     fibonacci_sphere,
     icosahedral_sphere,
     marching_cubes_sphere,
@@ -170,3 +171,89 @@ def test_a_small_dense_part_beside_a_large_one():
     eigenvalues = laplacian.eigenpairs(21).eigenvalues
     exact = np.append(0.0, sphere_eigenvalues(20))  # those of the small one lie far above
     np.testing.assert_allclose(eigenvalues[:17], exact[:17], rtol=2e-2, atol=1e-8)
+
+
+def all_eigenvalues(laplacian, dirichlet=False):
+    root = 1.0 / np.sqrt(laplacian.areas)
+    stiffness = laplacian.dirichlet[0] if dirichlet else laplacian.stiffness
+    return np.linalg.eigvalsh(root[:, None] * stiffness.toarray() * root)
+
+
+def islands(count):
+    """Eight spheres at the corners of a cube."""
+    corners = 3.0 * np.stack(np.meshgrid([0, 1], [0, 1], [0, 1]), axis=-1).reshape(-1, 1, 3)
+    return (fibonacci_sphere(count) + corners).reshape(-1, 3)
+
+
+def torus_grid():
+    """A torus with 60 by 24 points in rows, all of whose eigenvalues but a few come twice or more often."""
+    u, v = np.meshgrid(2.0 * np.pi * np.arange(60) / 60, 2.0 * np.pi * np.arange(24) / 24)
+    ring = 1.0 + 0.4 * np.cos(v)
+    return np.stack([ring * np.cos(u), ring * np.sin(u), 0.4 * np.sin(v)], axis=-1).reshape(-1, 3)
+
+
+CLOUDS = {
+    "islands": lambda: islands(250),
+    "twins": lambda: np.concatenate([fibonacci_sphere(900), fibonacci_sphere(900) + [3.0, 0.0, 0.0]]),
+    "torus grid": torus_grid,
+    "cubic": lambda: marching_cubes_sphere(22),
+    "random": lambda: random_sphere(1800),
+    "disc": lambda: disc_random(1500)[0],
+}
+
+
+@pytest.fixture(scope="module", params=CLOUDS)
+def cloud(request):
+    """Operator, whether to hold its boundary, and all of its eigenvalues."""
+    laplacian, dirichlet = core.build_laplacian(CLOUDS[request.param]()), request.param == "disc"
+    return laplacian, dirichlet, all_eigenvalues(laplacian, dirichlet)
+
+
+@pytest.mark.parametrize("coarse", [True, False])
+@pytest.mark.parametrize("count", [1, 3, 8, 10, 33, 40, 72, 120])
+def test_no_copy_is_lost(cloud, count, coarse, monkeypatch):
+    monkeypatch.setattr("core.operator.spectrum._FEW", float(coarse))
+    laplacian, dirichlet, exact = cloud
+    assert len(exact) > 1000  # so that there are coarse versions
+    spectrum = laplacian.eigenpairs(count, raw=True, dirichlet=dirichlet)
+    np.testing.assert_allclose(spectrum.eigenvalues, exact[:count], rtol=1e-8, atol=1e-9)
+    assert spectrum.residuals.shape == (count,)
+    assert spectrum.residuals.max() < 2e-7
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-10])
+def test_residuals_fall_to_the_tolerance(laplacian, tolerance):
+    spectrum = laplacian.eigenpairs(20, raw=True, tolerance=tolerance)
+    vectors, values = spectrum.eigenvectors, spectrum.eigenvalues
+    misfit = laplacian.apply(vectors, raw=True) + values * vectors
+    lengths = np.sqrt(laplacian.areas @ misfit**2) / max(values[-1], 80.0 * np.pi / laplacian.areas.sum())
+    assert lengths.max() <= 1.01 * tolerance
+    np.testing.assert_allclose(spectrum.residuals, lengths, rtol=1e-2, atol=1e-12)
+    assert laplacian.corrected(spectrum).residuals is spectrum.residuals
+
+
+def test_the_solver_says_where_it_ends(laplacian):
+    with pytest.raises(core.SolverError, match="of 20 modes on 2000 points"):
+        laplacian.eigenpairs(20, tolerance=1e-17)
+
+
+def test_the_number_of_cores_does_not_matter(laplacian, spectrum, monkeypatch):
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    np.testing.assert_array_equal(laplacian.eigenpairs(20).eigenvectors, spectrum.eigenvectors)
+
+
+def test_it_can_be_cancelled_at_any_report(laplacian):
+    calls = []
+    laplacian.eigenpairs(5, progress=lambda stage, fraction: calls.append(fraction))
+    assert calls == sorted(calls)
+    assert len(calls) > 50
+
+    for last in (0, 10, len(calls) // 2, len(calls) - 1):
+        left = iter(range(last))
+
+        def stop(stage, fraction, left=left):
+            if next(left, None) is None:
+                raise core.Cancelled
+
+        with pytest.raises(core.Cancelled):
+            laplacian.eigenpairs(5, progress=stop)

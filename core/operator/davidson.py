@@ -1,0 +1,176 @@
+"""Few eigenpairs of many unknowns: on coarse versions of the matrix first, then by Davidson's method in a block."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from scipy.linalg import eigh
+
+from .hierarchy import Level, build_levels, solve_roughly
+
+_SMALL = 1000  # unknowns that are solved whole in a tenth of a second
+_DENSE = 4000  # in ten seconds; where the coarsest version has more, this is not the way
+_BEYOND = 0.1  # how far beyond the last eigenvalue wanted, as a share of it, the block of vectors reaches
+_GUARDS = 4  # vectors that it has more, at least
+_WIDE = 32  # multiplicity up to which it holds all copies of the last eigenvalue, however few are wanted
+_RANDOM = 4  # vectors that start from random numbers, and turn into those that the coarse versions do not see
+_GUARDED = 0.1  # residual to which they are brought, so that nothing is left below those asked for
+_COARSE = 1e-2  # residual on coarse versions: finer, it would not help the next one
+_CYCLES = 2  # cycles of the approximate inverse in a step
+_STEPS, _COARSE_STEPS = 24, 8  # at most; five to ten are usual on the points, three on coarse versions
+_PATIENCE = 12  # steps after which the block of vectors is widened
+
+
+def coarse_to_fine(matrix, slowest, count, tolerance, report):
+    """Return the lowest eigenpairs, or none where coarse versions do not help.
+
+    Parameters
+    ----------
+    matrix : csr_array, (n, n)
+        Symmetric positive semi-definite.
+    slowest : ndarray, (n,)
+        A positive vector that the matrix hardly changes.
+    count : int
+    tolerance : float
+        Largest residual, over the last eigenvalue wanted.
+    report : callable
+        Called with the fraction done; may raise `Cancelled`.
+
+    Returns
+    -------
+    values, vectors : ndarray, (count,) and (n, count), or None
+        Ascending, orthonormal.
+    """
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        least = max(_SMALL, 5 * count)
+        levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report)
+        if not levels or last.shape[0] > max(least, _DENSE):
+            return None
+        values, vectors = eigh(last.toarray(), mass.toarray())
+        levels.append(Level(values=values, vectors=vectors.astype(np.float32)))
+        flat = np.searchsorted(values, 1e-9 * values[-1])  # as many as components
+        beyond = np.searchsorted(values, (1.0 + _BEYOND) * values[min(count, len(values)) - 1])
+        size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
+        for number in reversed(range(len(levels) - 1)):
+            level, finest = levels[number], number == 0
+            start = level.prolongation @ np.ascontiguousarray(vectors[:, : size if finest else 2 * size])
+            start = np.column_stack([start, _random(len(start), max(_RANDOM, count + _RANDOM - start.shape[1]))])
+            goal = (count, tolerance, _STEPS) if finest else (size, _COARSE, _COARSE_STEPS)
+            values, vectors, right = refine(levels[number:], start, size, *goal, report, finest)
+            if not finest:
+                level.values, level.vectors = values, vectors.astype(np.float32)
+                level.duals = _weighed(level.mass, vectors).astype(np.float32)
+    return (values[:count], vectors[:, :count]) if right else None
+
+
+def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
+    """Improve approximate eigenvectors by Davidson's method in a block.
+
+    Parameters
+    ----------
+    levels : list of Level
+        The eigenvectors of the first are sought.
+    vectors : ndarray, (n, m)
+        Approximate ones, and random ones, which turn into those that are missing.
+    size : int
+        How many the coarse versions gave.
+    wanted : int
+        How many residuals shall fall to the tolerance; of the others, the farther the less, to `_GUARDED`.
+    tolerance : float
+    limit : int
+        Most steps.
+    report : callable
+        Called with the fraction done; may raise `Cancelled`.
+    final : bool
+        The fractions count.
+
+    Returns
+    -------
+    values, vectors : ndarray, (m,) and (n, m)
+        The best after these steps.
+    right : bool
+        The residuals fell as far.
+    """
+    level, count, worst = levels[0], vectors.shape[1], None
+    rough_mass = None if level.mass is None else level.mass.astype(np.float32)
+    drift = np.inf  # of the images: they are products in double precision where it is 0, and sums from step to step
+    for step in range(limit + 1):
+        if final and step % _PATIENCE == _PATIENCE - 1:  # the block may end among copies of one eigenvalue: widen it
+            vectors = np.column_stack([vectors, _random(len(vectors), _RANDOM + count // 8, step)])
+            drift, count = np.inf, vectors.shape[1]
+        if drift > 0.1 * tolerance:
+            drift, image = 0.0, level.matrix @ vectors
+            values, turn = eigh(vectors.T @ image, vectors.T @ _weighed(level.mass, vectors))
+            vectors, image = vectors @ turn, image @ turn
+        report()
+        dual = _weighed(level.mass, vectors)
+        residual = image - dual * values
+        norms = _lengths(residual)
+        residuals = norms / _scale(values, wanted)
+        # Unless vectors close to the wanted ones are about as exact, these stall, or stand where lower ones belong.
+        beyond = np.clip((values - values[wanted - 1]) / (0.5 * _BEYOND * _scale(values, wanted)), 0.0, 1.0)
+        goals = tolerance * (max(_GUARDED, tolerance) / tolerance) ** beyond
+        goals[:wanted] = tolerance
+        excess = np.max(residuals / goals)
+        if final:
+            worst = worst or 10.0 * excess
+            report(1.0 - max(np.log(10.0 * excess), 0.1) / np.log(10.0 * worst) if 1.0 < excess < worst else 0.0)
+        if drift == 0.0 and (excess <= 1.0 or step == limit):
+            return values, vectors, excess <= 1.0
+        if excess <= 1.0 or step == limit - 1:
+            drift = np.inf  # look again
+            continue
+        # The rest is in single precision: corrections of a few digits suffice.
+        found = vectors.astype(np.float32)
+        dual = found if level.mass is None else dual.astype(np.float32)
+        active = np.flatnonzero(residuals > 0.5 * goals)
+        residual = (residual / norms).astype(np.float32)
+        load, shifts = residual[:, active], values[active].astype(np.float32)
+        relative = shifts / np.float32(values[size - 1])
+        change = solve_roughly(levels, load, relative, size)
+        for _ in range(_CYCLES - 1):
+            change -= found @ (dual.T @ change)
+            rest = level.rough @ change
+            np.subtract(load, rest, out=rest)
+            rest += _weighed(rough_mass, change) * shifts
+            change += solve_roughly(levels, rest, relative, size)
+        change -= found @ (dual.T @ change)
+        change /= _lengths(change)
+        report()
+        # The best combinations of both, in an orthonormal basis of the changes.
+        lengths, basis = np.linalg.eigh((change.T @ _weighed(rough_mass, change)).astype(np.float64))
+        kept = lengths > 1e-5 * lengths[-1]  # the others drown in rounding
+        basis = basis[:, kept] / np.sqrt(lengths[kept])
+        coupling = norms[:, None] * (residual.T @ change) @ basis
+        report()
+        changed = level.rough @ change
+        own = basis.T @ (change.T @ changed) @ basis
+        values, parts = np.linalg.eigh(np.block([[np.diag(values), coupling], [coupling.T, own]]))
+        values, parts = values[:count], parts[:, :count]
+        share = (basis @ parts[count:]).astype(np.float32)
+        report()
+        vectors, image = vectors @ parts[:count], image @ parts[:count]
+        vectors += change @ share
+        image += changed @ share
+        lost = np.linalg.norm(share[:, :wanted], axis=0).max()
+        drift += np.finfo(np.float32).eps * level.top * lost / _scale(values, wanted)
+
+
+def _lengths(vectors):
+    """Return the lengths of the columns, never zero."""
+    return np.sqrt(np.maximum(np.einsum("ij,ij->j", vectors, vectors), np.finfo(np.float32).tiny))
+
+
+def _weighed(mass, vectors):
+    """Return the product with the mass; none stands for the identity."""
+    return vectors if mass is None else mass @ vectors
+
+
+def _scale(values, wanted):
+    """Return the eigenvalue that residuals are measured by: the last one wanted, or where all are zero, the last."""
+    return values[wanted - 1] if values[wanted - 1] > 1e-9 * values[-1] else max(values[-1], np.finfo(float).tiny)
+
+
+def _random(count, columns, seed=0):
+    """Return random columns, about orthonormal."""
+    return np.random.default_rng(seed).standard_normal((count, columns)) / np.sqrt(count)

@@ -1,0 +1,224 @@
+"""Coarse versions of a symmetric matrix, and the approximate inverse that they make together."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy import sparse
+
+_PART = 1 << 20  # entries of a matrix that are multiplied in one go: some hundredths of a second
+_STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
+# first about 20 become one, with the others fewer
+_SMOOTHED = 0.3  # smoothing takes out the errors whose eigenvalues are at least this share of the largest
+
+
+class Rows:
+    """A sparse matrix whose products are taken by parts of its rows, on all cores.
+
+    Parameters
+    ----------
+    matrix : csr_array, (n, m)
+        Not copied.
+    pool : ThreadPoolExecutor
+    report : callable
+        Called without arguments after each part; may raise `Cancelled`.
+    """
+
+    def __init__(self, matrix, pool, report):
+        self._map, self._report, self._count = pool.map, report, matrix.shape[0]
+        starts = np.append(np.arange(0, max(matrix.nnz, 1), _PART), matrix.nnz)
+        cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
+        self._slices = [slice(first, last) for first, last in pairwise(cuts)]
+        self._parts = []
+        for rows in self._slices:
+            pointers = matrix.indptr[rows.start : rows.stop + 1]
+            entries = slice(pointers[0], pointers[-1])
+            part = (matrix.data[entries], matrix.indices[entries], pointers - pointers[0])
+            self._parts.append(sparse.csr_array(part, shape=(len(pointers) - 1, matrix.shape[1])))
+
+    def __matmul__(self, other):
+        """Multiply with an array, (m, k), or a sparse one."""
+        if sparse.issparse(other):
+            return sparse.vstack(list(self._each(lambda rows, part: part @ other)), format="csr")
+        result = np.empty((self._count, other.shape[1]), dtype=other.dtype)
+
+        def fill(rows, part):
+            result[rows] = part @ other
+
+        list(self._each(fill))
+        return result
+
+    def _each(self, function):
+        for result in self._map(function, self._slices, self._parts):
+            self._report()
+            yield result
+
+
+@dataclass
+class Level:
+    """One version of the matrix.
+
+    Attributes
+    ----------
+    matrix, rough : Rows, (n, n)
+        In double and in single precision.
+    mass : csr_array, (n, n), or None
+        Inner product of its functions; none stands for the identity.
+    top : float
+        Largest eigenvalue, about.
+    steps : list of ndarray, (n, 1) float32
+        Lengths of the steps of smoothing: those of Chebyshev's polynomial over the diagonal.
+    prolongation, extension, restriction : Rows, (n, m), (n, m) and (m, n)
+        What the functions of the next level are on this one, in double and single precision, and the transpose.
+    values, vectors, duals : ndarray, (q,), (n, q) and (n, q) float32, or None
+        Lowest eigenpairs, where they are known, and ``mass @ vectors``.
+    """
+
+    matrix: Rows | None = None
+    rough: Rows | None = None
+    mass: sparse.csr_array | None = None
+    top: float = np.inf
+    steps: list | None = None
+    prolongation: Rows | None = None
+    extension: Rows | None = None
+    restriction: Rows | None = None
+    values: np.ndarray | None = None
+    vectors: np.ndarray | None = None
+    duals: np.ndarray | None = None
+
+
+def build_levels(matrix, slowest, least, enough, pool, report):
+    """Build ever smaller versions of a matrix by smoothed aggregation (Vanek, Mandel and Brezina 1996).
+
+    Parameters
+    ----------
+    matrix : csr_array, (n, n)
+        Symmetric positive semi-definite.
+    slowest : ndarray, (n,)
+        A positive vector that the matrix hardly changes.
+    least : int
+        Size at which to stop.
+    enough : int
+        Size that no version should fall below.
+    pool, report
+        As of `Rows`.
+
+    Returns
+    -------
+    levels : list of Level
+        The given matrix first.
+    matrix, mass : csr_array
+        The last version, which needs no approximate inverse.
+    """
+    levels, mass = [], None
+    while matrix.shape[0] > least:
+        n, diagonal = matrix.shape[0], matrix.diagonal()
+        for share in _STRONG:
+            part = aggregates(matrix, diagonal, share, report)
+            if part.max() >= enough:
+                break
+        norm = np.sqrt(np.bincount(part, slowest**2))
+        if 2 * len(norm) > n:
+            break
+        rows, top = Rows(matrix, pool, report), largest_eigenvalue(matrix, diagonal, report)
+        plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1)), shape=(n, len(norm)))
+        prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ (rows @ plain)).tocsr()
+        restriction = prolongation.T.tocsr()
+        back = Rows(restriction, pool, report)
+        middle, half = 0.5 * top * (1.0 + _SMOOTHED), 0.5 * top * (1.0 - _SMOOTHED) * np.sqrt(0.5)
+        levels.append(
+            Level(
+                matrix=rows,
+                rough=Rows(matrix.astype(np.float32), pool, report),
+                mass=mass,
+                top=top * diagonal.max(),
+                steps=[(1.0 / (w * diagonal))[:, None].astype(np.float32) for w in (middle - half, middle + half)],
+                prolongation=Rows(prolongation, pool, report),
+                extension=Rows(prolongation.astype(np.float32), pool, report),
+                restriction=Rows(restriction.astype(np.float32), pool, report),
+            )
+        )
+        matrix = back @ (rows @ prolongation)
+        mass = back @ (prolongation if mass is None else mass @ prolongation)
+        slowest = norm
+    return levels, matrix, mass
+
+
+def aggregates(matrix, diagonal, share, report=lambda: None):
+    """Part the unknowns into the neighbourhoods of roots, no two of which are strongly coupled.
+
+    Returns
+    -------
+    ndarray, (n,) int
+        Number of each unknown's part.
+    """
+    n = len(diagonal)
+    row = np.repeat(np.arange(n, dtype=np.int32), np.diff(matrix.indptr))
+    report()
+    weight = -matrix.data
+    weight[row == matrix.indices] = np.inf
+    report()
+    kept = weight > share * np.minimum(diagonal[row], diagonal[matrix.indices])
+    report()
+    row, column, weight = row[kept], matrix.indices[kept], weight[kept]
+    first = np.searchsorted(row, np.arange(n, dtype=np.int32))
+    rank = np.random.default_rng(0).permutation(n).astype(np.int32)
+    waiting, root = rank.copy(), np.zeros(n, dtype=bool)
+    while waiting.max() >= 0:  # roots are those that come first in a random order, again among the rest (Luby 1986)
+        report()
+        new = (waiting >= 0) & (waiting == np.maximum.reduceat(waiting[column], first))
+        root |= new
+        waiting[np.maximum.reduceat(new[column], first)] = -1
+    weight = np.where(root[column], weight, 0.0)
+    best = np.flatnonzero(weight == np.maximum.reduceat(weight, first)[row])
+    chosen = np.empty(n, dtype=np.int32)
+    chosen[row[best]] = column[best]
+    return (np.cumsum(root) - 1)[chosen]
+
+
+def largest_eigenvalue(matrix, diagonal, report=lambda: None):
+    """Estimate the largest eigenvalue of the matrix over its diagonal, rather too large than too small."""
+    y = np.random.default_rng(0).standard_normal(len(diagonal))
+    for _ in range(10):  # leaves less than a tenth
+        report()
+        y /= np.linalg.norm(y)
+        y, before = (matrix @ y[:, None])[:, 0] / diagonal, y
+    return 1.1 * np.linalg.norm(y) / np.linalg.norm(before)
+
+
+def solve_roughly(levels, load, shifts, wanted):
+    """Apply an approximate inverse of ``matrix - shift * mass`` by one V-cycle in single precision.
+
+    Parameters
+    ----------
+    levels : list of Level
+        From the one that the load is on. The last has nothing but its eigenpairs.
+    load : ndarray, (n, k) float32
+    shifts : ndarray, (k,) float32
+        One for each column. Only the part of known eigenvectors heeds it: it is small for all others.
+    wanted : int
+        The lowest so many eigenvectors are found otherwise: the shift may lie among them, and is left out there.
+
+    Returns
+    -------
+    ndarray, (n, k) float32
+    """
+    level, known = levels[0], 0.0
+    if level.values is not None:
+        values = level.values[:, None]
+        floor = values[min(wanted, len(values) - 1)]
+        shift = shifts * values[wanted - 1]
+        distance = np.where(np.arange(len(values))[:, None] < wanted, np.maximum(values, floor), values - shift)
+        share = level.vectors.T @ load
+        known = level.vectors @ (share / np.maximum(distance, 0.1 * floor)).astype(np.float32)
+        if len(levels) == 1:
+            return known
+        load = load - level.duals @ share
+    result = level.extension @ solve_roughly(levels[1:], level.restriction @ load, shifts, wanted)
+    for step in level.steps:
+        change = level.rough @ result
+        np.subtract(load, change, out=change)
+        change *= step
+        result += change
+    result += known
+    return result
