@@ -58,6 +58,35 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     Stiffness
     """
     pairs = cloud.pairs
+    plain, mirrored, fourth = _kernel_weights(cloud, distance, areas)
+    residual, widths = np.zeros(len(areas)), pairs.lengths
+    if balanced:
+        balance = balance_weights(cloud, distance, plain[0] + mirrored[0], areas, report)
+        for part in (plain, mirrored, fourth):
+            part[0][:] *= balance.factor
+        residual, widths = balance.residual, _widths(pairs, plain[0] + mirrored[0], *fourth, areas)
+    weights = _for_callers_points(cloud, plain[0] + mirrored[0], plain[1] + mirrored[1])
+    stiffness = (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
+    known = mirrored[0] > 0.0
+    cloud = replace(cloud, pairs=pairs.keep(known))
+    images = _for_callers_points(cloud, mirrored[0][known], mirrored[1])
+    images.eliminate_zeros()
+    return Stiffness(stiffness, images, residual, widths)
+
+
+def _kernel_weights(cloud, distance, areas):
+    """Return what the kernel makes of pairs, (p,), and of points with themselves, (m,), as two arrays each.
+
+    Returns
+    -------
+    plain : tuple of ndarray
+        The weights of pairs, and of points with themselves.
+    mirrored : tuple of ndarray
+        The weights of images in one boundary.
+    fourth : tuple of ndarray
+        The fourth moments of both.
+    """
+    pairs = cloud.pairs
     factor = weight_factor(pairs.lengths, cloud.gaussian_curvature)
     lengths = pairs.mean(pairs.lengths)
     scale = pairs.mean(factor) / lengths**4 * areas[pairs.first] * areas[pairs.second]
@@ -74,19 +103,7 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
             weight = pair_kernel(image / h[rows]) * units[rows]
             whose[part][rows] += weight
             fourth[part][rows] += weight * image**4
-    residual, widths = np.zeros(len(areas)), pairs.lengths
-    if balanced:
-        balance = balance_weights(cloud, distance, plain[0] + mirrored[0], areas, report)
-        for part in (plain, mirrored, fourth):
-            part[0][:] *= balance.factor
-        residual, widths = balance.residual, _widths(pairs, plain[0] + mirrored[0], *fourth, areas)
-    weights = _for_callers_points(cloud, plain[0] + mirrored[0], plain[1] + mirrored[1])
-    stiffness = (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
-    known = mirrored[0] > 0.0
-    cloud = replace(cloud, pairs=pairs.keep(known))
-    images = _for_callers_points(cloud, mirrored[0][known], mirrored[1])
-    images.eliminate_zeros()
-    return Stiffness(stiffness, images, residual, widths)
+    return plain, mirrored, fourth
 
 
 def _widths(pairs, weights, fourth, own_fourth, areas):

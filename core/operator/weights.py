@@ -1,6 +1,7 @@
 """Pair weights of maximum entropy: as close to the kernel's as its own moments around every point allow."""
 
 import itertools
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ _RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the te
 _LARGEST = 1.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
 _SMALLEST = 1e-8  # share of what rounds change that an extrapolation goes by: less would be rounding
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
-_AT_ONCE = 4  # sums over all pairs, each of which holds two numbers of each pair
+_AT_ONCE = 4  # sums over all pairs at most, each of which holds two numbers of each pair
 _TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 
 
@@ -149,7 +150,10 @@ class _Moments:
         self._pairs, self._weights, self._unit, self._report = pairs, weights, unit, report
         self._ends = pairs.first, pairs.second
         self._blocks = blocks(len(weights), _BLOCK)
-        self._basis = np.empty((2, _TERMS, len(weights)))
+        self._basis = np.empty((2, _TERMS, len(weights)), dtype=np.float32)  # seven digits, of terms about one
+        # Fresh memory of this size costs as much as what is worked out in it, so it is used again.
+        self._factor = np.empty(len(weights))
+        self._spare = [np.empty((2, len(weights))) for _ in range(min(os.cpu_count() or 1, _AT_ONCE))]
         places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
         tangents = frames(cloud.normals)[:, :, 1:].transpose(2, 1, 0).copy()
         near, edges = cloud.boundary.reached(pairs.lengths), _Edges(cloud, tangents)
@@ -173,46 +177,48 @@ class _Moments:
         on_all_cores(describe, self._blocks, report)
 
     def factor(self, terms):
-        """Return the factor of each pair's weight, (p,)."""
-        result, terms = np.empty(len(self._weights)), terms.T.copy()
+        """Return the factor of each pair's weight, (p,), until the next call."""
+        terms = terms.T.copy()
 
         def evaluate(block):
-            power = sum(
-                values[end[block]] * part[block]
-                for end, basis in zip(self._ends, self._basis, strict=True)
-                for values, part in zip(terms, basis, strict=True)
-            )
-            np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST), out=result[block])
+            power = np.zeros(block.stop - block.start)
+            for end, basis in zip(self._ends, self._basis, strict=True):
+                own = end[block]
+                for values, part in zip(terms, basis, strict=True):
+                    power += values[own] * part[block]
+            np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST), out=self._factor[block])
 
         on_all_cores(evaluate, self._blocks, self._report)
-        return result
+        return self._factor
 
     def of(self, terms):
         """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
-        weights = self._weights * self.factor(terms)
-        here, there = self._basis
-        return np.stack(self._each(lambda k: self._sum(weights * here[k], weights * there[k]), range(_TERMS)), axis=1)
+        weights = self.factor(terms)
+        weights *= self._weights
+        return np.stack(self._sums((weights, part) for part in self._basis.swapaxes(0, 1)), axis=1)
 
     def curvature(self):
         """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
         result = np.empty((len(self._unit), _TERMS, _TERMS))
-
-        def entry(place):
-            a, b = place
-            result[:, a, b] = result[:, b, a] = self._sum(
-                *(self._weights * basis[a] * basis[b] for basis in self._basis)
-            )
-
-        self._each(entry, [(a, b) for a in range(_TERMS) for b in range(a + 1)])
+        places = [(a, b) for a in range(_TERMS) for b in range(a + 1)]
+        sums = self._sums((self._weights, self._basis[:, a], self._basis[:, b]) for a, b in places)
+        for (a, b), values in zip(places, sums, strict=True):
+            result[:, a, b] = result[:, b, a] = values
         return result
 
-    def _each(self, function, parts):
-        """Call a function that works on all pairs with each of some parts."""
-        return on_all_cores(function, parts, self._report, _AT_ONCE)
+    def _sums(self, products):
+        """Sum products of quantities of pairs, as each of their points sees them, at both ends, in the unit."""
 
-    def _sum(self, here, there):
-        """Sum quantities of pairs, as their first and their second point see them, at both ends, in the unit."""
-        return (self._pairs.half(here).sum(axis=1) + self._pairs.half(there).sum(axis=0)) / self._unit
+        def add(factors):
+            space = self._spare.pop()
+            np.multiply(*factors[:2], out=space)
+            for factor in factors[2:]:
+                space *= factor
+            total = self._pairs.half(space[0]).sum(axis=1) + self._pairs.half(space[1]).sum(axis=0)
+            self._spare.append(space)
+            return total / self._unit
+
+        return on_all_cores(add, list(products), self._report, len(self._spare))
 
 
 def _dot(left, right):
