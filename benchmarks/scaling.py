@@ -1,0 +1,207 @@
+"""How time and memory of every stage grow with the number of points, and the tufted Laplacian beside it.
+
+    python -m benchmarks.scaling [points ...]
+
+Tables and plots go to docs/scaling.md; without numbers, for 10,000, 100,000 and 1,000,000 random points of a sphere.
+The machine should have nothing else to do.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+import core
+from core.geometry import cloud
+from core.operator import laplacian, stiffness
+
+from .peers.methods import METHODS
+from .samplings import random_sphere, sphere_eigenvalues
+from .tables import Table
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+
+DOCUMENT = Path(__file__).parents[1] / "docs" / "scaling.md"
+PICTURE = "pictures/results/scaling.png"
+COUNTS = 10_000, 100_000, 1_000_000
+MODES = 50
+LARGEST = 100_000  # beyond, the applications and the peer are left out
+STAGES = {  # the rest of the build is its surface: outliers, components, quadrics, sheets, noise, cells
+    "pairs": [(cloud, "find_pairs"), (cloud, "separate_sheets"), (laplacian, "arc_length")],
+    "normals": [(cloud, "orient_normals")],
+    "areas": [(laplacian, "solve_areas")],
+    "weights": [(stiffness, "balance_weights")],
+    "matrix": [(laplacian, "assemble_stiffness")],
+}
+
+
+class Watch:
+    """Times of named pieces of work, and the most memory that was in use meanwhile."""
+
+    def __init__(self):
+        self.seconds, self.gigabytes = {}, {}
+        self._open = ["start"]
+        threading.Thread(target=self._look, daemon=True).start()
+
+    def _look(self):
+        while True:
+            used = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 1e9
+            name = self._open[-1]
+            self.gigabytes[name] = max(self.gigabytes.get(name, 0.0), used)
+            time.sleep(0.01)
+
+    def run(self, name, function, *args, **settings):
+        """Call a function; what is watched within does not count."""
+        self._open.append(name)
+        began, inner = time.perf_counter(), sum(self.seconds.values())
+        try:
+            return function(*args, **settings)
+        finally:
+            inner = sum(self.seconds.values()) - inner
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - began - inner
+            self._open.pop()
+
+    def watch(self, name, module, function):
+        """Have every call of a function of a module watched."""
+        inner = getattr(module, function)
+        setattr(module, function, lambda *args, **settings: self.run(name, inner, *args, **settings))
+
+
+def run_operator(count):
+    """Build the operator, and compute its modes."""
+    watch, points = Watch(), random_sphere(count)
+    for name, functions in STAGES.items():
+        for module, function in functions:
+            watch.watch(name, module, function)
+    built = watch.run("surface", core.build_laplacian, points)
+    operator = sum(watch.seconds.values())
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    spectrum = watch.run(f"{MODES} modes", built.eigenpairs, MODES)
+    return watch, {
+        "operator": operator,
+        "operator gigabytes": peak,
+        "pairs a row": built.stiffness.nnz / count,
+        "matrix gigabytes": (built.stiffness.data.nbytes + built.stiffness.indices.nbytes) / 1e9,
+        "error": error_of(spectrum.eigenvalues),
+    }
+
+
+def run_applications(count):
+    """Run what the operator is for."""
+    watch, points = Watch(), random_sphere(count)
+    built = core.build_laplacian(points)
+    low, high = points[:, 2] < -0.95, points[:, 2] > 0.95
+    watch.run("smoothing", core.smooth_points, built, core.exponential(0.1))
+    fixed = np.flatnonzero(low | high)
+    watch.run("harmonic field", core.harmonic_field, built, fixed, high[fixed].astype(float))
+    watch.run("geodesics, first source", core.geodesic_distance, built, [0])
+    watch.run("geodesics, next source", core.geodesic_distance, built, [1])
+    watch.run("segmentation", core.segment, built, 6)
+    watch.run("binding", core.Deformer, built, high, low)
+    belt = np.abs(points[:, 2]) < 0.5
+    ends = np.abs(points[belt, 2]) > 0.47
+    watch.run("minimal surface", core.minimal_surface, points[belt], ends)
+    return watch, {}
+
+
+def run_peer(count):
+    """Build the tufted Laplacian, and compute its modes by shift and invert."""
+    watch = Watch()
+    built = watch.run("operator", METHODS["tufted"].function, random_sphere(count))
+    values = watch.run("modes", built.eigenvalues, MODES)
+    return watch, {"error": error_of(values)}
+
+
+RUNS = {"operator": run_operator, "applications": run_applications, "peer": run_peer}
+
+
+def measure(run, count):
+    """Run in a process of its own, so that peak memory is its own too."""
+    command = [sys.executable, "-m", "benchmarks.scaling", run, str(count)]
+    result = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    print(run, count, result, flush=True)
+    return result
+
+
+def error_of(eigenvalues):
+    """Return the mean relative error of the eigenvalues of the unit sphere, without the first."""
+    exact = sphere_eigenvalues(MODES)[1:]
+    return float(np.mean(np.abs(eigenvalues[1:] / exact - 1.0)))
+
+
+def growth(values, counts):
+    """Return the exponent of n between the last two counts."""
+    if len(values) < 2 or min(values[-2:]) <= 0.0:
+        return ""
+    return f"n^{np.log(values[-1] / values[-2]) / np.log(counts[-1] / counts[-2]):.2f}"
+
+
+def main(counts):
+    """Measure, and write tables and the plot."""
+    few = [count for count in counts if count <= LARGEST]
+    results = {run: [measure(run, count) for count in (counts if run == "operator" else few)] for run in RUNS}
+    tables = [_stages("Operator", results["operator"], counts), _stages("Applications", results["applications"], few)]
+    tables += [_whole(results["operator"], counts), _against_peer(results, few)]
+    _plot(results, counts, few)
+    tables[0].plots.append(PICTURE)
+    text = "\n".join(table.markdown() for table in tables)
+    DOCUMENT.write_text(f"# Time and memory\n\n{__doc__.splitlines()[0]}\n\n{text}", encoding="utf-8")
+
+
+def _stages(title, results, counts):
+    header = ["stage"] + [f"{count:,}: {unit}" for count in counts for unit in ("s", "GB")] + ["growth"]
+    rows = []
+    for name in results[-1]["seconds"]:
+        seconds = [result["seconds"][name] for result in results]
+        pairs = zip(seconds, (result["gigabytes"].get(name, 0.0) for result in results), strict=True)
+        rows.append([name, *(f"{value:.2f}" for pair in pairs for value in pair), growth(seconds, counts)])
+    return Table(title, header, rows, "Seconds, and the most memory of the process meanwhile, on two cores.")
+
+
+def _whole(results, counts):
+    header = ["points", "operator, s", "peak GB", "matrix GB", f"{MODES} modes, s", "pairs a row", "eigenvalues off by"]
+    rows = [
+        [f"{count:,}", f"{result['operator']:.1f}", f"{result['operator gigabytes']:.2f}"]
+        + [f"{result['matrix gigabytes']:.2f}", f"{result['seconds'][f'{MODES} modes']:.1f}"]
+        + [f"{result['pairs a row']:.0f}", f"{100.0 * result['error']:.2g} %"]
+        for count, result in zip(counts, results, strict=True)
+    ]
+    return Table("As a whole", header, rows)
+
+
+def _against_peer(results, counts):
+    rows = []
+    for count, ours, peer in zip(counts, results["operator"], results["peer"], strict=False):
+        own, other = (sum(result["seconds"].values()) for result in (ours, peer))
+        rows.append([f"{count:,}", f"{own:.1f}", f"{other:.1f}", f"{own / other:.2f}"])
+        rows[-1] += [f"{100.0 * result['error']:.2g} %" for result in (ours, peer)]
+    header = ["points", "this project, s", "tufted, s", "times", "eigenvalues off by", "tufted"]
+    note = f"Operator and {MODES} modes, against the tufted Laplacian on the triangles of potpourri3d."
+    return Table("Against a peer", header, rows, note)
+
+
+def _plot(results, counts, few):
+    figure, panels = pyplot.subplots(1, 2, figsize=(10, 4.5), dpi=90)
+    for axes, run, own in zip(panels, ("operator", "applications"), (counts, few), strict=True):
+        for name in results[run][-1]["seconds"]:
+            axes.loglog(own, [result["seconds"][name] for result in results[run]], "o-", label=name, markersize=4)
+        axes.set(title=run.capitalize(), xlabel="points", ylabel="seconds")
+        axes.grid(which="both", alpha=0.2)
+        axes.legend(fontsize=7)
+    figure.savefig(DOCUMENT.parent / PICTURE, bbox_inches="tight")
+    pyplot.close(figure)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] and sys.argv[1] in RUNS:
+        watched, figures = RUNS[sys.argv[1]](int(sys.argv[2]))
+        print(json.dumps({"seconds": watched.seconds, "gigabytes": watched.gigabytes, **figures}))
+    else:
+        main([int(count) for count in sys.argv[1:]] or list(COUNTS))
