@@ -20,6 +20,7 @@ from .deformation import (
 _COUNT = 6000  # points to solve on
 _FEWEST = 300  # of a component, as far as it has them
 _ALL = 1.5  # times the count: so few points are all solved on
+_NEAR, _CLOSER = 10.0, 0.5  # of where constraints begin, in distances of chosen points, these are up to so much closer
 _SOURCES = 10  # points that each other one follows
 _RIDGE = 1e-2  # of their spread: what weights need not balance, such as heights above the surface
 
@@ -125,9 +126,11 @@ class CoarseDeformer:
         rank[self.anchors], rank[self.handles] = 1, 2
         rank[np.setdiff1d(np.concatenate([self.handles, self.anchors]), held)] = 0
         apart = move_apart(laplacian.surface_points[moving], component[moving])
-        spacing = _spacing(laplacian.areas[moving], laplacian.smoothing_lengths[moving], component[moving], count)
+        areas = laplacian.areas[moving]
+        lengths = laplacian.smoothing_lengths[moving] * _closer_to_border(apart, areas, rank[moving] > 0, count)
+        spacing = _spacing(areas, lengths, component[moving], count)
         looked = lambda: report("Points", 0.05)  # noqa: E731
-        rows = moving[thin(apart, laplacian.areas[moving], spacing, count, rank[moving], looked)]
+        rows = moving[thin(apart, areas, spacing, count, rank[moving], looked)]
         report("Operator", 0.1)
         coarse = narrow_laplacian(
             laplacian, neighbors, rows=rows, progress=lambda stage, share: report("Operator", 0.1 + 0.5 * share)
@@ -200,6 +203,14 @@ class CoarseDeformer:
         shift = now - np.einsum("mab,mb->ma", turn, rest)
         maps = self._weights @ np.concatenate([turn.reshape(-1, 9), shift], axis=1)
         return np.einsum("nab,nb->na", maps[:, :9].reshape(-1, 3, 3), self._rest) + maps[:, 9:] + self._center
+
+
+def _closer_to_border(points, areas, held, count):
+    """Return by what to multiply distances between chosen points near to where constraints begin."""
+    away = np.empty(len(points))
+    for own in (held, ~held):
+        away[own] = cKDTree(points[~own]).query(points[own], workers=-1)[0]
+    return np.clip(away / (_NEAR * np.sqrt(areas.sum() / count)), _CLOSER, 1.0)
 
 
 def _spacing(areas, lengths, component, count):

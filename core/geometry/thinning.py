@@ -88,7 +88,7 @@ def _close_pairs(start, distance, index, reach, rank):
 
 
 def nearest_in_blocks(sources, points, count, report=lambda: None):
-    """Find the nearest sources of points; yield the first point of each block, distances and indices, (block, count)."""
+    """Find the nearest sources of points; yield the first row of each block, distances and indices, (b, count)."""
     tree = cKDTree(sources)
     count = min(count, len(sources))
     for rows in blocks(len(points), _BLOCK):
