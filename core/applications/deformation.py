@@ -5,7 +5,7 @@ from scipy import sparse
 
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_indices
-from ..operator import dissection_order, factorize, narrow_laplacian, sparsify
+from ..operator import dissect, factorize, narrow_laplacian, sparsify
 from .rotations import nearest_rotations
 
 NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
@@ -148,7 +148,7 @@ class Deformer:
         fixed = np.zeros(len(moving), dtype=bool)
         fixed[self._row[inside & hard]] = True
         free, self._fixed = np.flatnonzero(~fixed), np.flatnonzero(fixed)
-        order = dissection_order(energy[free][:, free], self._rest[free], lambda: report("Equations", 0.5))
+        order, starts = dissect(energy[free][:, free], self._rest[free], lambda: report("Equations", 0.5))
         self._free = free[order]
         # A soft constraint adds its weight to the diagonal, and to the right-hand side times the place it pulls to.
         self._pull = np.zeros(len(moving))
@@ -162,7 +162,9 @@ class Deformer:
 
         report("Factors", 0.6)
         matrix = free_rows[:, self._free] + sparse.diags_array(self._pull[self._free])
-        self._solve = factorize(matrix) if len(self._free) else None
+        self._solve = (
+            factorize(matrix, starts, lambda share: report("Factors", 0.6 + 0.4 * share)) if len(order) else None
+        )
 
     def solve(self, handle_positions, *, steps=STEPS, rtol=RTOL, start=None, progress=None):
         """Find the points for new positions of the handles.
