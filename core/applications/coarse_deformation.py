@@ -22,6 +22,7 @@ _FEWEST = 300  # of a component, as far as it has them
 _ALL = 1.5  # times the count: so few points are all solved on
 _NEAR, _CLOSER = 10.0, 0.5  # of where constraints begin, in distances of chosen points, these are up to so much closer
 _SOURCES = 10  # points that each other one follows
+_SHARP = 1e-10  # share of the squared reach within which a point is at a source
 _RIDGE = 1e-2  # of their spread: what weights need not balance, such as heights above the surface
 
 
@@ -225,8 +226,8 @@ def _spacing(areas, lengths, component, count):
 def _linear_weights(sources, points, report):
     """Return the matrix that carries values from sources to points, exact for constants and, along surfaces, linear.
 
-    Weights fade to zero at the last neighbour, so that none appears or vanishes suddenly, times a linear function that
-    balances them around the point (moving least squares).
+    Weights fade to zero at the last neighbour, so that none appears or vanishes suddenly, and rise at the sources, which
+    keep their own values, times a linear function that balances them around the point (moving least squares).
     """
     weights, indices = [], []
     for start, distance, index in nearest_in_blocks(sources, points, _SOURCES + 1, lambda: None):
@@ -242,7 +243,8 @@ def _linear_weights(sources, points, report):
 def _balanced(distance, offset):
     """Return the weights of neighbours at these distances, (n, k), and offsets, (n, k, 3)."""
     last = distance[:, -1:]
-    weight = (1.0 - (distance / np.where(last > 0.0, 1.0001 * last, 1.0)) ** 2) ** 2  # a single one keeps some
+    share = (distance / np.where(last > 0.0, 1.0001 * last, 1.0)) ** 2  # so that a single one keeps some weight
+    weight = (1.0 - share) ** 2 / (share + _SHARP)
     weight /= weight.sum(axis=1, keepdims=True)
     mean = np.einsum("nk,nka->na", weight, offset)
     offset = offset - mean[:, None]

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import sparse
 
+from ..blocks import blocks
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_indices
 from ..operator import dissect, factorize, narrow_laplacian, sparsify
@@ -12,6 +13,7 @@ NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly small
 STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
 RTOL = 1e-5
 _HUGE = 1e100  # of a coordinate, so that no product overflows
+_BLOCK = 1 << 14  # rows
 _MEMORY = 5  # steps that the acceleration looks back on
 
 
@@ -141,8 +143,10 @@ class Deformer:
         self._rest = self.points[moving] - center[self._component]
         self._size = float(np.sqrt(np.mean(np.sum(self._rest**2, axis=1))))
         stiffness = sparsify(narrow.stiffness[moving][:, moving])
+        report("Equations", 0.42)
         inverse = sparse.diags_array(1.0 / narrow.areas[moving], format="csr")
-        energy = (stiffness @ inverse @ stiffness).tocsr()
+        energy = _energy(stiffness, inverse, lambda: report("Equations", 0.43))
+        report("Equations", 0.45)
         self._differential = stiffness @ self._rest
         inside = self._row >= 0
         fixed = np.zeros(len(moving), dtype=bool)
@@ -154,9 +158,11 @@ class Deformer:
         self._pull = np.zeros(len(moving))
         soft = inside & ~hard
         self._pull[self._row[soft]] = weights[soft] * energy.diagonal()[self._row[soft]]
+        report("Equations", 0.55)
         free_rows = energy[self._free]
         self._coupling = free_rows[:, self._fixed].tocsr()
         self._divergence = (stiffness[self._free] @ inverse).tocsr()
+        report("Equations", 0.57)
         if self.rotation_aware:
             self._edges = _edge_products(stiffness, self._rest)
 
@@ -378,6 +384,15 @@ def check_positions(positions, count, name, singular):
             f" each {singular}."
         )
     return given.astype(np.float64)
+
+
+def _energy(stiffness, inverse, report):
+    """Return K M^-1 K, made in blocks of rows, each in a fraction of a second."""
+    weighted, parts = (stiffness @ inverse).tocsr(), []
+    for rows in blocks(len(inverse.diagonal()), _BLOCK):
+        report()
+        parts.append(weighted[rows] @ stiffness)
+    return sparse.vstack(parts, format="csr")
 
 
 def _edge_products(stiffness, rest):

@@ -39,7 +39,7 @@ def factorize(matrix, starts, report=lambda fraction: None):
     -----
     The multifrontal method (Duff and Reid 1983): the unknowns of a part are eliminated in a dense matrix of themselves
     and of all later ones that they are coupled with, and what is left of it is added to that of the part after.
-    Nearly all of the work is done by dense products, in a quarter of the time that SuperLU takes for factors of both
+    Nearly all of the work is done by dense products, in half of the time that SuperLU takes for factors of both
     sides, and in less than half of the room.
     """
     count = matrix.shape[0]
