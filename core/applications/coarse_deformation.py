@@ -226,8 +226,8 @@ def _spacing(areas, lengths, component, count):
 def _linear_weights(sources, points, report):
     """Return the matrix that carries values from sources to points, exact for constants and, along surfaces, linear.
 
-    Weights fade to zero at the last neighbour, so that none appears or vanishes suddenly, and rise at the sources, which
-    keep their own values, times a linear function that balances them around the point (moving least squares).
+    Weights fade to zero at the last neighbour, so that none appears or vanishes suddenly, and rise at the sources, so
+    that these keep their values, times a linear function that balances them around the point (moving least squares).
     """
     weights, indices = [], []
     for start, distance, index in nearest_in_blocks(sources, points, _SOURCES + 1, lambda: None):
