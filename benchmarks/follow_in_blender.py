@@ -1,8 +1,8 @@
 """One update of a bound object in Blender, run by a Python that has bpy: ``python follow_in_blender.py FILE``.
 
 The file is an npz with points (n, 3), handles and anchors (n,) bool, and the path of the zip of the extension. Written
-beside it are the seconds of updates while a handle is dragged, (k,), and after them those of settling: all from the
-move of an empty to the evaluated object, as a drag in the window does.
+beside it are the seconds of updates while a handle is dragged, (k,), after them those of settling, for the first time
+and again: all from the move of an empty to the evaluated object, as a drag in the window does.
 """
 
 import importlib
@@ -36,7 +36,7 @@ def bound_object(points, handles, anchors):
 
 
 def follow(points, handles, anchors):
-    """Return the seconds of each quick update, and those of a settled one."""
+    """Return the seconds of each quick update, and those of two settled ones."""
     live = importlib.import_module(f"{MODULE}.operators.deform.live")
     obj = bound_object(points, handles, anchors)
     empty, view_layer = obj.meshfree.deform.handle_items[0].empty, bpy.context.view_layer
@@ -60,7 +60,7 @@ def follow(points, handles, anchors):
     quick = [measure() for _ in range(MOVES)]
     bpy.app.handlers.depsgraph_update_post.remove(dragged)
     bpy.app.handlers.depsgraph_update_post.append(handler)
-    return [*quick, measure()]
+    return [*quick, measure(), measure()]
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ of the unit sphere, where answers are known:
 """
 
 from .applications import (
+    CoarseDeformer,
     Deformer,
     MinimalSurface,
     PointBlend,
@@ -59,6 +60,7 @@ from .paper import Stability, check_stability
 __all__ = [
     "AreaError",
     "Cancelled",
+    "CoarseDeformer",
     "ComponentError",
     "Deformer",
     "InvalidPointsError",

@@ -78,7 +78,9 @@ def _draw_state(layout, obj):
         icon = "INFO" if is_baked(obj) else "ERROR"
     elif working is not None:
         stage, fraction = working
-        text = f"Not up to date. Binding: {stage}, {fraction:.0%}"
+        exact = live.find(obj) is not None and not live.is_prepared(obj)
+        state = "Follows its handles roughly. Exact soon" if exact else "Not up to date. Binding"
+        text = f"{state}: {stage}, {fraction:.0%}"
         icon = "SORTTIME"
     else:
         text, icon = "Bound: follows its handles", "CHECKMARK"

@@ -1,5 +1,6 @@
 """What the operator is for: filters, segments, fields, distances, deformation, minimal surfaces."""
 
+from .coarse_deformation import CoarseDeformer
 from .deformation import Deformer
 from .descriptors import heat_kernel_signature, signature_energies, signature_times, wave_kernel_signature
 from .fields import harmonic_field, solve_poisson

@@ -3,15 +3,17 @@
 import numpy as np
 from scipy import sparse
 
+from ..blocks import blocks
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_indices
-from ..operator import dissection_order, factorize, narrow_laplacian, sparsify
+from ..operator import dissect, factorize, narrow_laplacian, sparsify
 from .rotations import nearest_rotations
 
-_NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
-_STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
-_RTOL = 1e-5
+NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
+STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
+RTOL = 1e-5
 _HUGE = 1e100  # of a coordinate, so that no product overflows
+_BLOCK = 1 << 14  # rows
 _MEMORY = 5  # steps that the acceleration looks back on
 
 
@@ -105,23 +107,24 @@ class Deformer:
     """
 
     def __init__(
-        self, laplacian, handles, anchors=(), *, rotation_aware=True, weights=None, neighbors=_NEIGHBORS, progress=None
+        self, laplacian, handles, anchors=(), *, rotation_aware=True, weights=None, neighbors=NEIGHBORS, progress=None
     ):
         report = progress or (lambda stage, fraction: None)
         n = len(laplacian.points)
         self.points = laplacian.points
-        self.handles = as_indices(handles, n, "handles")
-        self.anchors = as_indices(anchors, n, "anchors")
+        self.handles, self.anchors, weights = check_constraints(handles, anchors, weights, n)
         self.rotation_aware = bool(rotation_aware)
         self.steps, self.converged, self.notices = 0, True, []
         held = np.concatenate([self.handles, self.anchors])
-        self._check_sets(held)
-        weights = _check_weights(weights, len(held))
 
         report("Operator", 0.0)
-        narrow = narrow_laplacian(laplacian, neighbors)
+        narrow = narrow_laplacian(laplacian, neighbors, progress=lambda stage, share: report("Operator", 0.4 * share))
         self.notices += [notice for notice in narrow.notices if notice not in laplacian.notices]
-        self._choose_moving(narrow.component, held, weights)
+        held_components = components_held(narrow.component, held[weights > 0.0])
+        self.notices += notices_of_components(narrow.component, held_components)
+        self._moving = np.flatnonzero(np.isin(narrow.component, held_components))
+        self._component = np.searchsorted(held_components, narrow.component[self._moving])
+        self._components = len(held_components)
         self._chosen = np.flatnonzero(weights)
         self._held, weights = held[self._chosen], weights[self._chosen]
         hard = np.isinf(weights)
@@ -140,30 +143,36 @@ class Deformer:
         self._rest = self.points[moving] - center[self._component]
         self._size = float(np.sqrt(np.mean(np.sum(self._rest**2, axis=1))))
         stiffness = sparsify(narrow.stiffness[moving][:, moving])
+        report("Equations", 0.42)
         inverse = sparse.diags_array(1.0 / narrow.areas[moving], format="csr")
-        energy = (stiffness @ inverse @ stiffness).tocsr()
+        energy = _energy(stiffness, inverse, lambda: report("Equations", 0.43))
+        report("Equations", 0.45)
         self._differential = stiffness @ self._rest
         inside = self._row >= 0
         fixed = np.zeros(len(moving), dtype=bool)
         fixed[self._row[inside & hard]] = True
         free, self._fixed = np.flatnonzero(~fixed), np.flatnonzero(fixed)
-        order = dissection_order(energy[free][:, free], self._rest[free], lambda: report("Equations", 0.5))
+        order, starts = dissect(energy[free][:, free], self._rest[free], lambda: report("Equations", 0.5))
         self._free = free[order]
         # A soft constraint adds its weight to the diagonal, and to the right-hand side times the place it pulls to.
         self._pull = np.zeros(len(moving))
         soft = inside & ~hard
         self._pull[self._row[soft]] = weights[soft] * energy.diagonal()[self._row[soft]]
+        report("Equations", 0.55)
         free_rows = energy[self._free]
         self._coupling = free_rows[:, self._fixed].tocsr()
         self._divergence = (stiffness[self._free] @ inverse).tocsr()
+        report("Equations", 0.57)
         if self.rotation_aware:
             self._edges = _edge_products(stiffness, self._rest)
 
         report("Factors", 0.6)
         matrix = free_rows[:, self._free] + sparse.diags_array(self._pull[self._free])
-        self._solve = factorize(matrix) if len(self._free) else None
+        self._solve = (
+            factorize(matrix, starts, lambda share: report("Factors", 0.6 + 0.4 * share)) if len(order) else None
+        )
 
-    def solve(self, handle_positions, *, steps=_STEPS, rtol=_RTOL, start=None, progress=None):
+    def solve(self, handle_positions, *, steps=STEPS, rtol=RTOL, start=None, progress=None):
         """Find the points for new positions of the handles.
 
         Parameters
@@ -191,7 +200,7 @@ class Deformer:
             Positions of the wrong shape or type, or not finite.
         """
         report = progress or (lambda stage, fraction: None)
-        target = _check_positions(handle_positions, len(self.handles), "handle positions", "handle")
+        target = check_positions(handle_positions, len(self.handles), "handle positions", "handle")
         target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
         result = self.points.copy()
         loose = self._row < 0
@@ -216,7 +225,7 @@ class Deformer:
         if start is None or not self.rotation_aware or steps < 1:
             now = place(0.0)
         else:
-            now = _check_positions(start, len(self.points), "starting points", "point")[self._moving]
+            now = check_positions(start, len(self.points), "starting points", "point")[self._moving]
         step, converged = 0, True
         if self.rotation_aware and steps > 0:
             at_rest = self._turned(turn, self._differential)
@@ -233,8 +242,20 @@ class Deformer:
         result[self._moving] = now
         return result
 
+    @property
+    def moving(self):
+        """The points that some constraint holds, by their components, ascending; all others stay where they are."""
+        return self._moving
+
+    def rotations(self, points):
+        """Estimate how the surface around each moving point has turned, (3, 3, m), from all points after, (n, 3)."""
+        return self._rotations(points[self._moving])
+
     def _rotations(self, now):
-        """Estimate how each neighbourhood has turned: the polar factor of sum_j w_ij (x_i - x_j)(p_i - p_j)^T."""
+        """Estimate how each neighbourhood has turned: the polar factor of sum_j w_ij (x_i - x_j)(p_i - p_j)^T.
+
+        Of the points that move, where they are now; (3, 3, m).
+        """
         centered = now - now.mean(axis=0)
         products = (self._edges @ centered).reshape(3, len(now), 3)
         return nearest_rotations(np.ascontiguousarray(products.transpose(2, 0, 1)))
@@ -267,34 +288,26 @@ class Deformer:
             return vectors @ turn[0].T
         return np.einsum("nab,nb->na", turn[self._component], vectors)
 
-    def _check_sets(self, held):
-        if not len(self.handles):
-            raise PointCloudError("There are no handles, so nothing can be moved. Choose at least one point.")
-        both = len(held) - len(np.unique(held))
-        if both:
-            raise PointCloudError(
-                f"{both} points are handles and anchors at once. Take them out of one of the two sets."
-            )
 
-    def _choose_moving(self, component, held, weights):
-        """Find the points of components that some constraint holds; all others stay where they are."""
-        known = np.unique(component[held[weights > 0.0]])
-        known = known[known >= 0]
-        self._moving = np.flatnonzero(np.isin(component, known))
-        self._component = np.searchsorted(known, component[self._moving])
-        self._components = len(known)
-        lone = int(np.count_nonzero(component < 0))
-        components = len(np.unique(component[component >= 0])) - len(known)
-        if lone:
-            self.notices.append(
-                f"{lone} points belong to no surface. They stay where they are, unless they are handles."
-            )
-        if components:
-            free = len(component) - lone - len(self._moving)
-            self.notices.append(
-                f"{components} components with {free} points have neither handles nor anchors. They stay where they"
-                " are."
-            )
+def components_held(component, held):
+    """Return the components that some of these points are in, ascending; others stay where they are."""
+    known = np.unique(component[held])
+    return known[known >= 0]
+
+
+def notices_of_components(component, held):
+    """Tell which points stay, as nothing holds them."""
+    notices = []
+    lone = int(np.count_nonzero(component < 0))
+    free = (component >= 0) & ~np.isin(component, held)
+    if lone:
+        notices.append(f"{lone} points belong to no surface. They stay where they are, unless they are handles.")
+    if free.any():
+        notices.append(
+            f"{len(np.unique(component[free]))} components with {np.count_nonzero(free)} points have neither handles"
+            " nor anchors. They stay where they are."
+        )
+    return notices
 
 
 class _Mixing:
@@ -324,6 +337,17 @@ class _Mixing:
         return after - (share @ (starts + changes)).reshape(after.shape)
 
 
+def check_constraints(handles, anchors, weights, count):
+    """Return handles and anchors of so many points as indices, and the weight of each, handles first."""
+    handles, anchors = as_indices(handles, count, "handles"), as_indices(anchors, count, "anchors")
+    if not len(handles):
+        raise PointCloudError("There are no handles, so nothing can be moved. Choose at least one point.")
+    both = len(np.intersect1d(handles, anchors))
+    if both:
+        raise PointCloudError(f"{both} points are handles and anchors at once. Take them out of one of the two sets.")
+    return handles, anchors, _check_weights(weights, len(handles) + len(anchors))
+
+
 def _check_weights(weights, count):
     """Return the weight of each constraint, (count,), infinite where it is hard."""
     if weights is None:
@@ -342,7 +366,7 @@ def _check_weights(weights, count):
     return np.broadcast_to(given.astype(np.float64), (count,))
 
 
-def _check_positions(positions, count, name, singular):
+def check_positions(positions, count, name, singular):
     """Return positions, (count, 3), in double precision."""
     try:
         given = np.asarray(positions)
@@ -360,6 +384,15 @@ def _check_positions(positions, count, name, singular):
             f" each {singular}."
         )
     return given.astype(np.float64)
+
+
+def _energy(stiffness, inverse, report):
+    """Return K M^-1 K, made in blocks of rows, each in a fraction of a second."""
+    weighted, parts = (stiffness @ inverse).tocsr(), []
+    for rows in blocks(len(inverse.diagonal()), _BLOCK):
+        report()
+        parts.append(weighted[rows] @ stiffness)
+    return sparse.vstack(parts, format="csr")
 
 
 def _edge_products(stiffness, rest):

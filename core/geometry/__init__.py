@@ -1,8 +1,9 @@
 """What the points tell: neighbourhoods, components, normals, boundary, bandwidth and pairs; `cloud` runs the stages."""
 
 from .cloud import estimate_normals, read_cloud
-from .components import SMALLEST
+from .components import SMALLEST, move_apart
 from .distances import arc_length, arc_squared, circle_arc, pair_heights, projected_distance
 from .nearest import ROUNDS, SMOOTH, find_nearest
 from .points import FEWEST, as_indices, as_mask, check_points, check_values
 from .quadrics import frames
+from .thinning import nearest_in_blocks, thin

@@ -34,7 +34,7 @@ class Cells:
     reach: np.ndarray
 
 
-def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None):
+def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None, report=lambda: None):
     """Measure the cell of every point in geodesic polar coordinates around it.
 
     A neighbour at the distance d cuts the plane at d / 2; next to a boundary the cell ends there. On a surface of
@@ -52,6 +52,8 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None
     boundary : Boundary
     component : ndarray, (m,) int, optional
         Component of each point; those of others cut nothing.
+    report : callable
+        Called now and then; may raise `Cancelled`.
 
     Returns
     -------
@@ -78,7 +80,7 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None
             cells.areas[block[known]], cells.reach[block[known]] = areas[known], reach[known]
             still_open[block] = ~closed & whole[block]
 
-        on_all_cores(measure, blocks(len(rows), _BLOCK // wider))
+        on_all_cores(measure, blocks(len(rows), _BLOCK // wider), report)
         rows = np.flatnonzero(still_open)
     return cells
 

@@ -131,25 +131,37 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     points = check_points(points)
     needed = options.neighbors + 1
     scaled = scale_points(points, needed)
-    sample = divide_components(leave_outliers(scaled, needed), needed)
+    report("Normals", 0.02)
+    sample = leave_outliers(scaled, needed, lambda: report("Normals", 0.04))
+    report("Normals", 0.06)
+    sample = divide_components(sample, needed)
+    report("Normals", 0.1)
     surface = fit_surface(sample, options.sheets)
+    report("Normals", 0.12)
     surface = remove_noise(surface, options)
+    report("Normals", 0.16)
     if options.sheets:
         surface = divide_sheets(surface, needed)
     sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
 
+    report("Normals", 0.18)
     given = None if normals is None else unit_normals(normals, len(points))[sample.scaled.first]
     oriented = orient_normals(nearest, quadrics.normals if given is None else given)
 
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature if options.curvature_correction else np.zeros(len(oriented))
     gaps = None
+
+    def looked():
+        report("Neighbors", 0.2)
+
     if options.boundary == "auto" and boundary is None and boundary_distance is None:
-        cells = measure_cells(nearest, oriented, gaussian, no_boundary(len(oriented)), sample.component)
+        cells = measure_cells(nearest, oriented, gaussian, no_boundary(len(oriented)), sample.component, looked)
         gaps = mean_gaps(nearest, cells.reach, 1)
     boundary = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
     if gaps is None or np.isfinite(boundary.distance).any():
-        cells = measure_cells(nearest, oriented, gaussian, boundary, sample.component)
+        cells = measure_cells(nearest, oriented, gaussian, boundary, sample.component, looked)
+    report("Neighbors", 0.25)
     lengths = smoothing_lengths(nearest, options, sample.component, cells.reach)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
     own = final_normals(nearest, pairs, given, oriented, options)
@@ -181,7 +193,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     )
 
 
-def leave_outliers(scaled, needed):
+def leave_outliers(scaled, needed, report=lambda: None):
     """Leave out distinct points that do not lie on the surface of their neighbours.
 
     Parameters
@@ -189,6 +201,8 @@ def leave_outliers(scaled, needed):
     scaled : ScaledPoints
     needed : int
         How many points must be left.
+    report : callable
+        Called between its two stages; may raise `Cancelled`.
 
     Returns
     -------
@@ -202,6 +216,7 @@ def leave_outliers(scaled, needed):
     """
     count = len(scaled.points)
     sample = Sample(scaled, np.zeros(count, dtype=int), find_nearest(scaled.points), np.zeros(count))
+    report()
     return _regroup(sample, np.where(find_outliers(sample.nearest), -1, 0), needed)
 
 

@@ -1,8 +1,9 @@
 """The Laplace-Beltrami operator on a cloud: areas, weights, stiffness, spectrum, solvers and factors."""
 
 from .areas import SOLVERS, AreaSolution, estimate_areas
+from .cholesky import factorize
 from .curvature import mean_curvature
-from .factors import dissection_order, factorize, sparsify
+from .factors import dissect, sparsify
 from .laplacian import LaplaceBeltrami, build_laplacian, narrow_laplacian
 from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_symmetric
 from .spectrum import Spectrum, symmetric_form

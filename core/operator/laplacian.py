@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import InvalidPointsError
-from ..geometry import arc_length, check_points, projected_distance, read_cloud
+from ..geometry import arc_length, check_points, move_apart, projected_distance, read_cloud
 from ..kernel import SECOND_MOMENT
 from ..options import LaplacianOptions
 from .areas import NO_AREA, solve_areas
@@ -351,8 +351,8 @@ def _trust(cloud, residual):
     return 1.0 / (1.0 + (residual / _FAR) ** 2 + (cloud.misfit / (_MISSED * cloud.spacing)) ** 2)
 
 
-def narrow_laplacian(laplacian, neighbors=NARROW):
-    """Build an operator with few neighbours on the same points, to be factorised.
+def narrow_laplacian(laplacian, neighbors=NARROW, *, rows=None, progress=None):
+    """Build an operator with few neighbours on the same points, to be factorised, or on some of them.
 
     Parameters
     ----------
@@ -360,11 +360,16 @@ def narrow_laplacian(laplacian, neighbors=NARROW):
         Its normals, boundary, and the points that it takes the surface to be at are used.
     neighbors : int
         Neighbours inside the kernel's support.
+    rows : ndarray, (k,) int, optional
+        Points to build it on alone; its components do not join those of the given operator.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
     Returns
     -------
     LaplaceBeltrami
-        Less accurate for functions, but it ends sharply at fixed points, and its factors are small.
+        Less accurate for functions, but it ends sharply at fixed points, and its factors are small. The given one if it
+        is as narrow already, and no rows are named.
     """
     options = replace(
         laplacian.options,
@@ -373,4 +378,11 @@ def narrow_laplacian(laplacian, neighbors=NARROW):
         bandwidth_factor=1.0 / 3.0,  # the support of 3 h ends at the last neighbour
         projection="off",
     )
-    return build_laplacian(laplacian.surface_points, laplacian.normals, options, boundary=laplacian.boundary)
+    points, normals, boundary = laplacian.surface_points, laplacian.normals, laplacian.boundary
+    if rows is None:
+        if laplacian.options == options:
+            return laplacian
+        return build_laplacian(points, normals, options, boundary=boundary, progress=progress)
+    apart = move_apart(points[rows], laplacian.component[rows])
+    built = build_laplacian(apart, normals[rows], options, boundary=boundary[rows], progress=progress)
+    return replace(built, points=laplacian.points[rows], surface_points=points[rows])

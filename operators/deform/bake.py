@@ -60,13 +60,13 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
     def _prepared_frames(self, progress):
         """Make the factors in a thread first, if there are none; see `_frames`."""
         obj = self._kept.find()[1]
-        if live.find(obj) is None:
-            work = Job(self.bl_label, [], live.plan_settled(obj)[0])
+        if not live.is_prepared(obj):
+            work = Job(self.bl_label, [], live.plan_prepared(obj))
             try:
                 while not work.ended:
                     progress(work.stage, 0.0)
                     yield
-                live.keep(self._kept.find()[1], work.result()[0])
+                live.keep(self._kept.find()[1], work.result())
             finally:
                 work.stop()
         return (yield from self._frames(progress))
@@ -83,7 +83,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
                 )
             scene.frame_set(number)
             self._kept.expect()
-            live.update(obj, waits=live.find(obj) is None)
+            live.update(obj, waits=not live.is_prepared(obj))
             reason = stale_reason(obj, glance=True, trusting=True)
             if reason:
                 raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')

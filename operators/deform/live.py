@@ -1,21 +1,24 @@
 """Bound objects follow their handles: what is kept in memory for that, and the handlers that call it.
 
-A quick update takes one step from the last result, for dragging and playing; a settled one starts from rest and takes
-all steps, so that it depends on nothing but where the handles are. Frames that are rendered or jumped to are settled,
+A quick update, for dragging and playing, takes one step from the last result, on some of the points, which carry the
+others. A settled one is exact: it starts from rest and takes all steps on all points, so that it depends on nothing but
+where the handles are; what it needs is made when it is first needed. Frames that are rendered or jumped to are settled,
 and so is what was dragged once it rests. In a window, what takes long runs in a thread; without one all is settled at
 once.
 """
 
 import threading
+from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from time import perf_counter
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import Cancelled, Deformer, PointCloudError
+from ...core import Cancelled, CoarseDeformer, Deformer, PointCloudError
 from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import laplacian_options
 from ..objects.reading import boundary_points
@@ -29,7 +32,7 @@ _TICK = 0.05  # seconds between two looks at a thread
 
 @dataclass
 class Live:
-    """The factors of a bound object.
+    """What a bound object follows its handles by.
 
     Attributes
     ----------
@@ -38,7 +41,12 @@ class Live:
         Points at rest in local space.
     matrix : ndarray, (3, 3)
         From local space to the lengths of the world when it was bound.
-    deformer : Deformer
+    follower : CoarseDeformer
+        For quick updates.
+    make_exact : callable
+        From a progress callback to the `Deformer` for settled ones.
+    exact : Deformer or None
+        That, once it was needed.
     last : dict of int to ndarray
         The last result by the object's session_uid: copies of an object have one binding.
     """
@@ -46,8 +54,16 @@ class Live:
     constraints: binding.Constraints
     rest: np.ndarray
     matrix: np.ndarray
-    deformer: Deformer
+    follower: CoarseDeformer
+    make_exact: Callable
+    exact: Deformer | None
     last: dict = field(default_factory=dict)
+
+    def prepare(self, progress):
+        """Make the factors for settled updates, if there are none, and return this."""
+        if self.exact is None:
+            self.exact = self.make_exact(progress)
+        return self
 
 
 @dataclass
@@ -62,7 +78,7 @@ class _Settling:
     pose : ndarray
         The pose that it works for.
     prepares : bool
-        Whether it makes the factors first.
+        Whether it may make factors first.
     """
 
     work: Job
@@ -101,6 +117,12 @@ def find(obj):
     return _lives.get(live_key(obj))
 
 
+def is_prepared(obj) -> bool:
+    """Whether an object can be settled at once."""
+    live = find(obj)
+    return live is not None and live.exact is not None
+
+
 def keep(obj, live):
     """Keep the factors of an object, and drop those that no object needs."""
     used = {live_key(other) for other in binding.bound_objects()}
@@ -110,7 +132,7 @@ def keep(obj, live):
 
 
 def plan_factors(obj, rest, matrix, constraints):
-    """Read the settings of an object; return a function of a progress callback that makes its factors.
+    """Read the settings of an object; return a function of a progress callback that makes its `Live`.
 
     Parameters
     ----------
@@ -125,9 +147,9 @@ def plan_factors(obj, rest, matrix, constraints):
     weights = settings.weight * constraints.strength if settings.soft else None
     options, boundary, aware = laplacian_options(obj.meshfree), boundary_points(obj), settings.rotation_aware
 
-    def make(progress):
+    def make_by(kind, progress):
         laplacian = cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress).laplacian
-        deformer = Deformer(
+        return kind(
             laplacian,
             constraints.moved,
             constraints.kept,
@@ -135,43 +157,82 @@ def plan_factors(obj, rest, matrix, constraints):
             weights=weights,
             progress=progress,
         )
-        return Live(constraints, rest, matrix, deformer)
+
+    def make(progress):
+        follower = make_by(CoarseDeformer, progress)
+        return Live(constraints, rest, matrix, follower, partial(make_by, Deformer), follower.exact)
 
     return make
 
 
-def displaced(live, goal, steps, start=None, progress=None):
-    """Solve for handles in local space, (h, 3); return the points, as `Live.matrix` places them, and displacements."""
-    if np.allclose(goal, live.rest[live.constraints.moved], rtol=0.0, atol=1e-6 * np.ptp(live.rest, axis=0).max()):
-        return live.deformer.points, np.zeros_like(live.deformer.points)
-    points = live.deformer.solve(goal @ live.matrix.T, steps=steps, start=start, progress=progress)
-    return points, (points - live.deformer.points) @ np.linalg.inv(live.matrix).T
+def is_at_rest(live, goal) -> bool:
+    """Whether handles in local space, (h, 3), are where they were bound."""
+    return np.allclose(goal, live.rest[live.constraints.moved], rtol=0.0, atol=1e-6 * np.ptp(live.rest, axis=0).max())
 
 
-def plan_settled(obj, depsgraph=None):
+def displaced(live, goal, steps=None, start=None, progress=None):
+    """Solve for handles in local space, (h, 3); return the points, as `Live.matrix` places them, and displacements.
+
+    With a number of steps the result is exact, otherwise it is a quick one.
+    """
+    rest = live.follower.points
+    if is_at_rest(live, goal):
+        return rest, np.zeros_like(rest)
+    if steps is None:
+        points = live.follower.solve(goal @ live.matrix.T, steps=1, start=start)
+    else:
+        points = live.prepare(progress).exact.solve(goal @ live.matrix.T, steps=steps, progress=progress)
+    return points, (points - rest) @ np.linalg.inv(live.matrix).T
+
+
+def plan_prepared(obj):
+    """Read a bound object; return a function of a progress callback that makes what settled updates need."""
+    known = find(obj)
+    if known is not None:
+        return known.prepare
+    make, _, _ = _plan_bound(obj)
+    return lambda progress: make(progress).prepare(progress)
+
+
+def plan_settled(obj, depsgraph=None, waits=True):
     """Read a bound object and where its handles are.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    depsgraph : bpy.types.Depsgraph, optional
+        Where the handles are read; otherwise as the viewport shows them.
+    waits : bool
+        Take the time to make all that is missing; otherwise, if nothing is there yet, a quick result has to do.
 
     Returns
     -------
     callable
-        From a progress callback to the factors, made if there are none, the points, and the displacements.
+        From a progress callback to the `Live`, made if there is none, the points, the displacements, and whether these
+        are settled.
     ndarray
         The pose.
     """
     known = find(obj)
     if known is None:
-        rest, constraints = binding.read_rest(obj), binding.read_constraints(obj)
-        matrix = np.reshape(obj.meshfree.deform.matrix, (3, 3)).astype(np.float64)
-        make = plan_factors(obj, rest, matrix, constraints)
+        make, rest, constraints = _plan_bound(obj)
     else:
         rest, constraints = known.rest, known.constraints
     goal, steps = binding.goal(obj, constraints, rest, depsgraph), obj.meshfree.deform.steps
 
     def compute(progress):
         live = known or make(progress)
-        return live, *displaced(live, goal, steps, progress=progress)
+        settled = waits or known is not None or live.exact is not None
+        return live, *displaced(live, goal, steps if settled else None, progress=progress), settled
 
     return compute, binding.read_pose(obj, depsgraph)
+
+
+def _plan_bound(obj):
+    """Read a bound object; return what makes its `Live`, its points at rest, and its constraints."""
+    rest, constraints = binding.read_rest(obj), binding.read_constraints(obj)
+    matrix = np.reshape(obj.meshfree.deform.matrix, (3, 3)).astype(np.float64)
+    return plan_factors(obj, rest, matrix, constraints), rest, constraints
 
 
 def write(obj, live, points, displacement, pose, settled=True):
@@ -203,14 +264,14 @@ def update(obj, depsgraph=None, quick=False, waits=True):
             _troubles.pop(obj.session_uid, None)  # it was at another pose
         return
     live = find(obj)
-    if not quick and (waits or live is not None):
-        live, points, displacement = plan_settled(obj, depsgraph)[0](lambda stage, fraction: None)
+    if not quick and (waits or is_prepared(obj)):
+        live, points, displacement, _ = plan_settled(obj, depsgraph)[0](lambda stage, fraction: None)
         keep(obj, live)
         write(obj, live, points, displacement, pose)
         return
     if live is not None:
         goal = binding.goal(obj, live.constraints, live.rest, depsgraph)
-        points, displacement = displaced(live, goal, steps=1, start=live.last.get(obj.session_uid))
+        points, displacement = displaced(live, goal, start=live.last.get(obj.session_uid))
         write(obj, live, points, displacement, pose, settled=False)
     settle_later(obj)
 
@@ -320,11 +381,11 @@ def _start(obj, key, pose, depsgraph):
     if binding.same_pose(_troubles.get(obj.session_uid, (None, None))[1], pose):
         return False  # it would go wrong again
     # A setting that is dragged must not start a thread for each value. Before the first factors waiting is of no use.
-    prepares = key not in _lives
+    prepares = not is_prepared(obj)
     if prepares and running() is not None:
         return True
     if perf_counter() >= _due or all(known[0] != key[0] for known in _lives):
-        compute, pose = plan_settled(obj, depsgraph)
+        compute, pose = plan_settled(obj, depsgraph, waits=False)
         job = _jobs[obj.session_uid] = _Settling(Job("Bind", [], compute), key, pose, prepares)
         if prepares:  # takes long: it is shown as other work is, and Esc ends it
             with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
@@ -335,15 +396,16 @@ def _start(obj, key, pose, depsgraph):
 def _take(obj, job, key, pose):
     """Write what a thread has computed, unless it is past."""
     try:
-        live, points, displacement = job.work.result()
+        live, points, displacement, settled = job.work.result()
     except Cancelled:
         if job.prepares and job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
-            _troubles[obj.session_uid] = "Binding was stopped. Press Update, or move a handle", pose
+            work = "Binding" if find(obj) is None else "The exact result"
+            _troubles[obj.session_uid] = f"{work} was stopped. Press Update, or move a handle", pose
         return
     if job.key == key:
         keep(obj, live)
         if binding.same_pose(job.pose, pose):
-            write(obj, live, points, displacement, pose)
+            write(obj, live, points, displacement, pose, settled)
 
 
 def _is_playing():

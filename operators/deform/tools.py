@@ -124,7 +124,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         live.update(obj)
         moved, stay = len(made.constraints.moved), len(made.constraints.kept)
         way = f'Move "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
-        return [*made.deformer.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
+        return [*made.follower.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
 
 
 def _add_empty(context, obj, name, rest, rows):
@@ -202,11 +202,12 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
         return lambda progress: (pose, *compute(progress))
 
     def write(self, context, obj, result):
-        pose, made, points, displacement = result
+        pose, made, points, displacement, _ = result
         live.keep(obj, made)
         live.write(obj, made, points, displacement, pose)
-        distance = np.linalg.norm(points - made.deformer.points, axis=1)
-        notices = [] if made.deformer.converged else ["The turns of details were still changing. Raise Steps."]
+        distance = np.linalg.norm(points - made.follower.points, axis=1)
+        converged = made.exact is None or made.exact.converged
+        notices = [] if converged else ["The turns of details were still changing. Raise Steps."]
         return [*notices, f"{obj.name}: moved at most by {length_text(distance.max())}"]
 
 

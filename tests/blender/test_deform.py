@@ -1,5 +1,6 @@
 """Deformation: bound once, the points follow their handles by themselves, in this file and when it is opened again."""
 
+import functools
 import importlib
 import os
 import re
@@ -240,6 +241,111 @@ class TestFollowing:
         lift(bind(), 1.0)
         bpy.ops.meshfree.analyze(show=False)
         assert_allclose(attribute(strip, "lb_area"), areas, rtol=1e-5)
+
+
+class TestManyPoints:
+    """Where points are many, some of them carry the others until the handles rest."""
+
+    @pytest.fixture(autouse=True)
+    def few(self, core, live, monkeypatch):
+        """Take a strip for many points."""
+        monkeypatch.setattr(live, "CoarseDeformer", functools.partial(core.CoarseDeformer, count=300))
+
+    @pytest.fixture
+    def unattended(self, live):
+        """Let nothing follow by itself, as a script in the background would have it settled at once."""
+        handlers = bpy.app.handlers.depsgraph_update_post
+        place = [function.__module__ for function in handlers].index(live.__name__)
+        following = handlers.pop(place)
+        yield
+        handlers.insert(place, following)
+
+    def rest(self, live, obj):
+        """Do what the timer does, until nothing is left to do."""
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        live._due, seen = 0.0, []
+        while live._attend(obj, depsgraph):
+            live._due = 0.0
+            for job in [*live._jobs.values()]:
+                job.work.wait(60.0)
+                seen.append(live.is_prepared(obj))
+        return seen
+
+    def expected(self, core, points):
+        """What all points do when the handles go up by 0.7."""
+        laplacian = core.build_laplacian(points, options=core.LaplacianOptions(orient=True))
+        deformer = core.Deformer(laplacian, is_end(points), points[:, 0] < 0.25)
+        return deformer.solve(points[deformer.handles] + (0.0, 0.0, 0.7)) - points
+
+    def test_roughly_while_dragged_and_exactly_at_rest(self, core, live, binding, strip, unattended):
+        before = local_points(strip)
+        lift(bind(), 0.7)
+        assert live.find(strip).exact is None
+        live.update(strip, quick=True)
+        live.update(strip, quick=True)
+        rough, exact = displacement(strip), self.expected(core, before)
+        assert live.find(strip).exact is None
+        assert not binding.written_pose(strip)[1]
+        assert_allclose(rough[is_end(before)], np.tile([0.0, 0.0, 0.7], (is_end(before).sum(), 1)), atol=1e-5)
+        assert 1e-5 < np.abs(rough - exact).max() < 0.05
+        assert self.rest(live, strip)
+        assert binding.written_pose(strip)[1]
+        assert_allclose(displacement(strip), exact, atol=1e-4)
+
+    def test_an_opened_file_follows_before_it_is_exact(self, core, live, binding, strip, unattended):
+        before = local_points(strip)
+        lift(bind(), 0.7)
+        live._forget()
+        live.update(strip, quick=True)
+        assert not displacement(strip).any()
+        live._attend(strip, bpy.context.evaluated_depsgraph_get())
+        (job,) = live._jobs.values()
+        job.work.wait(60.0)
+        live._attend(strip, bpy.context.evaluated_depsgraph_get())
+        assert live.find(strip).exact is None
+        assert_allclose(displacement(strip)[is_end(before), 2], 0.7, atol=1e-5)
+        assert "Bound: follows its handles" in draw()
+        self.rest(live, strip)
+        assert_allclose(displacement(strip), self.expected(core, before), atol=1e-4)
+
+    def test_the_panel_tells_that_it_will_be_exact(self, live, strip, unattended):
+        bind()
+        work = SimpleNamespace(stage="Factors", fraction=0.5)
+        live._jobs[strip.session_uid] = live._Settling(work, (), np.zeros(2), prepares=True)
+        try:
+            assert "Follows its handles roughly. Exact soon: Factors, 50%" in " ".join(draw())
+        finally:
+            live._jobs.clear()
+
+    def test_esc_leaves_what_was_dragged(self, core, live, strip, unattended):
+        lift(bind(), 0.7)
+        live.update(strip, quick=True)
+        rough = displacement(strip)
+        live._due = 0.0
+        live._attend(strip, bpy.context.evaluated_depsgraph_get())
+        (job,) = live._jobs.values()
+        job.work.stop()
+        live._attend(strip, bpy.context.evaluated_depsgraph_get())
+        assert not live._attend(strip, bpy.context.evaluated_depsgraph_get())
+        assert "The exact result was stopped" in live.trouble(strip)
+        assert_allclose(displacement(strip), rough)
+
+    def test_a_script_waits_for_what_is_exact(self, core, strip):
+        before = local_points(strip)
+        lift(bind(), 0.7)
+        assert_allclose(displacement(strip), self.expected(core, before), atol=1e-4)
+
+    def test_what_is_baked_is_exact(self, live, strip, monkeypatch):
+        animate(bind())
+        bpy.ops.meshfree.deform_bake()
+        bpy.context.scene.frame_set(3)
+        baked = shown_points(strip)
+        bpy.ops.meshfree.deform_free()
+        monkeypatch.undo()
+        live._forget()
+        bpy.context.scene.frame_set(2)
+        bpy.context.scene.frame_set(3)
+        assert_allclose(shown_points(strip), baked, atol=1e-5)
 
 
 class TestFrames:

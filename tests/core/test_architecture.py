@@ -74,6 +74,7 @@ BELOW = {  # what each wing of core may use
     "files": GROUND,
 }
 SIDEWAYS = {  # applications that build on others
+    ("coarse_deformation", "deformation"),
     ("deformation", "rotations"),
     ("fields", "graph"),
     ("geodesics", "graph"),

@@ -1,4 +1,4 @@
-"""The order of sparse equations: a permutation that keeps factors small, whatever the points are like."""
+"""Sparse equations: an order that keeps factors small, whatever the points are like, and Cholesky's factors."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,8 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 import core
-from core.operator.factors import dissection_order
+from core.operator.cholesky import factorize
+from core.operator.factors import dissect
 
 
 def near_matrix(points, reach):
@@ -31,7 +32,7 @@ def fill(matrix, order):
 def test_factors_are_hardly_larger_than_those_of_minimum_degree():
     points = square(1500)
     matrix = near_matrix(points, 0.1306)  # 76 entries in a row, as the equations of a deformation have
-    order = dissection_order(matrix, points)
+    order = dissect(matrix, points)[0]
     assert np.array_equal(np.sort(order), np.arange(1500))
     least = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).nnz
     assert fill(matrix, order) < 1.17 * least
@@ -52,7 +53,7 @@ def test_factors_are_hardly_larger_than_those_of_minimum_degree():
     ids=["none", "one", "one place", "all coupled", "line", "two components", "none coupled"],
 )
 def test_any_points_are_ordered(points, reach):
-    order = dissection_order(near_matrix(points, reach), points)
+    order = dissect(near_matrix(points, reach), points)[0]
     assert np.array_equal(np.sort(order), np.arange(len(points)))
 
 
@@ -62,4 +63,55 @@ def test_it_may_be_stopped():
 
     points = square(500)
     with pytest.raises(core.Cancelled):
-        dissection_order(near_matrix(points, 0.1), points, stop)
+        dissect(near_matrix(points, 0.1), points, stop)
+
+
+@pytest.mark.parametrize(
+    ("points", "reach"),
+    [
+        (np.zeros((1, 3)), 1.0),
+        (square(400), 2.0),
+        (square(1500), 0.13),
+        (square(1000) * (1.0, 0.0, 0.0), 0.01),
+        (np.concatenate([square(500), square(500, 1) + 100.0]), 0.1),
+        (square(500), 1e-9),
+    ],
+    ids=["one", "all coupled", "sheet", "line", "two components", "none coupled"],
+)
+@pytest.mark.parametrize("shape", [(), (1,), (3,)])
+def test_factors_solve_the_equations(points, reach, shape, monkeypatch):
+    monkeypatch.setattr("core.operator.cholesky._WIDEST", 50)  # so that parts are cut
+    matrix = near_matrix(points, reach)
+    order, starts = dissect(matrix, points)
+    ordered = matrix[order][:, order]
+    right = np.random.default_rng(0).standard_normal((len(points), *shape))
+    given = right.copy()
+    found = factorize(ordered, starts)(right)
+    assert found.shape == right.shape
+    np.testing.assert_allclose(ordered @ found, right, atol=1e-10)
+    np.testing.assert_array_equal(right, given)
+
+
+def test_equations_without_a_single_solution_are_refused():
+    points = square(300)
+    matrix = near_matrix(points, 0.2) - sparse.diags_array(np.full(300, 1.0 + 1e-6))
+    order, starts = dissect(matrix, points)
+    with pytest.raises(core.SolverError, match="equations of 300 points have no single solution"):
+        factorize(matrix[order][:, order], starts)
+
+
+def test_factors_tell_how_far_they_are_and_may_be_stopped():
+    points = square(3000)
+    matrix = near_matrix(points, 0.05)
+    order, starts = dissect(matrix, points)
+    shares = []
+    factorize(matrix[order][:, order], starts, shares.append)
+    assert len(shares) > 10
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+
+    def stop(share):
+        raise core.Cancelled
+
+    with pytest.raises(core.Cancelled):
+        factorize(matrix[order][:, order], starts, stop)

@@ -1,0 +1,97 @@
+"""Fewer points for the same surface, spread as evenly as the given ones let them."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..blocks import blocks
+
+_STEP = 2.0  # each pass leaves a quarter of the points
+_NEIGHBORS = 25  # the point itself and more than a pass lets go of
+_FILL = 0.49  # points that stay in a square whose side is their least distance, about
+_SEED = 0
+_BLOCK = 1 << 15
+
+
+def thin(points, areas, spacing, count, rank=None, report=lambda: None):
+    """Choose some of the points so that no two are close to each other, and none of the others is far from all.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+        Coordinates [L].
+    areas : ndarray, (n,)
+        Their area elements [L^2].
+    spacing : ndarray, (n,)
+        Lengths that are to vary as the distances between chosen points do, of any size.
+    count : int
+        How many to choose, about.
+    rank : ndarray, (n,) int, optional
+        Points of a higher rank are chosen before others. Those of different ranks above zero do not displace each
+        other.
+    report : callable
+        Called now and then; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (k,) int
+        Indices of the chosen points, ascending. They depend on where the points are and not on their order.
+
+    Notes
+    -----
+    A maximal independent set of the graph of close points, by priorities drawn at random (Luby 1986), in passes of
+    which each doubles the distance, so that the work is linear in the number of points.
+    """
+    n = len(points)
+    rank = np.zeros(n, dtype=np.int64) if rank is None else rank
+    if count >= n:
+        return np.arange(n)
+    reach = spacing * np.sqrt(_FILL * np.sum(areas / spacing**2) / count)
+    priority = np.empty(n)
+    priority[np.lexsort(points.T)] = np.random.default_rng(_SEED).permutation(n)
+    priority = np.argsort(np.argsort(priority + n * rank))
+    passes = max(1, int(np.ceil(np.log(n / count) / np.log(_STEP**2))))
+    chosen = np.arange(n)
+    for step in range(passes):
+        share = reach[chosen] / _STEP ** (passes - 1 - step)
+        chosen = chosen[_independent(points[chosen], share, priority[chosen], rank[chosen], report)]
+    return chosen
+
+
+def _independent(points, reach, priority, rank, report):
+    """Return which points have none of a higher priority within reach that stays, (m,) bool."""
+    pairs = [_close_pairs(*found, reach, rank) for found in nearest_in_blocks(points, points, _NEIGHBORS, report)]
+    first, second = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
+    row, other = np.concatenate([first, second]), np.concatenate([second, first])
+    weaker = priority[row] < priority[other]
+    row, other = row[weaker], other[weaker]
+    stays, open_ = np.zeros(len(points), dtype=bool), np.ones(len(points), dtype=bool)
+    while open_.any():
+        report()
+        beaten = np.zeros(len(points), dtype=bool)
+        beaten[row] = True
+        winners = open_ & ~beaten
+        stays |= winners
+        open_ &= ~winners
+        open_[row[winners[other]]] = False
+        left = open_[row] & open_[other]
+        row, other = row[left], other[left]
+    return stays
+
+
+def _close_pairs(start, distance, index, reach, rank):
+    """Return the pairs of some points and their neighbours of which only one may stay, as two arrays."""
+    row = np.repeat(np.arange(start, start + len(index)), index.shape[1])
+    other = index.ravel()
+    apart = (rank[row] > 0) & (rank[other] > 0) & (rank[row] != rank[other])
+    close = (2.0 * distance.ravel() < reach[row] + reach[other]) & (row != other) & ~apart
+    return row[close], other[close]
+
+
+def nearest_in_blocks(sources, points, count, report=lambda: None):
+    """Find the nearest sources of points; yield the first row of each block, distances and indices, (b, count)."""
+    tree = cKDTree(sources)
+    count = min(count, len(sources))
+    for rows in blocks(len(points), _BLOCK):
+        report()
+        distance, index = tree.query(points[rows], k=range(1, count + 1), workers=-1)
+        yield rows.start, distance, index

@@ -1,0 +1,143 @@
+"""Factors of sparse symmetric equations: Cholesky's, in dense fronts along a dissection."""
+
+from itertools import pairwise
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg.lapack import dpotrf, dtrtri
+
+from ..blocks import blocks
+from ..errors import SolverError
+
+_BANDS = 6  # in which the lower half of a matrix is gone through
+_WIDEST = 512  # unknowns that are eliminated at one time, so that no step takes long
+
+
+def factorize(matrix, starts, report=lambda fraction: None):
+    """Factorise a sparse symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    matrix : sparse array, (m, m)
+        Its unknowns in the order that `dissect` gives, or factors become large.
+    starts : ndarray, (k,) int
+        The first unknown of each part, as `dissect` gives them.
+    report : callable
+        Called with the share that is done after each part, which takes a fraction of a second; may raise `Cancelled`.
+
+    Returns
+    -------
+    callable
+        Solves for a right-hand side, (m,) or (m, k).
+
+    Raises
+    ------
+    SolverError
+        The matrix is not positive definite: some component of the surface has nothing that holds it.
+
+    Notes
+    -----
+    The multifrontal method (Duff and Reid 1983): the unknowns of a part are eliminated in a dense matrix of themselves
+    and of all later ones that they are coupled with, and what is left of it is added to that of the part after.
+    Nearly all of the work is done by dense products, in half of the time that SuperLU takes for factors of both
+    sides, and in less than half of the room.
+    """
+    count = matrix.shape[0]
+    bounds = _bounds(starts, count)
+    lower = sparse.tril(matrix, format="csc")
+    report(0.0)
+    coupled, parent = _coupled(lower, bounds)
+    report(0.0)
+    width, size = np.diff(bounds)[:, 0], np.array([len(rows) for rows in coupled])
+    work = width * (width + size) ** 2.0
+    done = np.cumsum(work) / work.sum()
+    place = np.empty(count, dtype=np.intp)  # of unknowns in the front
+    children = [[] for _ in bounds]
+    factors = Factors(count)
+    for number, ((start, end), rows) in enumerate(zip(bounds, coupled, strict=True)):
+        width = end - start
+        place[start:end], place[rows] = np.arange(width), np.arange(width, width + len(rows))
+        front = np.zeros((width + len(rows),) * 2, order="F")
+        entries = slice(lower.indptr[start], lower.indptr[end])
+        column = np.repeat(np.arange(width), np.diff(lower.indptr[start : end + 1]))
+        front[place[lower.indices[entries]], column] = lower.data[entries]
+        for own, left in children[number]:
+            _add(front, place[own], left)
+        children[number] = None
+        own, info = dpotrf(front[:width, :width], lower=1, clean=1)
+        if info:
+            raise SolverError(
+                f"The equations of {count} points have no single solution. Fix some points on every component."
+            )
+        inverse = dtrtri(own, lower=1)[0]
+        below = front[width:, :width] @ inverse.T
+        factors.append(start, end, rows, inverse, below)
+        if len(rows):
+            left = front[width:, width:]
+            left -= below @ below.T
+            children[parent[number]].append((rows, left))
+        report(done[number])
+    return factors.solve
+
+
+def _bounds(starts, count):
+    """Return the first unknown of each part and the one after its last, of parts that are not too wide."""
+    cuts = [
+        np.linspace(start, end, (end - start - 1) // _WIDEST + 2).astype(int)[:-1]
+        for start, end in pairwise([*starts, count])
+    ]
+    return list(pairwise([*np.concatenate(cuts).tolist(), count]))
+
+
+def _coupled(lower, bounds):
+    """Return which later unknowns each part is coupled with once those before are eliminated, and its next part."""
+    part = np.repeat(np.arange(len(bounds)), [end - start for start, end in bounds])
+    found, parent = [[] for _ in bounds], np.full(len(bounds), -1)
+    result = []
+    for number, (start, end) in enumerate(bounds):
+        rows = np.unique(np.concatenate([lower.indices[lower.indptr[start] : lower.indptr[end]], *found[number]]))
+        rows = rows[np.searchsorted(rows, end) :]
+        found[number] = None
+        result.append(rows)
+        if len(rows):
+            parent[number] = part[rows[0]]
+            found[parent[number]].append(rows)
+    return result, parent
+
+
+def _add(front, place, left):
+    """Add the lower half of what is left of an earlier front, at its places in this one, which ascend."""
+    if place[-1] - place[0] == len(place) - 1:
+        front[place[0] : place[-1] + 1, place[0] : place[-1] + 1] += left
+        return
+    for columns in blocks(len(place), -(-len(place) // _BANDS)):
+        rows = slice(columns.start, None)
+        front.T[place[columns, None], place[rows]] += left.T[columns, rows]  # along memory
+
+
+class Factors:
+    """The inverse of the lower factor of a matrix, as a product over dense parts.
+
+    Parameters
+    ----------
+    count : int
+        Unknowns.
+    """
+
+    def __init__(self, count):
+        self._count, self._parts = count, []
+
+    def append(self, start, end, rows, inverse, below):
+        """Add the next part: its unknowns from start to end, the later rows, the inverse factor, and that below it."""
+        self._parts.append((start, end, rows, np.concatenate([inverse, -below @ inverse])))
+
+    def solve(self, right):
+        """Solve for a right-hand side, (m,) or (m, k)."""
+        values = np.array(np.reshape(right, (self._count, -1)).T, dtype=np.float64, order="C")
+        for start, end, rows, part in self._parts:
+            found = values[:, start:end] @ part.T
+            values[:, start:end] = found[:, : end - start]
+            values[:, rows] += found[:, end - start :]
+        for start, end, rows, part in reversed(self._parts):
+            values[:, start:end] = np.concatenate([values[:, start:end], values[:, rows]], axis=1) @ part
+        return values.T.reshape(np.shape(right))
