@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_symbol, symbol
+from ..memory import check_mode_memory
 
 _DEGREE = 6  # of the polynomial that the Lanczos steps work on, at least
 _FLAT = 4.0  # the symbol hardly rises beyond
@@ -38,6 +39,7 @@ def solve_spectrum(laplacian, stiffness, count, progress=None):
         raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
     if count > n // 3:
         raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
+    check_mode_memory(n, int(count))
     try:
         values, vectors = lowest_eigenpairs(
             laplacian, stiffness, int(count), progress or (lambda stage, fraction: None)
