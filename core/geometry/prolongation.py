@@ -1,6 +1,7 @@
 """From some points to all: what was computed on a subset is carried to the points between."""
 
 import numpy as np
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..blocks import blocks, on_all_cores
@@ -8,9 +9,11 @@ from ..errors import InvalidPointsError
 from .nearest import SMOOTH
 from .points import check_points, check_values
 from .quadrics import frames
+from .subset import voxel_numbers
 
 _NEIGHBORS = 9  # of the subset around each point
 _BLOCK = 1 << 14  # points worked on at one time
+_CELLS = 64  # along the longest side of the cloud: points go cell by cell, so that neighbours are near in memory
 _STEEP = 10.0  # how much farther than along the surface a point of the subset counts as lying, across it
 _CLOSE = 1e-6  # of the reach: a point of the subset takes its own value
 _LEVEL = 1e-3  # of the scatter of the neighbours, below which they lie in a row
@@ -80,14 +83,17 @@ class Prolongation:
                 " points in the subset. Give one row per point of it."
             )
         tree, width = cKDTree(chosen), min(_NEIGHBORS, len(chosen))
-        self.nearest = np.empty(count, dtype=np.int32)
+        low, extent = points.min(axis=0), np.ptp(points, axis=0).max()
+        self._order = np.argsort(voxel_numbers(points, low, extent / _CELLS + 1e-300), kind="stable").astype(np.int32)
         self._index = np.empty((count, width), dtype=np.int32)
         self._weight = np.empty((count, width), dtype=np.float32)
+        self.nearest = np.empty(count, dtype=np.int32)
 
         def carry(block):
-            index = tree.query(points[block], k=width)[1].reshape(-1, width)
-            first, weight = _weights(points[block], chosen, normals, component, index)
-            self.nearest[block], self._index[block], self._weight[block] = first, index, weight
+            rows = self._order[block]
+            index = tree.query(points[rows], k=width)[1].reshape(-1, width)
+            self.nearest[rows], self._weight[block] = _weights(points[rows], chosen, normals, component, index)
+            self._index[block] = index
 
         on_all_cores(carry, blocks(count, _BLOCK), progress or (lambda: None))
 
@@ -104,11 +110,15 @@ class Prolongation:
         ndarray, (n,) or (n, m) float32
             On all points; on those of the subset as given.
         """
-        values = np.asarray(values)
+        values = np.ascontiguousarray(values, dtype=np.float32)
         result = np.empty((len(self.nearest), *values.shape[1:]), dtype=np.float32)
+        width = self._index.shape[1]
 
         def carry(block):
-            result[block] = np.einsum("ij,ij...->i...", self._weight[block], values[self._index[block]])
+            index, weight = self._index[block], self._weight[block]
+            start = np.arange(0, index.size + 1, width, dtype=np.int32)
+            matrix = sparse.csr_array((weight.ravel(), index.ravel(), start), shape=(len(index), len(values)))
+            result[self._order[block]] = matrix @ values
 
         on_all_cores(carry, blocks(len(result), _BLOCK))
         return result

@@ -15,7 +15,7 @@ _SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that tell
 _TRIALS = 8  # of voxels, or of radii
 
 
-def blue_noise_subset(points, count):
+def blue_noise_subset(points, count, *, progress=None):
     """Choose points that are evenly spread over the surface, none close to another: a Poisson-disc subset.
 
     Of each voxel of a fine grid the point next to its centre is a candidate. Of candidates closer than a radius one
@@ -28,6 +28,8 @@ def blue_noise_subset(points, count):
         Coordinates [L].
     count : int
         How many to choose at most.
+    progress : callable, optional
+        Called without arguments at each trial; may raise `Cancelled`.
 
     Returns
     -------
@@ -55,6 +57,7 @@ def blue_noise_subset(points, count):
     >>> print(180 <= len(core.blue_noise_subset(points, 200)) <= 200)
     True
     """
+    report = progress or (lambda: None)
     points = check_points(points)
     if int(count) != count or count < 1:
         raise InvalidPointsError(f"A subset of {count!r} points was asked for. Ask for a whole number of at least 1.")
@@ -62,19 +65,20 @@ def blue_noise_subset(points, count):
     extent = float(np.max(points.max(axis=0) - low))
     if extent == 0.0:
         return np.array([0])
-    chosen, keys = _candidates(points, low, extent, int(count))
+    chosen, keys = _candidates(points, low, extent, int(count), report)
     if len(chosen) > count:
-        chosen = chosen[_thin(points[chosen], keys, int(count))]
+        chosen = chosen[_thin(points[chosen], keys, int(count), report)]
     return np.sort(chosen)
 
 
-def _candidates(points, low, extent, count):
+def _candidates(points, low, extent, count, report):
     """Return a point of each voxel, and the numbers of these voxels, few more than are needed."""
     finest = extent / _FINEST
     wanted = _CANDIDATES * count
     edge = finest if len(points) <= wanted else max(extent * np.sqrt(_VOXELS / wanted), finest)
     for _ in range(_TRIALS):
-        keys = _voxels(points, low, edge)
+        report()
+        keys = voxel_numbers(points, low, edge)
         order = np.argsort(keys)
         ordered = keys[order]
         first = np.flatnonzero(np.diff(ordered, prepend=-1))
@@ -85,8 +89,8 @@ def _candidates(points, low, extent, count):
     return _central(points, order, first, low, edge), ordered[first]
 
 
-def _voxels(points, low, edge):
-    """Return the numbers of the voxels that points lie in."""
+def voxel_numbers(points, low, edge):
+    """Return the numbers of the voxels that points lie in, from the lowest corner on; near ones are mostly near."""
     keys = np.zeros(len(points), dtype=np.int64)
     for axis in range(3):
         keys <<= 21
@@ -108,7 +112,7 @@ def _central(points, order, first, low, edge):
     return order[nearest[np.diff(voxel[nearest], prepend=-1) > 0]]
 
 
-def _thin(points, keys, count):
+def _thin(points, keys, count, report):
     """Return which of the candidates stay when discs of one radius must not hold another, at most a count of them."""
     rank = _shuffled(keys)
     tree = cKDTree(points)
@@ -117,6 +121,7 @@ def _thin(points, keys, count):
     radius = np.sqrt(_DISCS * area / count)
     below, most, best = 0.0, np.inf, None  # radii that leave too many, and few enough
     for _ in range(_TRIALS):
+        report()
         kept = _discs(tree, rank, radius)
         found = np.count_nonzero(kept)
         if found <= count:

@@ -200,7 +200,7 @@ def _process(path, arguments) -> dict:
 def _analyze(obj, arguments, output):
     check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
     with Stages(bpy.context.window_manager, _kind("analyze").name) as stages:
-        analysis = plan_analysis(bpy.context, obj, arguments.modes)(stages)
+        analysis = plan_analysis(bpy.context, obj, arguments.modes, arguments.write_limit)(stages)
     if sharing_objects(obj):  # by choice, or it would not be writable
         obj.data = obj.data.copy()
     write_result(obj, analysis, arguments.write_limit)
