@@ -40,12 +40,12 @@ class UnresolvedModesError(PointCloudError):
 
 
 class NotEnoughMemoryError(PointCloudError):
-    """More points than the free memory is enough for.
+    """More points, or modes, than the free memory is enough for.
 
     Attributes
     ----------
     fitting : int
-        How many it is enough for.
+        How many points, or modes, it is enough for.
     """
 
     def __init__(self, text, fitting=0):

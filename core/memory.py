@@ -51,12 +51,6 @@ def points_that_fit(options, modes=0):
     -------
     int or None
         None where the machine does not tell how much memory is free.
-
-    Examples
-    --------
-    >>> import core
-    >>> core.points_that_fit(core.LaplacianOptions()) > core.points_that_fit(core.LaplacianOptions(neighbors=200))
-    True
     """
     free = available_memory()
     return None if free is None else int(_SHARE * free / needed_memory(1, options, modes))
@@ -99,13 +93,17 @@ def check_mode_memory(count, modes):
     NotEnoughMemoryError
         They do not fit; the text says how many modes do.
     """
-    free, needed = available_memory(), _PER_MODE * count * modes
-    if free is not None and needed > _SHARE * free:
+    free = available_memory()
+    if free is None:
+        return
+    most = int(_SHARE * free / (_PER_MODE * count))
+    if modes > most:
+        needed = _PER_MODE * count * modes
         raise NotEnoughMemoryError(
             f"{modes} modes of {count:,} points would take about {needed / 2**30:.1f} GB of memory, and"
-            f" {free / 2**30:.1f} GB are free: enough for {int(modes * _SHARE * free / needed)} modes. Ask for fewer,"
+            f" {free / 2**30:.1f} GB are free: enough for {most} modes. Ask for fewer,"
             " use fewer points, or free memory.",
-            fitting=int(_SHARE * free / (_PER_MODE * modes)),
+            fitting=most,
         )
 
 

@@ -67,7 +67,7 @@ class Prolongation:
     >>> every = core.Prolongation(points, subset, laplacian.normals)
     >>> print(np.isclose(every.shares(laplacian.areas).sum(), laplacian.areas.sum()))
     True
-    >>> print(np.abs(every.interpolate(points[subset, 2]) - points[:, 2]).max() < 0.01)
+    >>> print(np.abs(every.interpolate(points[subset, 2]) - points[:, 2]).max() < 0.03)
     True
     """
 

@@ -29,7 +29,6 @@ SHOWN = [
     "mean_curvature",
     "minimal_surface",
     "nodal_domains",
-    "points_that_fit",
     "segment",
     "smooth_points",
     "solve_poisson",
