@@ -108,7 +108,7 @@ def _carry(prolongation, known):
     smooth = np.column_stack([known.normals, known.mean_curvature, known.gaussian_curvature, known.trust])
     smooth = prolongation.interpolate(smooth)
     normals = smooth[:, :3]
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    length = np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
     return Measures(
         areas=prolongation.shares(known.areas),
         normals=np.divide(normals, length, out=prolongation.labels(known.normals), where=length > 0.5),
