@@ -130,9 +130,9 @@ def _subset(points, options, boundary, budget, modes, progress):
         most = budget or _automatic(count, options, modes)
         if most >= count:
             return _ALL
+        progress("Subset", 0.0)
         return blue_noise_subset(points, most, progress=_within(progress, "Subset"))
 
-    progress("Subset", 0.0)
     return cache.fetch(cache.content(points, options, boundary, "subset", budget), choose)
 
 

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ...core import Spectrum, UnresolvedModesError
+from ...core import LaplaceBeltrami, Spectrum, UnresolvedModesError
 from ..objects.attributes import point_count
 from ..objects.options import laplacian_options, point_budget
 from ..objects.reading import read_points
@@ -23,6 +23,7 @@ WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each 
 class Analysis:
     """All that is computed for an object, in lengths of the world; normals in local space too."""
 
+    laplacian: LaplaceBeltrami  # of the subset, where there is one
     measures: Measures
     local_normals: np.ndarray
     spectrum: Spectrum | None
@@ -62,6 +63,7 @@ def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT):
                 times("All Points", 1.0)
                 spectrum = replace(spectrum, eigenvectors=measured.carried(spectrum.eigenvectors[:, :write_limit]))
         return Analysis(
+            laplacian=measured.laplacian,
             measures=measured.measures,
             local_normals=reading.local_normals(measured.measures.normals),
             spectrum=spectrum,
