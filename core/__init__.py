@@ -47,12 +47,14 @@ from .errors import (
     ComponentError,
     InvalidPointsError,
     NotASurfaceError,
+    NotEnoughMemoryError,
     PointCloudError,
     SolverError,
     TooFewPointsError,
     UnresolvedModesError,
 )
-from .geometry import check_points, estimate_normals
+from .geometry import Prolongation, blue_noise_subset, check_points, estimate_normals
+from .memory import points_that_fit
 from .operator import LaplaceBeltrami, Spectrum, build_laplacian, estimate_areas, mean_curvature
 from .options import LaplacianOptions
 from .paper import Stability, check_stability
@@ -68,14 +70,17 @@ __all__ = [
     "LaplacianOptions",
     "MinimalSurface",
     "NotASurfaceError",
+    "NotEnoughMemoryError",
     "PointBlend",
     "PointCloudError",
+    "Prolongation",
     "SolverError",
     "Spectrum",
     "Stability",
     "TooFewPointsError",
     "UnresolvedModesError",
     "band",
+    "blue_noise_subset",
     "boost",
     "build_laplacian",
     "chebyshev_filter",
@@ -95,6 +100,7 @@ __all__ = [
     "minimal_surface",
     "modes_needed",
     "nodal_domains",
+    "points_that_fit",
     "segment",
     "signature_energies",
     "signature_times",

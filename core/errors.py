@@ -39,6 +39,20 @@ class UnresolvedModesError(PointCloudError):
         self.resolved = resolved
 
 
+class NotEnoughMemoryError(PointCloudError):
+    """More points, or modes, than the free memory is enough for.
+
+    Attributes
+    ----------
+    fitting : int
+        How many points, or modes, it is enough for.
+    """
+
+    def __init__(self, text, fitting=0):
+        super().__init__(text)
+        self.fitting = fitting
+
+
 class SolverError(PointCloudError):
     """An iterative solver that did not reach its tolerance."""
 

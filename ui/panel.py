@@ -20,6 +20,7 @@ _SETTINGS = (  # what belongs together
     ("bandwidth", "neighbors", "bandwidth_factor"),
     ("normals", "areas", "regularization"),
     ("curvature_correction", "symbol_correction"),
+    ("point_budget", "most_points"),
 )
 
 
@@ -84,6 +85,8 @@ def _draw_job(layout, job):
 def _draw_result(layout, result):
     """Draw the total area, and of components, boundaries and points left out what is worth telling."""
     lines = [("Total Area", area_text(result.total_area))]
+    if result.subset_count:
+        lines.append(("Analyzed Points", f"{result.subset_count:,}"))
     if result.component_count > 1:
         lines.append(("Components", f"{result.component_count:,}"))
     if result.boundary_count:
@@ -137,8 +140,15 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
             column = layout.column(align=True)
             for name in group:
                 row = column.row(align=True)
-                row.active = name != "boundary" or not obj.meshfree.boundary_group  # a named one is not looked for
+                row.active = _counts(obj.meshfree, name)
                 draw_setting(row, obj.meshfree, name, obj)
+
+
+def _counts(settings, name):
+    """Whether a setting makes a difference as the others are."""
+    if name == "boundary":
+        return not settings.boundary_group  # a named one is not looked for
+    return name != "most_points" or settings.point_budget == "NUMBER"
 
 
 class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):

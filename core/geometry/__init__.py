@@ -5,5 +5,7 @@ from .components import SMALLEST, move_apart
 from .distances import arc_length, arc_squared, circle_arc, pair_heights, projected_distance
 from .nearest import ROUNDS, SMOOTH, find_nearest
 from .points import FEWEST, as_indices, as_mask, check_points, check_values
+from .prolongation import Prolongation
 from .quadrics import frames
+from .subset import blue_noise_subset
 from .thinning import nearest_in_blocks, thin

@@ -41,8 +41,9 @@ def check_points(points):
     if len(given) == 0:
         raise TooFewPointsError("There are no points. Add points, or choose another object.")
     result = given.astype(np.float64, copy=False)
-    bad = int(np.count_nonzero(~np.isfinite(result).all(axis=1)))
-    if bad:
+    finite = np.isfinite(result)
+    if not finite.all():
+        bad = np.count_nonzero(~finite.all(axis=1))
         raise InvalidPointsError(
             f"{bad} of {len(result)} points have coordinates that are not finite (NaN or infinity). Delete these"
             " points."

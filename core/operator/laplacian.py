@@ -8,6 +8,7 @@ from scipy import sparse
 from ..errors import InvalidPointsError
 from ..geometry import arc_length, check_points, move_apart, projected_distance, read_cloud
 from ..kernel import SECOND_MOMENT
+from ..memory import check_memory
 from ..options import LaplacianOptions
 from .areas import NO_AREA, solve_areas
 from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
@@ -184,6 +185,8 @@ class LaplaceBeltrami:
             More modes than a third of the points, or a count below 1.
         UnresolvedModesError
             Modes asked for that vary faster than the smoothing length resolves; never with `raw`.
+        NotEnoughMemoryError
+            More modes than the free memory is enough for, before the start.
         SolverError
             The eigenvalue solver did not converge.
 
@@ -266,7 +269,8 @@ def build_laplacian(
         The input has no sound answer; the text says why and what to do. Its children tell what it is: points, normals
         or a boundary of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighbourhoods need
         (`TooFewPointsError`), points along a curve (`NotASurfaceError`), components of too few points alone
-        (`ComponentError`), areas of eq. (7) that are not positive (`AreaError`).
+        (`ComponentError`), areas of eq. (7) that are not positive (`AreaError`), more points than the free memory is
+        enough for, before the start (`NotEnoughMemoryError`).
 
     See Also
     --------
@@ -296,6 +300,7 @@ def build_laplacian(
     """
     report = progress or (lambda stage, fraction: None)
     points = check_points(points)
+    check_memory(len(points), options)
 
     cloud = read_cloud(points, options, normals, boundary, boundary_distance, report)
     scaled, pairs, notices = cloud.scaled, cloud.pairs, cloud.notices

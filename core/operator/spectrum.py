@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_symbol, symbol
+from ..memory import check_mode_memory
 from .davidson import coarse_to_fine
 from .lanczos import lift_lowest
 
@@ -45,6 +46,7 @@ def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=No
         raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
     if count > n // 3:
         raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
+    check_mode_memory(n, int(count))
     count, done = int(count), 0.0
 
     def report(fraction=0.0):

@@ -200,23 +200,29 @@ def _process(path, arguments) -> dict:
 def _analyze(obj, arguments, output):
     check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
     with Stages(bpy.context.window_manager, _kind("analyze").name) as stages:
-        analysis = plan_analysis(bpy.context, obj, arguments.modes)(stages)
+        analysis = plan_analysis(bpy.context, obj, arguments.modes, arguments.write_limit)(stages)
     if sharing_objects(obj):  # by choice, or it would not be writable
         obj.data = obj.data.copy()
     write_result(obj, analysis, arguments.write_limit)
     if output is not None:
-        arrays = files.analysis_arrays(
-            files.place_of(obj), analysis.laplacian, analysis.mean_curvature, analysis.spectrum
-        )
-        files.save(output, obj, arrays)
+        files.save(output, obj, _arrays(obj, analysis))
     return {
-        "points": len(analysis.laplacian.areas),
+        "points": len(analysis.measures.areas),
         "total_area": analysis.total_area,
         **analysis.counts,
         "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
         "seconds": {name: round(seconds, 3) for name, seconds in analysis.seconds.items()},
         "notices": analysis.notices,
     }
+
+
+def _arrays(obj, analysis):
+    """Arrays of an analysis by name; of one of a subset those that were carried to all points, without an operator."""
+    if analysis.subset_count:
+        return files.attribute_arrays(obj)
+    return files.analysis_arrays(
+        files.place_of(obj), analysis.laplacian, analysis.measures.mean_curvature, analysis.spectrum
+    )
 
 
 def _apply(obj, arguments, output):

@@ -12,7 +12,7 @@ DEFAULTS = LaplacianOptions()
 NAMES = tuple(option.name for option in fields(LaplacianOptions) if option.name != "orient")
 
 # Those, and the settings that say what of the object is read.
-ALL_NAMES = (*NAMES, "boundary_group", "use_modifiers")
+ALL_NAMES = (*NAMES, "boundary_group", "use_modifiers", "point_budget", "most_points")
 
 # Options for kinds of points.
 PRESETS = {
@@ -38,6 +38,11 @@ def settings_values(settings) -> dict:
 def laplacian_options(settings) -> LaplacianOptions:
     """Options of the operator, with oriented normals, which the sign of the mean curvature needs."""
     return LaplacianOptions(orient=True, **settings_values(settings))
+
+
+def point_budget(settings):
+    """How many points an analysis takes at most; 0 for as many as fit the memory, None for all."""
+    return {"AUTO": 0, "ALL": None, "NUMBER": settings.most_points}[settings.point_budget]
 
 
 def _value(value):

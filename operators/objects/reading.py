@@ -86,7 +86,7 @@ class Reading:
     def local_normals(self, normals):
         """Turn normals of the points into unit normals of the local positions: covectors, so by M^T, not M^-1."""
         local = normals @ self.matrix
-        return local / np.linalg.norm(local, axis=1, keepdims=True)
+        return local / np.sqrt(np.einsum("ij,ij->i", local, local))[:, None]
 
 
 def read_points(context, obj) -> Reading:

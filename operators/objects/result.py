@@ -21,7 +21,7 @@ from .attributes import (
     tag_changed,
     write_attribute,
 )
-from .options import settings_values
+from .options import point_budget, settings_values
 from .reading import fingerprint, metric, sharing_objects
 
 EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
@@ -73,24 +73,32 @@ def write_result(obj, analysis, write_limit: int):
         remove_numbered(mesh, EIGENVECTOR, beyond=0)
         for owner in owners:
             owner.pop(EIGENVALUES, None)
-    laplacian = analysis.laplacian
-    write_attribute(mesh, AREA, laplacian.areas)
+    measures = analysis.measures
+    write_attribute(mesh, AREA, measures.areas)
     write_attribute(mesh, NORMAL, analysis.local_normals)
-    write_attribute(mesh, MEAN_CURVATURE, analysis.mean_curvature)
-    write_attribute(mesh, GAUSSIAN_CURVATURE, laplacian.gaussian_curvature)
-    write_attribute(mesh, BOUNDARY, laplacian.boundary)
-    write_attribute(mesh, COMPONENT, laplacian.component)
-    write_attribute(mesh, TRUST, laplacian.trust)
+    write_attribute(mesh, MEAN_CURVATURE, measures.mean_curvature)
+    write_attribute(mesh, GAUSSIAN_CURVATURE, measures.gaussian_curvature)
+    write_attribute(mesh, BOUNDARY, measures.boundary)
+    write_attribute(mesh, COMPONENT, measures.component)
+    write_attribute(mesh, TRUST, measures.trust)
     for owner in owners:
-        _note_analysis(owner, analysis, settings_values(obj.meshfree))
+        _note_analysis(owner, analysis, _settings(obj))
     tag_changed(mesh)
 
 
+def _settings(obj):
+    """Write the settings that results depend on; of the budget only where it asks for a smaller number of points."""
+    kept = obj.meshfree
+    budget = point_budget(kept)
+    return repr(settings_values(kept)) + (f" {budget}" if budget and budget < point_count(obj.data) else "")
+
+
 def _note_analysis(obj, analysis, settings):
-    """Keep on an object what tells of an analysis with some settings."""
+    """Keep on an object what tells of an analysis with some settings, as written."""
     kept = obj.meshfree
     kept.total_area = analysis.total_area
     kept.point_count = point_count(obj.data)
+    kept.subset_count = analysis.subset_count
     for name, count in analysis.counts.items():
         setattr(kept, name, count)
     kept.stages.clear()
@@ -99,7 +107,7 @@ def _note_analysis(obj, analysis, settings):
         stage.name, stage.seconds = name, seconds
     kept.fingerprint = fingerprint(obj)
     kept.metric = metric(obj).reshape(-1)
-    kept.settings_used = repr(settings)
+    kept.settings_used = settings
 
 
 def is_analyzed(obj) -> bool:
@@ -114,7 +122,9 @@ def is_stale(obj, glance=False) -> bool:
     """
     kept = obj.meshfree
     known = fingerprint(obj, glance)
-    if (known and kept.fingerprint != known) or kept.settings_used != repr(settings_values(kept)):
+    if (known and kept.fingerprint != known) or kept.settings_used != _settings(obj):
+        return True
+    if kept.subset_count and point_budget(kept) is None:
         return True
     return not same_lengths(np.reshape(kept.metric, (3, 3)), metric(obj))
 

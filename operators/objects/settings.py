@@ -154,6 +154,24 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         description="Take the points where the modifiers put them; the modifiers must keep their number and order",
         default=False,
     )
+    point_budget: EnumProperty(
+        name="Point Budget",
+        description="How many points Analyze Points and Compute Modes work on; results of a subset, evenly spread over"
+        " the surface, are carried to all points. Other tools always take all",
+        items=(
+            ("AUTO", "Automatic", "All points if the free memory is enough for them, else a subset that fits well"),
+            ("ALL", "All Points", "Every point, or a message that says how many fit the free memory"),
+            ("NUMBER", "Most Points", "A subset of the number below where there are more points"),
+        ),
+        default="AUTO",
+    )
+    most_points: IntProperty(
+        name="Most Points",
+        description="How many points to analyze at most, with Point Budget set to Most Points",
+        default=1_000_000,
+        min=1000,
+        soft_max=10_000_000,
+    )
     make_single_user: BoolProperty(
         name="Make Single User",
         description="Give the object a mesh of its own if it shares its mesh with other objects",
@@ -260,6 +278,11 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     # Results of the last analysis, for the panel and for scripts.
     total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
     point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
+    subset_count: IntProperty(
+        name="Points in the Subset",
+        description="How many points the last analysis worked on, whose results were carried to all; 0 if on all",
+        min=0,
+    )
     component_count: IntProperty(name="Components", description="How many components the surface falls into", min=0)
     boundary_count: IntProperty(
         name="Boundary Points", description="How many points lie at a boundary of the surface", min=0

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature
+from ...core import LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature, points_that_fit
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
 _FACTOR = 12  # bytes of each entry of sparse factors: a number and its row
@@ -40,6 +40,7 @@ def build(points, options, boundary, progress) -> Built:
     """
 
     def compute():
+        fitting(len(points), options)
         laplacian = build_laplacian(points, options=options, boundary=boundary, progress=progress)
         progress("Curvature", 1.0)
         return Built(laplacian, mean_curvature(laplacian))
@@ -49,6 +50,23 @@ def build(points, options, boundary, progress) -> Built:
     with _lock:
         _sources[built.laplacian] = key
     return built
+
+
+def holds(points, options, boundary) -> bool:
+    """Tell whether the operator that `build` returns is kept."""
+    return _get(content(points, options, boundary)) is not None
+
+
+def fitting(count: int, options, modes: int = 0):
+    """Return how many points the free memory is enough for, None if unknown; see `points_that_fit`.
+
+    Where it is not enough for a count, what is kept is given back first.
+    """
+    most = points_that_fit(options, modes)
+    if most is None or most >= count:
+        return most
+    clear()
+    return points_that_fit(options, modes)
 
 
 def lowest_modes(laplacian, count: int, progress, dirichlet=False, raw=False) -> Spectrum:

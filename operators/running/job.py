@@ -8,7 +8,7 @@ from bpy.app.handlers import persistent
 
 from ...core import Cancelled, PointCloudError
 from ..objects.handlers import add_handlers, remove_handlers, tell
-from ..objects.options import settings_values
+from ..objects.options import point_budget, settings_values
 from ..objects.reading import find_object, fingerprint, metric, obstacle, read_points
 from ..objects.result import same_lengths
 from .ready import ReadyOperator, reporting
@@ -67,7 +67,7 @@ class Snapshot:
 def _state(context, obj):
     """What of an object decides about results, beside its scale."""
     seen = hash(read_points(context, obj).points.tobytes()) if obj.meshfree.use_modifiers else None
-    return fingerprint(obj), repr(settings_values(obj.meshfree)), seen
+    return fingerprint(obj), repr(settings_values(obj.meshfree)), point_budget(obj.meshfree), seen
 
 
 class Job(StageTimes):

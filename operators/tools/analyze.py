@@ -1,6 +1,6 @@
 """Areas, normals, curvature, boundary and components of the active object's points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -8,11 +8,12 @@ from bpy.props import BoolProperty, IntProperty
 
 from ...core import LaplaceBeltrami, Spectrum, UnresolvedModesError
 from ..objects.attributes import point_count
-from ..objects.options import laplacian_options
+from ..objects.options import laplacian_options, point_budget
 from ..objects.reading import read_points
 from ..objects.result import analysis_names, area_text, write_result
 from ..running import cache
 from ..running.application import ShownOperator
+from ..running.measures import Measures, measure
 from ..running.stages import StageTimes
 
 WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each takes 4 bytes per point in the file
@@ -22,41 +23,53 @@ WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each 
 class Analysis:
     """All that is computed for an object, in lengths of the world; normals in local space too."""
 
-    laplacian: LaplaceBeltrami
+    laplacian: LaplaceBeltrami  # of the subset, where there is one
+    measures: Measures
     local_normals: np.ndarray
-    mean_curvature: np.ndarray
     spectrum: Spectrum | None
+    subset_count: int  # points that it was computed on; 0 for all
     seconds: dict
     notices: list
 
     @property
     def total_area(self) -> float:
         """Area of the whole surface."""
-        return float(self.laplacian.areas.sum())
+        return float(self.measures.areas.sum())
 
     @property
     def counts(self) -> dict:
         """Components, points at a boundary and points left out, by the names of the settings that keep them."""
-        component = self.laplacian.component
+        component = self.measures.component
         return {
             "component_count": int(component.max()) + 1,
-            "boundary_count": int(np.count_nonzero(self.laplacian.boundary)),
+            "boundary_count": int(np.count_nonzero(self.measures.boundary)),
             "left_out_count": int(np.count_nonzero(component < 0)),
         }
 
 
-def plan_analysis(context, obj, modes: int = 0):
-    """Read an object; return a function of a progress callback that analyzes it, with the lowest modes if any."""
+def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT):
+    """Read an object; return a function of a progress callback that analyzes it, with the lowest modes if any.
+
+    Of a subset no more modes than `write_limit` are carried to all points.
+    """
     reading = read_points(context, obj)
-    options = laplacian_options(obj.meshfree)
+    options, budget = laplacian_options(obj.meshfree), point_budget(obj.meshfree)
 
     def compute(progress):
         with StageTimes(progress) as times:
-            laplacian, curvature = cache.build(reading.points, options, reading.boundary, times)
-            spectrum, unresolved = resolved_modes(laplacian, modes, times) if modes else (None, [])
-        notices = reading.notices + laplacian.notices + unresolved
+            measured = measure(reading.points, options, reading.boundary, budget, modes, times)
+            spectrum, unresolved = resolved_modes(measured.laplacian, modes, times) if modes else (None, [])
+            if spectrum is not None and len(measured.subset):
+                times("All Points", 1.0)
+                spectrum = replace(spectrum, eigenvectors=measured.carried(spectrum.eigenvectors[:, :write_limit]))
         return Analysis(
-            laplacian, reading.local_normals(laplacian.normals), curvature, spectrum, times.seconds, notices
+            laplacian=measured.laplacian,
+            measures=measured.measures,
+            local_normals=reading.local_normals(measured.measures.normals),
+            spectrum=spectrum,
+            subset_count=len(measured.subset),
+            seconds=times.seconds,
+            notices=reading.notices + measured.notices + unresolved,
         )
 
     return compute
@@ -101,7 +114,7 @@ class AnalysisOperator(ShownOperator):
         return self.make_single_user or super().becomes_single(obj)
 
     def plan(self, context, obj):
-        return plan_analysis(context, obj, self.wanted)
+        return plan_analysis(context, obj, self.wanted, self.write_limit)
 
     def write(self, context, obj, result):
         write_result(obj, result, self.write_limit)

@@ -233,7 +233,8 @@ def test_panel_shows_every_setting_that_changes_results(extension):
     options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
     add_object(sphere_points()).meshfree.boundary_group = "Missing"
     texts = draw()
-    assert [name for name in (*options.NAMES, "boundary_group") if texts.count(name) != 1] == []
+    drawn = (*options.NAMES, "boundary_group", "point_budget", "most_points")
+    assert [name for name in drawn if texts.count(name) != 1] == []
 
 
 @pytest.mark.parametrize(

@@ -15,15 +15,15 @@ FAMILY = [kind for kind in vars(errors).values() if isinstance(kind, type) and i
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda error: pickle.loads(pickle.dumps(error))])
 @pytest.mark.parametrize("kind", FAMILY)
 def test_errors_can_be_copied(kind, again):
-    more = {"resolved": 3} if kind is core.UnresolvedModesError else {}
+    more = {core.UnresolvedModesError: {"resolved": 3}, core.NotEnoughMemoryError: {"fitting": 3}}.get(kind, {})
     given = kind('"{0} {x} {" has 4,000 points', **more)
     given.add_note("seen")
     error = again(given)
     assert type(error) is kind
     assert str(error) == '"{0} {x} {" has 4,000 points'
     assert error.__notes__ == ["seen"]
-    if more:
-        assert error.resolved == 3
+    for name, number in more.items():
+        assert getattr(error, name) == number
 
 
 def test_a_file_name_may_hold_braces(tmp_path):

@@ -14,6 +14,8 @@ SHOWN = [
     "LaplaceBeltrami.eigenpairs",
     "LaplacianOptions",
     "LaplacianOptions.paper",
+    "Prolongation",
+    "blue_noise_subset",
     "build_laplacian",
     "check_stability",
     "displace_by_mode",

@@ -1,0 +1,194 @@
+"""From some points to all: what was computed on a subset is carried to the points between."""
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from ..blocks import blocks, on_all_cores
+from ..errors import InvalidPointsError
+from .nearest import SMOOTH
+from .points import check_points, check_values
+from .quadrics import frames
+from .subset import voxel_numbers
+
+_NEIGHBORS = 9  # of the subset around each point
+_BLOCK = 1 << 14  # points worked on at one time
+_CELLS = 64  # along the longest side of the cloud: points go cell by cell, so that neighbours are near in memory
+_STEEP = 10.0  # how much farther than along the surface a point of the subset counts as lying, across it
+_CLOSE = 1e-6  # of the reach: a point of the subset takes its own value
+_LEVEL = 1e-3  # of the scatter of the neighbours, below which they lie in a row
+_BEYOND = 2.0  # scatters beyond the middle of the neighbours up to which values go on in their slope
+
+
+class Prolongation:
+    """Carries areas, functions and labels from a subset of points to all of them, along the surface.
+
+    Each point belongs to the point of the subset that is nearest, steps across the surface counting ten times, so that
+    close sheets stay apart. Functions are interpolated from that one and its neighbours of the same sheet: moving least
+    squares of first order, whose weights rise without bound at the points of the subset, so that these keep their
+    values and functions linear along the surface stay linear: an error of second order in the spacing.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        All points [L].
+    subset : array_like, (k,) int or (n,) bool
+        Which of them hold values.
+    normals : array_like, (k, 3)
+        Unit normals of the surface at these; signs agree on each sheet.
+    component : array_like, (k,) int, optional
+        Numbers of components, which are kept apart.
+    progress : callable, optional
+        Called without arguments again and again; may raise `Cancelled`.
+
+    Attributes
+    ----------
+    nearest : ndarray, (n,) int
+        The row of the subset that each point belongs to.
+
+    Raises
+    ------
+    InvalidPointsError
+        Points, a subset or normals of a wrong shape.
+
+    See Also
+    --------
+    blue_noise_subset : Chooses a subset.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> subset = core.blue_noise_subset(points, 300)
+    >>> laplacian = core.build_laplacian(points[subset])
+    >>> every = core.Prolongation(points, subset, laplacian.normals)
+    >>> print(np.isclose(every.shares(laplacian.areas).sum(), laplacian.areas.sum()))
+    True
+    >>> print(np.abs(every.interpolate(points[subset, 2]) - points[:, 2]).max() < 0.03)
+    True
+    """
+
+    def __init__(self, points, subset, normals, component=None, progress=None):
+        points = check_points(points)
+        count = len(points)
+        subset = _rows(subset, count)
+        chosen, normals = points[subset], check_values(normals, len(subset))
+        component = np.zeros(len(subset), dtype=np.int64) if component is None else np.asarray(component)
+        if normals.shape != chosen.shape or component.shape != chosen.shape[:1]:
+            raise InvalidPointsError(
+                f"Normals have the shape {normals.shape}, components {component.shape}, and there are {len(chosen)}"
+                " points in the subset. Give one row per point of it."
+            )
+        tree, width = cKDTree(chosen), min(_NEIGHBORS, len(chosen))
+        low, extent = points.min(axis=0), np.ptp(points, axis=0).max()
+        self._order = np.argsort(voxel_numbers(points, low, extent / _CELLS + 1e-300), kind="stable").astype(np.int32)
+        self._index = np.empty((count, width), dtype=np.int32)
+        self._weight = np.empty((count, width), dtype=np.float32)
+        self.nearest = np.empty(count, dtype=np.int32)
+
+        def carry(block):
+            rows = self._order[block]
+            index = tree.query(points[rows], k=width)[1].reshape(-1, width)
+            self.nearest[rows], self._weight[block] = _weights(points[rows], chosen, normals, component, index)
+            self._index[block] = index
+
+        on_all_cores(carry, blocks(count, _BLOCK), progress or (lambda: None))
+
+    def interpolate(self, values):
+        """Interpolate functions.
+
+        Parameters
+        ----------
+        values : array_like, (k,) or (k, m)
+            On the subset.
+
+        Returns
+        -------
+        ndarray, (n,) or (n, m) float32
+            On all points; on those of the subset as given.
+        """
+        values = np.ascontiguousarray(values, dtype=np.float32)
+        result = np.empty((len(self.nearest), *values.shape[1:]), dtype=np.float32)
+        width = self._index.shape[1]
+
+        def carry(block):
+            index, weight = self._index[block], self._weight[block]
+            start = np.arange(0, index.size + 1, width, dtype=np.int32)
+            matrix = sparse.csr_array((weight.ravel(), index.ravel(), start), shape=(len(index), len(values)))
+            result[self._order[block]] = matrix @ values
+
+        on_all_cores(carry, blocks(len(result), _BLOCK))
+        return result
+
+    def shares(self, areas):
+        """Share areas, or masses, evenly over the points that belong to each point of the subset: sums are kept.
+
+        Parameters
+        ----------
+        areas : array_like, (k,)
+
+        Returns
+        -------
+        ndarray, (n,)
+        """
+        owned = np.bincount(self.nearest, minlength=len(areas))
+        return (np.asarray(areas) / np.maximum(owned, 1))[self.nearest]
+
+    def labels(self, values):
+        """Give each point what the point of the subset has that it belongs to: truth values, numbers of components.
+
+        Parameters
+        ----------
+        values : array_like, (k,) or (k, m)
+
+        Returns
+        -------
+        ndarray, (n,) or (n, m)
+        """
+        return np.asarray(values)[self.nearest]
+
+
+def _rows(subset, count):
+    """Return the rows of a subset, indices in their order or a mask."""
+    given = np.asarray(subset)
+    if given.dtype == bool and given.shape == (count,):
+        given = np.flatnonzero(given)
+    if given.ndim != 1 or given.dtype.kind not in "iu" or not len(given) or given.min() < 0 or given.max() >= count:
+        raise InvalidPointsError(
+            f"A subset has the shape {given.shape} and type {given.dtype}. Give whole numbers from 0 to {count - 1}, or"
+            f" {count} truth values, at least one."
+        )
+    return given
+
+
+def _weights(points, chosen, normals, component, index):
+    """Return the rows of the subset that some points belong to, (b,), and the weights of their neighbours, (b, 9)."""
+    step = chosen[index] - points[:, None]
+    height = np.einsum("ijk,ijk->ij", normals[index], step)
+    squared = np.einsum("ijk,ijk->ij", step, step)
+    row = np.arange(len(points))
+    best = np.argmin(squared + _STEEP**2 * height**2, axis=1)
+    first = index[row, best]
+
+    own = normals[first]
+    same = (np.einsum("ijk,ik->ij", normals[index], own) > SMOOTH) & (component[index] == component[first][:, None])
+    same[row, best] = True
+    reach = squared.max(axis=1, keepdims=True) * 1.01 + 1e-300
+    weight = np.where(same, (1.0 - squared / reach) / (squared + _CLOSE**2 * reach), 0.0)
+    weight /= weight.sum(axis=1, keepdims=True)
+
+    # In the tangent plane: the value at zero of the linear function that fits the neighbours' values best.
+    u, v = np.einsum("ijk,ikl->lij", step, frames(own)[:, :, 1:])
+    mean_u, mean_v = np.sum(weight * u, axis=1), np.sum(weight * v, axis=1)
+    u, v = u - mean_u[:, None], v - mean_v[:, None]
+    uu, uv, vv = (np.sum(weight * product, axis=1) for product in (u * u, u * v, v * v))
+    scatter = uu + vv
+    beyond = np.sqrt((mean_u**2 + mean_v**2) / np.maximum(scatter, 1e-300))
+    fade = _BEYOND / np.maximum(beyond, _BEYOND)
+    uu, vv = uu + _LEVEL * scatter + 1e-300, vv + _LEVEL * scatter + 1e-300
+    determinant = np.maximum(uu * vv - uv**2, 1e-300)
+    slope_u, slope_v = fade * (vv * mean_u - uv * mean_v), fade * (uu * mean_v - uv * mean_u)
+    return first, weight * (1.0 - (slope_u[:, None] * u + slope_v[:, None] * v) / determinant[:, None])

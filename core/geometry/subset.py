@@ -1,0 +1,171 @@
+"""Fewer points that stand for many: a blue-noise subset, evenly spread over the surface whatever the density was."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidPointsError
+from .points import check_points
+
+_CANDIDATES = 3.0  # voxels for each point wanted: enough to choose from, few enough for their pairs
+_FINEST = 2**21 - 1  # voxels along each axis: three numbers of 21 bits share one of 64
+_DISCS = 0.7  # points a squared radius that discs in random order leave on an area of one
+_VOXELS = 1.5  # voxels that a surface of area one meets for each squared edge, on average over its directions
+_FEW = 0.9  # of the points wanted, which are enough
+_SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that tell of the area
+_TRIALS = 8  # of voxels, or of radii
+
+
+def blue_noise_subset(points, count, *, progress=None):
+    """Choose points that are evenly spread over the surface, none close to another: a Poisson-disc subset.
+
+    Of each voxel of a fine grid the point next to its centre is a candidate. Of candidates closer than a radius one
+    stays, in an order that looks random but follows from the places alone, so that neither the order of the points nor
+    the run makes a difference. The radius is found by trial.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Coordinates [L].
+    count : int
+        How many to choose at most.
+    progress : callable, optional
+        Called without arguments at each trial; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (k,) int
+        Indices, ascending; k lies between nine tenths of the count and the count, or is a little less where the points
+        are many times denser in some places. Of points at one place one at most. All different places where there are
+        no more than the count.
+
+    Raises
+    ------
+    InvalidPointsError
+        Points of a wrong shape or not finite, or a count below 1.
+
+    See Also
+    --------
+    Prolongation : Carries what was computed there to all points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> print(180 <= len(core.blue_noise_subset(points, 200)) <= 200)
+    True
+    """
+    report = progress or (lambda: None)
+    points = check_points(points)
+    if int(count) != count or count < 1:
+        raise InvalidPointsError(f"A subset of {count!r} points was asked for. Ask for a whole number of at least 1.")
+    low = points.min(axis=0)
+    extent = float(np.max(points.max(axis=0) - low))
+    if extent == 0.0:
+        return np.array([0])
+    chosen, keys = _candidates(points, low, extent, int(count), report)
+    if len(chosen) > count:
+        chosen = chosen[_thin(points[chosen], keys, int(count), report)]
+    return np.sort(chosen)
+
+
+def _candidates(points, low, extent, count, report):
+    """Return a point of each voxel, and the numbers of these voxels, few more than are needed."""
+    finest = extent / _FINEST
+    wanted = _CANDIDATES * count
+    edge = finest if len(points) <= wanted else max(extent * np.sqrt(_VOXELS / wanted), finest)
+    for _ in range(_TRIALS):
+        report()
+        keys = voxel_numbers(points, low, edge)
+        order = np.argsort(keys)
+        ordered = keys[order]
+        first = np.flatnonzero(np.diff(ordered, prepend=-1))
+        ratio = len(first) / wanted
+        if edge == finest or 0.8 < ratio < 1.5:
+            break
+        edge = max(edge * np.sqrt(np.clip(ratio, 0.05, 20.0)), finest)
+    return _central(points, order, first, low, edge), ordered[first]
+
+
+def voxel_numbers(points, low, edge):
+    """Return the numbers of the voxels that points lie in, from the lowest corner on; near ones are mostly near."""
+    keys = np.zeros(len(points), dtype=np.int64)
+    for axis in range(3):
+        keys <<= 21
+        keys += ((points[:, axis] - low[axis]) / edge).astype(np.int64)
+    return keys
+
+
+def _central(points, order, first, low, edge):
+    """Return of each voxel the point next to the centre; of several equally near the one with the least coordinates."""
+    distance = np.zeros(len(order))
+    for axis in range(3):
+        place = (points[order, axis] - low[axis]) / edge
+        distance += (place - np.floor(place) - 0.5) ** 2
+    voxel = np.repeat(np.arange(len(first)), np.diff(first, append=len(order)))
+    nearest = np.flatnonzero(distance == np.minimum.reduceat(distance, first)[voxel])
+    if len(nearest) > len(first):
+        x, y, z = points[order[nearest]].T
+        nearest = nearest[np.lexsort((z, y, x, voxel[nearest]))]
+    return order[nearest[np.diff(voxel[nearest], prepend=-1) > 0]]
+
+
+def _thin(points, keys, count, report):
+    """Return which of the candidates stay when discs of one radius must not hold another, at most a count of them."""
+    rank = _shuffled(keys)
+    tree = cKDTree(points)
+    distance = tree.query(points[:: 1 + len(points) // _SAMPLE], k=min(_AROUND, len(points)), workers=-1)[0][:, -1]
+    area = len(points) * np.mean(np.pi * distance**2 / _AROUND)
+    radius = np.sqrt(_DISCS * area / count)
+    below, most, best = 0.0, np.inf, None  # radii that leave too many, and few enough
+    for _ in range(_TRIALS):
+        report()
+        kept = _discs(tree, rank, radius)
+        found = np.count_nonzero(kept)
+        if found <= count:
+            if best is None or found > np.count_nonzero(best):
+                best = kept
+            most = radius
+            if found >= _FEW * count:
+                break
+        else:
+            below = radius
+        radius *= np.sqrt(found / (0.96 * count))
+        if not below < radius < most:
+            radius = 0.5 * (below + most)
+    while best is None:  # far denser in some places than in others
+        radius *= 1.5
+        kept = _discs(tree, rank, radius)
+        best = kept if np.count_nonzero(kept) <= count else None
+    return best
+
+
+def _shuffled(keys):
+    """Return numbers in an order that looks random, for a voxel always the same (the mixing of SplitMix64)."""
+    mixed = keys.astype(np.uint64)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)
+    mixed ^= mixed >> np.uint64(31)
+    rank = np.empty(len(keys), dtype=np.int64)
+    rank[np.argsort(mixed)] = np.arange(len(keys))
+    return rank
+
+
+def _discs(tree, rank, radius):
+    """Return which points stay, (m,) bool, when each, in the order of their ranks, takes all others within a radius."""
+    first, second = tree.query_pairs(radius, output_type="ndarray").T
+    swap = rank[first] > rank[second]
+    first, second = np.where(swap, second, first), np.where(swap, first, second)
+    kept, gone = np.zeros(tree.n, dtype=bool), np.zeros(tree.n, dtype=bool)
+    while True:
+        beaten = gone.copy()
+        beaten[second] = True
+        kept |= ~beaten  # nobody left comes before them
+        taken = kept[first]
+        gone[second[taken]] = True
+        left = ~(gone[first] | gone[second] | taken)
+        if not len(first):
+            return kept
+        first, second = first[left], second[left]

@@ -1,0 +1,165 @@
+"""What an operator takes of the machine's memory, told before the start: Blender must not be ended by the system."""
+
+import ctypes
+import os
+import sys
+from pathlib import Path
+
+from .errors import NotEnoughMemoryError
+
+# Bytes for each neighbour of a point, at the peak of a build: resident memory of builds of 50,000 random points of a
+# sphere, beyond that before, with 45, 117, 262 and 323 neighbours a point (6.8, 14.3, 28.5 and 35.6 kB a point).
+_PER_NEIGHBOR = 110
+_ALONE = 15  # neighbours that would take as much as what each point needs for itself
+_PER_MODE = 40  # bytes a point for each mode: Lanczos vectors, two a mode, the modes in two orders, and one for reserve
+_ADAPTIVE = 0.13  # neighbours of "adaptive" kernels against "local" ones on random points, which have the most
+_SHARE = 0.8  # of the free memory, for what else goes on meanwhile
+_CGROUP = Path("/sys/fs/cgroup")
+
+
+def needed_memory(count, options, modes=0):
+    """Estimate the most memory that an operator takes while it is built and its modes are computed.
+
+    Parameters
+    ----------
+    count : int
+        Points.
+    options : LaplacianOptions
+        The kernel's width decides.
+    modes : int
+        Vibration modes that are to be computed.
+
+    Returns
+    -------
+    int
+        Bytes. Those of random points, which have the widest kernels; even samples take half.
+    """
+    share = _ADAPTIVE if options.bandwidth == "adaptive" else 1.0
+    neighbors = 9.0 * share * options.bandwidth_factor**2 * options.neighbors  # inside of 3 h
+    return int(count * (_PER_NEIGHBOR * (neighbors + _ALONE) + _PER_MODE * modes))
+
+
+def points_that_fit(options, modes=0):
+    """Estimate how many points the free memory is enough for.
+
+    Parameters
+    ----------
+    options, modes
+        See `needed_memory`.
+
+    Returns
+    -------
+    int or None
+        None where the machine does not tell how much memory is free.
+    """
+    free = available_memory()
+    return None if free is None else int(_SHARE * free / needed_memory(1, options, modes))
+
+
+def check_memory(count, options, modes=0):
+    """Refuse to build an operator that does not fit the free memory.
+
+    Parameters
+    ----------
+    count, options, modes
+        See `needed_memory`.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        It does not fit; the text says how many points do.
+    """
+    most = points_that_fit(options, modes)
+    if most is not None and count > most:
+        raise NotEnoughMemoryError(
+            f"{count:,} points would take about {needed_memory(count, options, modes) / 2**30:.1f} GB of memory, and"
+            f" {available_memory() / 2**30:.1f} GB are free: enough for {_rounded(most):,} points. Use fewer points,"
+            " fewer neighbors, or free memory.",
+            fitting=most,
+        )
+
+
+def check_mode_memory(count, modes):
+    """Refuse to compute modes that do not fit the free memory.
+
+    Parameters
+    ----------
+    count : int
+        Points.
+    modes : int
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        They do not fit; the text says how many modes do.
+    """
+    free = available_memory()
+    if free is None:
+        return
+    most = int(_SHARE * free / (_PER_MODE * count))
+    if modes > most:
+        needed = _PER_MODE * count * modes
+        raise NotEnoughMemoryError(
+            f"{modes} modes of {count:,} points would take about {needed / 2**30:.1f} GB of memory, and"
+            f" {free / 2**30:.1f} GB are free: enough for {most} modes. Ask for fewer,"
+            " use fewer points, or free memory.",
+            fitting=most,
+        )
+
+
+def _rounded(count):
+    """Return a number down to two digits, for people."""
+    unit = 10 ** max(len(str(count)) - 2, 0)
+    return count // unit * unit
+
+
+def available_memory():
+    """Return the bytes of memory that can be had without the system ending programs; None where it does not tell."""
+    if sys.platform == "win32":
+        return _windows_memory()
+    if (
+        sys.platform == "darwin"
+    ):  # which calls memory used that it gives at once when asked: half of all is taken as free
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+    known = [free for free in (_linux_memory(), _container_memory()) if free is not None]
+    return min(known, default=None)
+
+
+def _linux_memory(path=Path("/proc/meminfo")):
+    if not path.exists():
+        return None
+    return 1024 * _numbers(path.read_text()).get("MemAvailable:", 0) or None
+
+
+def _container_memory(root=_CGROUP):
+    """Return what the limit of a container leaves, None where there is none; files that were read are given back."""
+    limit, used, kinds = (root / name for name in ("memory.max", "memory.current", "memory.stat"))
+    if not (limit.exists() and used.exists() and kinds.exists()) or limit.read_text().strip() == "max":
+        return None
+    given_back = _numbers(kinds.read_text()).get("inactive_file", 0)
+    return max(int(limit.read_text()) - int(used.read_text()) + given_back, 0)
+
+
+def _numbers(text):
+    """Return the numbers of lines that begin with a name and a number."""
+    fields = (line.split() for line in text.splitlines())
+    return {name: int(number) for name, number, *_ in fields}
+
+
+class _WindowsStatus(ctypes.Structure):
+    """MEMORYSTATUSEX of the Windows API."""
+
+    _fields_ = (
+        ("length", ctypes.c_uint32),
+        ("load", ctypes.c_uint32),
+        ("total", ctypes.c_uint64),
+        ("available", ctypes.c_uint64),
+        *((name, ctypes.c_uint64) for name in ("total_page", "free_page", "total_virtual", "free_virtual", "extended")),
+    )
+
+
+def _windows_memory():
+    status = _WindowsStatus(length=ctypes.sizeof(_WindowsStatus))
+    if not ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
+        return None
+    return status.available

@@ -1,0 +1,178 @@
+"""More points than the budget: a subset is analyzed, and its results carried to all points."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.blender.clouds import RESULTS, add_object, attribute, everything, local_points, result_names, sphere_points
+
+
+@pytest.fixture
+def cache(extension):
+    cache = importlib.import_module(f"{extension.__name__}.operators.running.cache")
+    cache.clear()
+    return cache
+
+
+@pytest.fixture
+def free(core, cache, monkeypatch):
+    """Function that sets how many points the free memory is enough for."""
+    memory = importlib.import_module(f"{core.__name__}.memory")
+    need = memory.needed_memory(1, core.LaplacianOptions())
+    return lambda count: monkeypatch.setattr(memory, "available_memory", lambda: 1.25 * need * (count + 0.5))
+
+
+def limited(points, most=1000):
+    """Add an object with a budget."""
+    obj = add_object(points)
+    obj.meshfree.point_budget = "NUMBER"
+    obj.meshfree.most_points = most
+    return obj
+
+
+def test_results_are_carried_to_all_points(core):
+    obj = limited(sphere_points(6000))
+    assert bpy.ops.meshfree.analyze(modes=9) == {"FINISHED"}
+    points = local_points(obj)
+    assert 900 <= obj.meshfree.subset_count <= 1000
+    assert obj.meshfree.point_count == 6000
+    assert [name for name in result_names(obj) if "vector" not in name] == RESULTS
+    assert obj.meshfree.total_area == pytest.approx(4.0 * np.pi, rel=2e-3)
+    assert attribute(obj, "lb_area").sum() == pytest.approx(obj.meshfree.total_area, rel=1e-5)
+    assert_allclose(attribute(obj, "lb_normal"), points, atol=0.05)
+    assert_allclose(attribute(obj, "lb_mean_curvature"), 1.0, atol=0.05)
+    assert not attribute(obj, "lb_boundary").any()
+    assert not attribute(obj, "lb_component").any()
+    assert_allclose(obj["lb_eigenvalues"][1:4], 2.0, rtol=0.01)
+    modes = np.column_stack([attribute(obj, f"lb_eigenvector_{mode:03d}") for mode in (2, 3, 4)])
+    fit = np.linalg.lstsq(modes, points, rcond=None)[0]
+    assert np.abs(modes @ fit - points).max() < 0.02  # the modes of degree 1 are the coordinates
+
+
+def test_values_at_the_subset_are_those_of_its_operator(core):
+    obj = limited(sphere_points(3000))
+    bpy.ops.meshfree.analyze()
+    points = local_points(obj)
+    subset = core.blue_noise_subset(points, 1000)
+    laplacian = core.build_laplacian(points[subset], options=core.LaplacianOptions(orient=True))
+    assert obj.meshfree.subset_count == len(subset)
+    assert_allclose(attribute(obj, "lb_gaussian_curvature")[subset], laplacian.gaussian_curvature, rtol=1e-5)
+    assert_array_equal(attribute(obj, "lb_boundary")[subset], laplacian.boundary)
+
+
+def test_modes_beyond_those_written_keep_their_eigenvalue():
+    obj = limited(sphere_points(2000))
+    bpy.ops.meshfree.analyze(modes=6, write_limit=2)
+    assert len(obj["lb_eigenvalues"]) == 6
+    assert [name for name in result_names(obj) if "vector" in name] == ["lb_eigenvector_001", "lb_eigenvector_002"]
+
+
+def test_a_budget_that_is_enough_changes_nothing():
+    obj = limited(sphere_points(), most=1000)
+    bpy.ops.meshfree.analyze()
+    within = everything(obj)["attributes"]
+    obj.meshfree.point_budget = "ALL"
+    bpy.ops.meshfree.analyze()
+    assert everything(obj)["attributes"] == within
+    assert obj.meshfree.subset_count == 0
+
+
+def test_the_boundary_group_is_read_of_the_subset(core):
+    points = sphere_points(6000)
+    obj = limited(points[points[:, 2] > 0.0])
+    bpy.ops.meshfree.analyze()
+    at_boundary = attribute(obj, "lb_boundary")
+    assert at_boundary.any()
+    assert np.abs(local_points(obj)[at_boundary][:, 2]).max() < 0.2
+    assert obj.meshfree.total_area == pytest.approx(2.0 * np.pi, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "stale"),
+    [
+        ("NUMBER", "NUMBER", False),
+        ("NUMBER", "AUTO", True),
+        ("NUMBER", "ALL", True),
+        ("ALL", "NUMBER", True),
+        ("ALL", "AUTO", False),
+    ],
+)
+def test_results_are_stale_where_another_number_is_asked_for(extension, before, after, stale):
+    result = importlib.import_module(f"{extension.__name__}.operators.objects.result")
+    obj = limited(sphere_points(2000))
+    obj.meshfree.point_budget = before
+    bpy.ops.meshfree.analyze()
+    assert not result.is_stale(obj)
+    obj.meshfree.point_budget = after
+    assert result.is_stale(obj) == stale
+
+
+def test_automatic_takes_what_fits(free):
+    obj = add_object(sphere_points(5000))
+    free(5000)
+    bpy.ops.meshfree.analyze()
+    assert obj.meshfree.subset_count == 0
+
+
+def test_automatic_takes_a_subset_where_all_do_not_fit(free, capfd):
+    obj = add_object(sphere_points(5000))
+    free(4999)
+    bpy.ops.meshfree.analyze()
+    assert 1800 <= obj.meshfree.subset_count <= 2000  # a round number that takes half at most
+    assert "of 5,000 points" in capfd.readouterr().out
+    free(4000)
+    bpy.ops.meshfree.spectrum(count=3)  # the same one, as it is kept
+    assert 1800 <= obj.meshfree.subset_count <= 2000
+
+
+def test_an_operator_that_is_kept_is_used_whatever_is_free(free):
+    obj = add_object(sphere_points(2000))
+    bpy.ops.meshfree.analyze()
+    free(1500)
+    bpy.ops.meshfree.spectrum(count=3)
+    assert obj.meshfree.subset_count == 0
+
+
+def test_all_points_are_refused_where_they_do_not_fit(free):
+    obj = add_object(sphere_points(5000))
+    obj.meshfree.point_budget = "ALL"
+    free(4000)
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=r'"Cloud": 5,000 points would take .* enough for 4,000 points'):
+        bpy.ops.meshfree.analyze()
+    assert everything(obj) == before
+
+
+def test_other_tools_refuse_what_does_not_fit(free):
+    obj = add_object(sphere_points(5000))
+    free(4000)
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match="Use fewer points"):
+        bpy.ops.meshfree.segment()
+    assert everything(obj) == before
+
+
+def test_what_is_kept_is_given_back_where_memory_is_short(cache, free):
+    add_object(sphere_points(1000), "First")
+    bpy.ops.meshfree.analyze()
+    kept = set(cache._kept)
+    add_object(sphere_points(3000), "Second").meshfree.point_budget = "ALL"
+    free(2000)
+    with pytest.raises(RuntimeError, match="GB are free"):
+        bpy.ops.meshfree.analyze()
+    assert not kept & set(cache._kept)
+
+
+def test_command_line(extension, tmp_path, capfd):
+    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
+    np.save(tmp_path / "a.npy", sphere_points(3000))
+    given = ["analyze", str(tmp_path / "a.npy"), "--out", str(tmp_path / "a.npz")]
+    assert command.run([*given, "--point-budget", "number", "--most-points", "1000", "--modes", "3"]) == 0
+    assert "of 3,000 points" in capfd.readouterr().out
+    with np.load(tmp_path / "a.npz") as arrays:
+        assert arrays["area"].sum() == pytest.approx(4.0 * np.pi, rel=2e-3)
+        assert arrays["eigenvector_003"].shape == (3000,)
+        assert len(arrays["eigenvalues"]) == 3

@@ -1,0 +1,79 @@
+"""What does not fit the free memory is refused before the start, with the number that fits."""
+
+import pytest
+
+import core
+from benchmarks.samplings import fibonacci_sphere
+from core import memory
+
+POINTS = fibonacci_sphere(1000)
+DEFAULT = core.LaplacianOptions()
+
+
+@pytest.fixture
+def free(monkeypatch):
+    """Function that sets the free memory, None for unknown."""
+    return lambda size: monkeypatch.setattr(memory, "available_memory", lambda: size)
+
+
+def test_the_need_grows_with_points_neighbors_and_modes():
+    one = memory.needed_memory(1000, DEFAULT)
+    assert memory.needed_memory(2000, DEFAULT) == 2 * one
+    assert memory.needed_memory(1000, DEFAULT, modes=50) > one
+    assert memory.needed_memory(1000, core.LaplacianOptions(neighbors=200)) > 1.5 * one
+    assert memory.needed_memory(1000, core.LaplacianOptions.paper()) > 5.0 * one
+
+
+def test_the_number_that_fits_is_not_refused(free):
+    free(10_000_000)
+    most = core.points_that_fit(DEFAULT)
+    memory.check_memory(most, DEFAULT)
+    with pytest.raises(core.NotEnoughMemoryError) as caught:
+        memory.check_memory(most + 1, DEFAULT)
+    assert caught.value.fitting == most
+
+
+def test_an_operator_is_refused_before_the_start(free):
+    free(5_000_000)
+    stages = []
+    with pytest.raises(core.NotEnoughMemoryError, match=r"1,000 points .* enough for \d\d0 points\. Use fewer points"):
+        core.build_laplacian(POINTS, progress=lambda *stage: stages.append(stage))
+    assert stages == []
+
+
+def test_modes_are_refused_before_the_start(free):
+    laplacian = core.build_laplacian(POINTS)
+    free(1_000_000)
+    with pytest.raises(core.NotEnoughMemoryError, match="100 modes of 1,000 points .* enough for 20 modes") as caught:
+        laplacian.eigenpairs(100)
+    assert caught.value.fitting == 20
+    assert len(laplacian.eigenpairs(4).eigenvalues) == 4
+
+
+def test_without_knowledge_nothing_is_refused(free):
+    free(None)
+    assert core.points_that_fit(DEFAULT) is None
+    memory.check_memory(10**12, DEFAULT)
+    memory.check_mode_memory(10**12, 10**6)
+
+
+def test_this_machine_tells_its_free_memory():
+    assert 1 << 26 < memory.available_memory() < 1 << 50
+
+
+def test_linux(tmp_path):
+    known = tmp_path / "meminfo"
+    known.write_text("MemTotal:  2000 kB\nMemAvailable:   1000 kB\nHugePages_Total:       0\n")
+    assert memory._linux_memory(known) == 1_024_000
+    assert memory._linux_memory(tmp_path / "none") is None
+
+
+@pytest.mark.parametrize(("limit", "expected"), [("1000", 700), ("max", None), ("100", 0)])
+def test_container(tmp_path, limit, expected):
+    for name, text in (("max", limit), ("current", "400"), ("stat", "anon 300\ninactive_file 100")):
+        (tmp_path / f"memory.{name}").write_text(f"{text}\n")
+    assert memory._container_memory(tmp_path) == expected
+
+
+def test_no_container(tmp_path):
+    assert memory._container_memory(tmp_path) is None
