@@ -9,6 +9,7 @@ import pytest
 import core
 
 SHOWN = [
+    "CoarseDeformer",
     "Deformer",
     "LaplaceBeltrami.apply",
     "LaplaceBeltrami.eigenpairs",
