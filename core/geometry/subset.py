@@ -158,8 +158,23 @@ def _discs(tree, rank, radius):
     first, second = tree.query_pairs(radius, output_type="ndarray").T
     swap = rank[first] > rank[second]
     first, second = np.where(swap, second, first), np.where(swap, first, second)
-    kept, gone = np.zeros(tree.n, dtype=bool), np.zeros(tree.n, dtype=bool)
+    return independent(first, second, tree.n)
+
+
+def independent(first, second, count, report=lambda: None):
+    """Return which of so many points stay, (count,) bool: no two of a pair, and of each left out one that beats it.
+
+    Parameters
+    ----------
+    first, second : ndarray, (p,) int
+        Pairs of which one may stay; the first beats the second, without circles (Luby 1986).
+    count : int
+    report : callable
+        Called at each round; may raise `Cancelled`.
+    """
+    kept, gone = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     while True:
+        report()
         beaten = gone.copy()
         beaten[second] = True
         kept |= ~beaten  # nobody left comes before them

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..blocks import blocks
+from .subset import independent
 
 _STEP = 2.0  # each pass leaves a quarter of the points
 _NEIGHBORS = 25  # the point itself and more than a pass lets go of
@@ -61,21 +62,9 @@ def _independent(points, reach, priority, rank, report):
     """Return which points have none of a higher priority within reach that stays, (m,) bool."""
     pairs = [_close_pairs(*found, reach, rank) for found in nearest_in_blocks(points, points, _NEIGHBORS, report)]
     first, second = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
-    row, other = np.concatenate([first, second]), np.concatenate([second, first])
-    weaker = priority[row] < priority[other]
-    row, other = row[weaker], other[weaker]
-    stays, open_ = np.zeros(len(points), dtype=bool), np.ones(len(points), dtype=bool)
-    while open_.any():
-        report()
-        beaten = np.zeros(len(points), dtype=bool)
-        beaten[row] = True
-        winners = open_ & ~beaten
-        stays |= winners
-        open_ &= ~winners
-        open_[row[winners[other]]] = False
-        left = open_[row] & open_[other]
-        row, other = row[left], other[left]
-    return stays
+    beats = priority[first] > priority[second]
+    winner, loser = np.where(beats, first, second), np.where(beats, second, first)
+    return independent(winner, loser, len(points), report)
 
 
 def _close_pairs(start, distance, index, reach, rank):

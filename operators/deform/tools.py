@@ -121,7 +121,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         live.keep(obj, made)
         obj.data.pop(POSE, None)
         write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False)
-        live.update(obj)
+        live.update(obj, waits=bpy.app.background)
         moved, stay = len(made.constraints.moved), len(made.constraints.kept)
         way = f'Move "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
         return [*made.follower.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]

@@ -38,7 +38,7 @@ COSTLY = {  # where each is called from
     "operators.running.cache": ("build_laplacian", "mean_curvature"),
     "operators.tools.minimal": ("minimal_surface",),
     "core.operator.laplacian": ("build_laplacian",),
-    "core.operator.factors": ("splu",),
+    "core.operator.cholesky": ("dpotrf",),
     "core.operator.solvers": ("conjugate_gradients",),
     "core.operator.spectrum": ("eigsh",),
     "core.applications.filters": ("eigsh",),
