@@ -7,11 +7,11 @@ from pathlib import Path
 
 from .errors import NotEnoughMemoryError
 
-# Bytes for each neighbour of a point, at the peak of a build: resident memory of builds of 50,000 random points of a
-# sphere, beyond that before, with 45, 117, 262 and 323 neighbours a point (6.8, 14.3, 28.5 and 35.6 kB a point).
-_PER_NEIGHBOR = 110
-_ALONE = 15  # neighbours that would take as much as what each point needs for itself
-_PER_MODE = 40  # bytes a point for each mode: Lanczos vectors, two a mode, the modes in two orders, and one for reserve
+# Bytes for each neighbour of a point, at the peak of a build: resident memory of builds of 50,000 points of a sphere,
+# beyond that before, with 40, 117 and 233 neighbours a point (5.5, 10.9 and 18.8 kB a point; 9.3 kB of a million).
+_PER_NEIGHBOR = 70
+_ALONE = 43  # neighbours that would take as much as what each point needs for itself
+_PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
 _ADAPTIVE = 0.13  # neighbours of "adaptive" kernels against "local" ones on random points, which have the most
 _SHARE = 0.8  # of the free memory, for what else goes on meanwhile
 _CGROUP = Path("/sys/fs/cgroup")
