@@ -40,7 +40,7 @@ COSTLY = {  # where each is called from
     "core.operator.laplacian": ("build_laplacian",),
     "core.operator.cholesky": ("dpotrf",),
     "core.operator.solvers": ("conjugate_gradients",),
-    "core.operator.spectrum": ("eigsh",),
+    "core.operator.spectrum": ("coarse_to_fine", "lift_lowest"),
     "core.applications.filters": ("eigsh",),
     "core.applications.geodesics": ("dijkstra",),
     "core.applications.smoothing": ("match_size",),
