@@ -188,13 +188,13 @@ def _against_peer(results, counts):
 
 
 def _plot(results, counts, few):
-    figure, panels = pyplot.subplots(1, 2, figsize=(10, 4.5), dpi=90)
+    figure, panels = pyplot.subplots(1, 2, figsize=(12, 4), dpi=80, layout="constrained")
     for axes, run, own in zip(panels, ("operator", "applications"), (counts, few), strict=True):
         for name in results[run][-1]["seconds"]:
             axes.loglog(own, [result["seconds"][name] for result in results[run]], "o-", label=name, markersize=4)
         axes.set(title=run.capitalize(), xlabel="points", ylabel="seconds")
         axes.grid(which="both", alpha=0.2)
-        axes.legend(fontsize=7)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)  # beside the lines
     figure.savefig(DOCUMENT.parent / PICTURE, bbox_inches="tight")
     pyplot.close(figure)
 
