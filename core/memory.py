@@ -117,9 +117,7 @@ def available_memory():
     """Return the bytes of memory that can be had without the system ending programs; None where it does not tell."""
     if sys.platform == "win32":
         return _windows_memory()
-    if (
-        sys.platform == "darwin"
-    ):  # which calls memory used that it gives at once when asked: half of all is taken as free
+    if sys.platform == "darwin":  # it calls memory used that it gives at once when asked: half of all is taken as free
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
     known = [free for free in (_linux_memory(), _container_memory()) if free is not None]
     return min(known, default=None)
