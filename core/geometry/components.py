@@ -34,9 +34,14 @@ def label_components(nearest):
 
 def label_connected(index, joined):
     """Number the components of points whose neighbours, (m, k) int, are joined to them, (m, k) bool."""
-    row = np.repeat(np.arange(len(index), dtype=np.int32), index.shape[1])[joined.ravel()]
-    graph = sparse.csr_array((np.ones(len(row), dtype=bool), (row, index[joined])), shape=(len(index),) * 2)
-    return connected_components(graph, directed=False)[1]
+    label = np.arange(len(index), dtype=np.int32)
+    # The nearest neighbours make few components, so that hardly a step to the others is left that joins two.
+    for some in (slice(0, _REACH), slice(_REACH, None)):
+        row, column = np.nonzero(joined[:, some] & (label[index[:, some]] != label[:, None]))
+        ends = label[row], label[index[row, some.start + column]]
+        graph = sparse.csr_array((np.ones(len(row), dtype=bool), ends), shape=(label.max() + 1,) * 2)
+        label = connected_components(graph, directed=False)[1][label]
+    return label
 
 
 def number_by_size(label, smallest=SMALLEST):
