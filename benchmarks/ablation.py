@@ -46,7 +46,7 @@ MODULES = (
     *(areas, weights, images, curvature, stiffness),
 )
 UNTUNED = (  # memory, rounding, counts, and what only notices go by
-    *("_BLOCK", "_SOURCES", "_SAME", "_EVEN", "_SMALLEST", "_TERMS", "_AT_ONCE", "NO_AREA", "_WIDER", "COUNT"),
+    *("_BLOCK", "_SOURCES", "_SAME", "_EVEN", "_SMALLEST", "_TERMS", "_PAIRS", "NO_AREA", "_WIDER", "COUNT"),
     *("_MEMORY", "_RIDGE", "_NARROW", "bandwidth._STEPS", "boundary._REACH", "_AT_BOUNDARY"),
 )
 DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"

@@ -10,8 +10,6 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.special import j0
 
-from .blocks import blocks, on_all_cores
-
 SUPPORT = 3.0
 """Radius of the kernel's support in units of h."""
 
@@ -27,30 +25,7 @@ FOURTH_MOMENT = 27479.0 / 15774.0
 RESOLVED = 2.2
 """Largest ``t = k h`` whose frequency k is recovered from the symbol without multiplying noise by more than 3."""
 
-_BLOCK = 1 << 15
 
-
-def _in_blocks(function):
-    """Let a function of many numbers work on a few at a time, so that its temporaries stay in the cache."""
-
-    @functools.wraps(function)
-    def evaluate(q):
-        q = np.asarray(q, dtype=np.float64)
-        if q.size <= _BLOCK:
-            return function(q)
-        result = np.empty(q.size)
-        flat = q.reshape(-1)
-
-        def fill(block):
-            result[block] = function(flat[block])
-
-        on_all_cores(fill, blocks(q.size, _BLOCK))
-        return result.reshape(q.shape)
-
-    return evaluate
-
-
-@_in_blocks
 def kernel(q):
     """Evaluate the kernel W_1.
 
@@ -64,6 +39,7 @@ def kernel(q):
     ndarray
         Same shape; zero beyond the support of 3.
     """
+    q = np.asarray(q, dtype=np.float64)
     return NORMALIZATION * (_power(3.0 - q, 5) - 6.0 * _power(2.0 - q, 5) + 15.0 * _power(1.0 - q, 5))
 
 
@@ -73,9 +49,9 @@ def kernel_derivative(q):
     return -5.0 * NORMALIZATION * (_power(3.0 - q, 4) - 6.0 * _power(2.0 - q, 4) + 15.0 * _power(1.0 - q, 4))
 
 
-@_in_blocks
 def pair_kernel(q):
     """Evaluate ``-2 W_1'(q) / q``, the pair weight of eqs. (3) and (10), finite (240 x normalisation) at q = 0."""
+    q = np.asarray(q, dtype=np.float64)
     near = np.minimum(q, 1.0)
     far = np.maximum(q, 1.0)
     outer = 5.0 * (_power(3.0 - far, 4) - 6.0 * _power(2.0 - far, 4)) / far

@@ -1,16 +1,20 @@
 """Distances along the surface."""
 
+from functools import partial
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
+from ..blocks import blocks
 from ..errors import InvalidPointsError
 from ..geometry import as_mask, circle_arc, pair_heights
 from .graph import mean_spacing
 
 _BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
 _SQUARE = 0.1  # cosine of two normals below which they stand at a right angle
+_BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 _GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point: the surface is there
 
 
@@ -93,9 +97,12 @@ def _lengths_of_pairs(laplacian):
     arcs = np.empty(len(first))
     kept = np.empty(len(first), dtype=bool)
     tree = cKDTree(points[laplacian.component >= 0])
-    for block, chord, left, right, cosine in pair_heights(points, first, second, laplacian.normals):
+    places, normals = points.T.copy(), laplacian.normals.T.copy()
+    for block in blocks(len(first), _BLOCK):
         i, j = first[block], second[block]
-        length = np.linalg.norm(chord, axis=1)
+        ends = (partial(np.take, indices=end, axis=1) for end in (i, j))
+        chord, left, right, cosine = pair_heights(*ends, places, normals)
+        length = np.linalg.norm(chord, axis=0)
         turn = np.abs(np.where(cosine < 0.0, -right, right) - left)
         # Which way normals face each other across a right angle is chance: it bends, either way.
         turn = np.where(np.abs(cosine) < _SQUARE, np.maximum(turn, np.abs(left) + np.abs(right)), turn)

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from ..blocks import blocks
+from ..blocks import on_all_cores
 from .nearest import SMOOTH
 
-_BLOCK = 1 << 20  # pairs worked on at one time, so that their coordinates stay in the cache
 _STEPS = 8  # nearest neighbours whose chords tell of roughness
 _ACROSS = 3  # of these chords lead across a sharp edge: it is no roughness there
 
@@ -49,11 +48,16 @@ def projected_distance(pairs, normals):
     ndarray, (p,)
     """
     result = np.empty(len(pairs.first))
-    for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, normals):
+    points, normals = pairs.points.T.copy(), normals.T.copy()
+
+    def measure(patch):
+        _, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
         side = np.where(cosine < 0.0, -1.0, 1.0)
         # The mean of two unit normals has the squared length (1 + cos) / 2.
         height = (left + side * right) ** 2 / (2.0 + 2.0 * np.abs(cosine))
-        result[block] = np.sqrt(np.maximum(pairs.distance[block] ** 2 - height, 0.0))
+        result[patch.pairs] = np.sqrt(np.maximum(pairs.distance[patch.pairs] ** 2 - height, 0.0))
+
+    on_all_cores(measure, pairs.patches)
     return result
 
 
@@ -74,15 +78,21 @@ def arc_length(cloud):
     -------
     ndarray, (p,)
     """
-    pairs = cloud.pairs
+    pairs, rough = cloud.pairs, cloud.roughness.any()
     result = np.empty(len(pairs.first))
-    for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, cloud.normals):
+    points, normals = pairs.points.T.copy(), cloud.normals.T.copy()
+
+    def measure(patch):
+        _, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
         right = np.where(cosine < 0.0, -right, right)
-        result[block] = arc_squared(pairs.distance[block] ** 2, left, right, np.abs(cosine))
-    if cloud.roughness.any():
-        least = pairs.mean(cloud.spacing) ** 2
-        result += pairs.mean(cloud.roughness) * np.maximum(pairs.distance**2 - least, 0.0)
-    return np.sqrt(result)
+        squared = pairs.distance[patch.pairs] ** 2
+        arc = arc_squared(squared, left, right, np.abs(cosine))
+        if rough:
+            arc += patch.mean(cloud.roughness) * np.maximum(squared - patch.mean(cloud.spacing) ** 2, 0.0)
+        result[patch.pairs] = np.sqrt(arc)
+
+    on_all_cores(measure, pairs.patches)
+    return result
 
 
 def measure_roughness(nearest, normals):
@@ -114,22 +124,26 @@ def measure_roughness(nearest, normals):
     return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
 
 
-def pair_heights(points, first, second, normals):
-    """Yield blocks of pairs: their rows, the chord, its height along the first normal and along the second, the cosine.
+def pair_heights(first, second, points, normals):
+    """Return the chords of pairs, their heights along the first normal and along the second, and the normals' cosine.
 
     Parameters
     ----------
-    points, normals : ndarray, (m, 3)
-    first, second : ndarray, (p,) int
-        The ends of the pairs.
+    first, second : callable
+        Return quantities of points, (..., m), at the first and at the second point of each of p pairs, (..., p).
+    points, normals : ndarray, (3, m)
+        One row for each coordinate.
+
+    Returns
+    -------
+    chord : ndarray, (3, p)
+    left, right, cosine : ndarray, (p,)
     """
-    for block in blocks(len(first), _BLOCK):
-        i, j = first[block], second[block]
-        left, right = normals[i], normals[j]
-        chord = points[j] - points[i]
-        yield block, chord, _dot(chord, left), _dot(chord, right), _dot(left, right)
+    chord = second(points) - first(points)
+    left, right = first(normals), second(normals)
+    return chord, _dot(chord, left), _dot(chord, right), _dot(left, right)
 
 
 def _dot(left, right):
-    """Return the inner products of the rows of two arrays, (p,)."""
-    return np.einsum("ij,ij->i", left, right)
+    """Return the inner products of the columns of two arrays, (p,)."""
+    return np.einsum("cp,cp->p", left, right)

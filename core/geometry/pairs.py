@@ -7,6 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from ..kernel import SUPPORT
+from .patches import divide_pairs
 
 _BLOCK = 1 << 22  # neighbour candidates held at one time while the pairs are collected
 
@@ -43,10 +44,15 @@ class Pairs:
 
     def half(self, values):
         """Return a pair quantity as the (m, m) CSR matrix U that holds each pair once; the whole is U + U.T."""
-        return sparse.csr_array((values, self.second, self._start), shape=(len(self.points),) * 2)
+        return sparse.csr_array((values, self.second, self.start), shape=(len(self.points),) * 2)
 
     @functools.cached_property
-    def _start(self):
+    def patches(self):
+        """The pairs by blocks that fit the cache: a list of `Patch`."""
+        return divide_pairs(self.start, self.second)
+
+    @functools.cached_property
+    def start(self):
         """Where the pairs of each first point start, (m + 1,)."""
         start = np.zeros(len(self.points) + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
         np.cumsum(np.bincount(self.first, minlength=len(self.points)), out=start[1:])
@@ -78,7 +84,7 @@ def find_pairs(tree, lengths, report=lambda: None):
     spacing = tree.query(tree.data[sample], k=[min(31, n)], workers=-1)[0][:, 0]
     count = int(min(max(40.0 * np.median(radii[sample] / spacing) ** 2, 16), n))
     pending = np.arange(n)
-    found = []
+    found = [], [], []
     while len(pending):
         unfinished = []
         for rows in np.array_split(pending, len(pending) * count // _BLOCK + 1):
@@ -91,10 +97,14 @@ def find_pairs(tree, lengths, report=lambda: None):
             # A pair is kept by the end that reaches further, which always sees it.
             kept = (reach > other) | ((reach == other) & (rows[:, None] < column))
             kept &= distance <= 0.5 * (reach + other)
-            first = np.repeat(rows.astype(np.int32), np.count_nonzero(kept, axis=1))
-            found.append((first, column[kept].astype(np.int32), distance[kept]))
+            found[0].append(np.repeat(rows.astype(np.int32), np.count_nonzero(kept, axis=1)))
+            found[1].append(column[kept].astype(np.int32))
+            found[2].append(distance[kept])
         pending, count = np.concatenate(unfinished), min(2 * count, n)
-    rounds = [np.concatenate(part) for part in zip(*found, strict=True)]
+    rounds = []
+    for parts in found:
+        rounds.append(np.concatenate(parts))
+        parts.clear()  # as much memory as the next ones take
     if np.any(np.diff(rounds[0]) < 0):  # later rounds answered for earlier rows
         order = np.argsort(rounds[0], kind="stable")
         rounds = [part[order] for part in rounds]

@@ -230,9 +230,14 @@ def separate_sheets(pairs, nearest, oriented):
 def _plainly_on_one_sheet(pairs, oriented, spacing):
     """Tell of which pairs the normals say that they lie on one sheet, (p,) bool."""
     result = np.empty(len(pairs.first), dtype=bool)
-    for block, _, left, right, cosine in pair_heights(pairs.points, pairs.first, pairs.second, oriented):
-        mean = 0.5 * (spacing[pairs.first[block]] + spacing[pairs.second[block]])
-        result[block] = same_sheet(left, right, cosine, pairs.distance[block], mean) & (cosine > SMOOTH)
+    points, normals = pairs.points.T.copy(), oriented.T.copy()
+
+    def judge(patch):
+        _, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
+        same = same_sheet(left, right, cosine, pairs.distance[patch.pairs], patch.mean(spacing))
+        result[patch.pairs] = same & (cosine > SMOOTH)
+
+    on_all_cores(judge, pairs.patches)
     return result
 
 

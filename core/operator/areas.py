@@ -7,6 +7,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.special import expit
 
+from ..blocks import on_all_cores
 from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
@@ -154,19 +155,27 @@ class KernelMatrix:
 
     def __init__(self, pairs, distance, boundary, report=lambda: None):
         self._report = report
-        lengths = pairs.mean(pairs.lengths)
         own = pairs.lengths
-        values = kernel(distance / lengths) / lengths**2
+        values = np.empty(len(distance))
+
+        def evaluate(patch):
+            lengths = patch.mean(own)
+            values[patch.pairs] = kernel(distance[patch.pairs] / lengths) / lengths**2
+
+        on_all_cores(evaluate, pairs.patches, report)
         for rows, image, factor in mirror(pairs, distance, boundary):
-            values[rows] += factor * kernel(image / lengths[rows]) / lengths[rows] ** 2
-        self._half = pairs.half(values)
+            lengths = 0.5 * (own[pairs.first[rows]] + own[pairs.second[rows]])
+            values[rows] += factor * kernel(image / lengths) / lengths**2
+        half = pairs.half(values)
+        self._halves = half, half.T
         self._diagonal = kernel(0.0) / own**2
         for rows, image, factor in own_images(pairs, boundary):
             self._diagonal[rows] += factor * kernel(image / own[rows]) / own[rows] ** 2
 
     def __matmul__(self, values):
         self._report()
-        return self._diagonal * values + self._half @ values + self._half.T @ values
+        first, second = on_all_cores(lambda half: half @ values, self._halves)
+        return self._diagonal * values + first + second
 
 
 def fast_areas(matrix, target, cells, rho=None):

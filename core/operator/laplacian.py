@@ -319,6 +319,8 @@ def build_laplacian(
     report("Operator", 0.8)
     if not options.curvature_correction:
         distance = projected_distance(pairs, cloud.normals)
+    pairs = replace(pairs, distance=distance)  # gives back the memory of the ways through space
+    cloud = replace(cloud, pairs=pairs)
     assembled = assemble_stiffness(
         cloud, distance, solution.areas, options.curvature_correction, lambda: report("Operator", 0.8)
     )

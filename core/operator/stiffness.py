@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from ..blocks import on_all_cores
 from ..kernel import SECOND_MOMENT, pair_kernel
 from .curvature import weight_factor
 from .images import mirror, own_images
@@ -34,6 +35,27 @@ class Stiffness:
     widths: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Images:
+    """Weights of images in boundaries.
+
+    Attributes
+    ----------
+    rows : ndarray, (k,) int
+        Whose image each is: a pair's or a point's. A row has up to three of them.
+    weights : ndarray, (k,)
+    fourth : ndarray, (k,)
+        What the fourth moment of the weight is, less what it would be at the distance of the pair itself.
+    once : ndarray, (k,) bool
+        Those in one boundary; others are images of images.
+    """
+
+    rows: np.ndarray
+    weights: np.ndarray
+    fourth: np.ndarray
+    once: np.ndarray
+
+
 def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: None):
     """Assemble K = -D G D of eq. (10) for the caller's points.
 
@@ -57,81 +79,105 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     -------
     Stiffness
     """
-    pairs = cloud.pairs
-    plain, mirrored, fourth = _kernel_weights(cloud, distance, areas)
+    pairs, scaled = cloud.pairs, cloud.scaled
+    weights, own, images, alone = _kernel_weights(cloud, distance, areas)
     residual, widths = np.zeros(len(areas)), pairs.lengths
     if balanced:
-        balance = balance_weights(cloud, distance, plain[0] + mirrored[0], areas, report)
-        for part in (plain, mirrored, fourth):
-            part[0][:] *= balance.factor
-        residual, widths = balance.residual, _widths(pairs, plain[0] + mirrored[0], *fourth, areas)
-    weights = _for_callers_points(cloud, plain[0] + mirrored[0], plain[1] + mirrored[1])
-    stiffness = (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
-    known = mirrored[0] > 0.0
-    cloud = replace(cloud, pairs=pairs.keep(known))
-    images = _for_callers_points(cloud, mirrored[0][known], mirrored[1])
-    images.eliminate_zeros()
+        balance = balance_weights(cloud, distance, weights, areas, report)
+        residual, factor = balance.residual, balance.factor[images.rows]
+        weights *= balance.factor
+        del balance  # its memory is needed
+        images = replace(images, weights=images.weights * factor, fourth=images.fourth * factor)
+        widths = _widths(pairs, distance, areas, weights, images, alone)
+    if scaled.copies.max() > 1:
+        whole = _symmetric(scaled, pairs.first, pairs.second, weights, own)
+        stiffness = (sparse.diags_array(whole.sum(axis=1), format="csr") - whole).tocsr()
+    else:
+        half = pairs.half(weights)
+        total = half.sum(axis=0) + half.sum(axis=1)
+        stiffness = _symmetric(scaled, pairs.first, pairs.second, np.negative(weights, out=weights), total)
+    rows = images.rows[images.once]
+    mirrored = np.bincount(alone.rows[alone.once], alone.weights[alone.once], len(areas))
+    images = _symmetric(scaled, pairs.first[rows], pairs.second[rows], images.weights[images.once], mirrored)
     return Stiffness(stiffness, images, residual, widths)
 
 
 def _kernel_weights(cloud, distance, areas):
-    """Return what the kernel makes of pairs, (p,), and of points with themselves, (m,), as two arrays each.
+    """Return what the kernel makes of pairs, and of points with themselves.
 
     Returns
     -------
-    plain : tuple of ndarray
-        The weights of pairs, and of points with themselves.
-    mirrored : tuple of ndarray
-        The weights of images in one boundary.
-    fourth : tuple of ndarray
-        The fourth moments of both.
+    weights : ndarray, (p,)
+        Those of pairs, with their images.
+    own : ndarray, (m,)
+        Those of points with themselves, with their images.
+    images, alone : _Images
+        Of pairs, and of points alone.
     """
-    pairs = cloud.pairs
-    factor = weight_factor(pairs.lengths, cloud.gaussian_curvature)
-    lengths = pairs.mean(pairs.lengths)
-    scale = pairs.mean(factor) / lengths**4 * areas[pairs.first] * areas[pairs.second]
-    own_scale = factor / pairs.lengths**4 * areas**2
-    # Weights of pairs, and of points with themselves; then those of images in one boundary.
-    plain = pair_kernel(distance / lengths) * scale, pair_kernel(0.0) * own_scale
-    fourth = plain[0] * distance**4, np.zeros(len(areas))
-    mirrored = np.zeros_like(plain[0]), np.zeros(len(areas))
-    for part, images, h, units in (
-        (0, mirror(pairs, distance, cloud.boundary), lengths, scale),
-        (1, own_images(pairs, cloud.boundary), pairs.lengths, own_scale),
-    ):
-        for whose, (rows, image, _) in zip((mirrored, mirrored, plain), images, strict=True):
-            weight = pair_kernel(image / h[rows]) * units[rows]
-            whose[part][rows] += weight
-            fourth[part][rows] += weight * image**4
-    return plain, mirrored, fourth
+    pairs, lengths = cloud.pairs, cloud.pairs.lengths
+    factor = weight_factor(lengths, cloud.gaussian_curvature)
+    weights = np.empty(len(distance))
+
+    def weigh(patch):
+        first, second, h = patch.first(areas), patch.second(areas), patch.mean(lengths)
+        weights[patch.pairs] = pair_kernel(distance[patch.pairs] / h) * (patch.mean(factor) / h**4) * first * second
+
+    on_all_cores(weigh, pairs.patches)
+    own = pair_kernel(0.0) * factor / lengths**4 * areas**2
+
+    def weigh_images(weights, found, distance, first, second):
+        parts = []
+        for number, (rows, image, _) in enumerate(found):
+            i, j = first[rows], second[rows]
+            h = 0.5 * (lengths[i] + lengths[j])
+            weight = pair_kernel(image / h) * (0.5 * (factor[i] + factor[j]) / h**4) * areas[i] * areas[j]
+            weights[rows] += weight
+            parts.append((rows, weight, weight * (image**4 - distance[rows] ** 4), np.full(len(rows), number < 2)))
+        return _Images(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+    images = weigh_images(weights, mirror(pairs, distance, cloud.boundary), distance, pairs.first, pairs.second)
+    points = np.arange(len(own))
+    alone = weigh_images(own, own_images(pairs, cloud.boundary), np.zeros(len(own)), points, points)
+    return weights, own, images, alone
 
 
-def _widths(pairs, weights, fourth, own_fourth, areas):
+def _widths(pairs, distance, areas, weights, images, alone):
     """Return the smoothing length of the kernel whose fourth moment, 8 mu2 h^2 of the area, the weights have, (m,).
 
     It is a mean over the neighbours, as the operator would make much of what differs from point to point by chance.
     """
-    fourth, near = pairs.half(fourth), pairs.half(weights)
-    moment, unit = fourth.sum(axis=0) + fourth.sum(axis=1) + own_fourth, 8.0 * SECOND_MOMENT * areas
-    total = near.sum(axis=0) + near.sum(axis=1)
+    total, moment = np.zeros((2, len(areas)))
+    for patch in pairs.patches:
+        values = weights[patch.pairs], weights[patch.pairs] * distance[patch.pairs] ** 4
+        for rows, sums in ((patch.rows, patch.over_first(*values)), (patch.columns, patch.over_second(*values))):
+            total[rows] += sums[0]
+            moment[rows] += sums[1]
+    for rows, added in (
+        (pairs.first[images.rows], images.fourth),
+        (pairs.second[images.rows], images.fourth),
+        (alone.rows, alone.fourth),
+    ):
+        moment += np.bincount(rows, added, len(areas))
+    unit, near = 8.0 * SECOND_MOMENT * areas, pairs.half(weights)
     total[total == 0.0] = 1.0  # of points without pairs
     moment, unit = (near @ (values / total) + near.T @ (values / total) for values in (moment, unit))
     return np.where(unit > 0.0, np.sqrt(moment / np.where(unit > 0.0, unit, 1.0)), pairs.lengths)
 
 
-def _for_callers_points(cloud, weights, own):
-    """Return the symmetric matrix of pair weights and own weights for the caller's points, columns sorted."""
-    scaled, pairs = cloud.scaled, cloud.pairs
-    n = len(scaled.inverse)
-    if scaled.duplicates:
+def _symmetric(scaled, first, second, values, own):
+    """Return the symmetric matrix, (n, n), of quantities of pairs and of points with themselves, columns sorted.
+
+    Points at the same place share what theirs has.
+    """
+    n, m = len(scaled.inverse), len(own)
+    if scaled.copies.max() > 1:
         known = np.flatnonzero(scaled.inverse >= 0)
         row = scaled.inverse[known]
-        spread = sparse.csr_array((1.0 / scaled.copies[row], (known, row)), shape=(n, len(own)))
-        half = pairs.half(weights)
+        spread = sparse.csr_array((1.0 / scaled.copies[row], (known, row)), shape=(n, m))
+        half = sparse.csr_array((values, (first, second)), shape=(m, m))
         return (spread @ (half + half.T + sparse.diags_array(own)) @ spread.T).tocsr()
     caller = scaled.first.astype(np.int32)
-    half = sparse.csr_array((weights, (caller[pairs.first], caller[pairs.second])), shape=(n, n))
-    half = half.T.tocsr()  # transposing sorts the columns, which makes the sums fast
-    diagonal = np.zeros(n)
-    diagonal[caller] = own
-    return (half + half.T.tocsr() + sparse.diags_array(diagonal, format="csr")).tocsr()
+    ends = (np.concatenate([caller[end], caller]) for end in (first, second))
+    half = sparse.csr_array((np.concatenate([values, 0.5 * own]), tuple(ends)), shape=(n, n))
+    half = half.T.tocsr()  # transposing sorts the columns, which makes the sum fast
+    return half + half.T.tocsr()

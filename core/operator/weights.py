@@ -1,12 +1,10 @@
 """Pair weights of maximum entropy: as close to the kernel's as its own moments around every point allow."""
 
-import itertools
-import os
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..blocks import blocks, on_all_cores
+from ..blocks import on_all_cores
 from ..geometry import frames
 from ..kernel import SECOND_MOMENT, SUPPORT
 from .curvature import second_moment, uneven
@@ -17,8 +15,6 @@ _MEMORY = 5  # earlier rounds that a step is extrapolated from
 _RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the terms apart
 _LARGEST = 1.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
 _SMALLEST = 1e-8  # share of what rounds change that an extrapolation goes by: less would be rounding
-_BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
-_AT_ONCE = 4  # sums over all pairs at most, each of which holds two numbers of each pair
 _TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 
 
@@ -78,30 +74,39 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     inverse = np.linalg.inv(moments.curvature() + _RIDGE * np.eye(_TERMS))
     goal = np.zeros((len(areas), _TERMS))
     goal[:, 0] = 1.0
-    terms, earlier = np.zeros_like(goal), []
+    terms, before, turns = np.zeros_like(goal), None, []
     for step in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)
         if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
         change = np.einsum("iab,ib->ia", inverse, missing - _RIDGE * terms)
-        earlier = [*earlier[-_MEMORY:], (terms, change)]
-        terms = _extrapolate(earlier)
+        terms = terms + change
+        if before is not None:
+            turns = [*turns[1 - _MEMORY :], (before[0] - terms, before[1] - change)]
+        before = terms, change
+        terms = _extrapolate(terms, change, turns)
     return Balance(moments.factor(terms), residual)
 
 
-def _extrapolate(earlier):
-    """Return the next iterate of a fixed-point iteration from earlier ones and their changes (Anderson 1965)."""
-    terms, change = earlier[-1]
-    result = terms + change
-    if len(earlier) > 1:
-        slopes = np.stack([(before[1] - after[1]).ravel() for before, after in itertools.pairwise(earlier)])
-        products = slopes @ slopes.T
-        products += _SMALLEST * np.trace(products) * np.eye(len(slopes))
-        share = np.linalg.solve(products, slopes @ change.ravel())
-        for (before, after), part in zip(itertools.pairwise(earlier), share, strict=True):
-            result = result - part * ((before[0] + before[1]) - (after[0] + after[1]))
-    return result
+def _extrapolate(terms, change, turns):
+    """Return the next iterate of a fixed-point iteration, from the turns of earlier ones (Anderson 1965).
+
+    Parameters
+    ----------
+    terms : ndarray
+        The iterate.
+    change : ndarray
+        How it differs from what it was made of.
+    turns : list of tuple of ndarray
+        How both of them differed from round to round.
+    """
+    if not turns:
+        return terms
+    products = np.array([[np.vdot(left, right) for _, left in turns] for _, right in turns])
+    products += _SMALLEST * np.trace(products) * np.eye(len(turns))
+    share = np.linalg.solve(products, [np.vdot(turn, change) for _, turn in turns])
+    return terms - sum(part * step for part, (step, _) in zip(share, turns, strict=True))
 
 
 def _trace(cloud, weights, areas):
@@ -110,11 +115,14 @@ def _trace(cloud, weights, areas):
     That of the curved surface, times ``1 + mu2 Laplacian(h^2) / 8`` where h varies: pairs are as wide as h is in their
     middle, which is on the side of the wider kernel more often.
     """
-    pairs, lengths = cloud.pairs, cloud.pairs.lengths
-    squared = lengths**2
-    gain = pairs.half(weights * (squared[pairs.second] - squared[pairs.first]))
-    gain = (gain.sum(axis=1) - gain.sum(axis=0)) * (SECOND_MOMENT / 8.0) / areas
-    return second_moment(lengths, cloud.gaussian_curvature) * (1.0 + uneven(gain))
+    pairs, squared = cloud.pairs, cloud.pairs.lengths**2
+    gain = np.zeros(len(squared))
+    for patch in pairs.patches:
+        change = weights[patch.pairs] * (patch.second(squared) - patch.first(squared))
+        gain[patch.rows] += patch.over_first(change)[0]
+        gain[patch.columns] -= patch.over_second(change)[0]
+    gain *= (SECOND_MOMENT / 8.0) / areas
+    return second_moment(pairs.lengths, cloud.gaussian_curvature) * (1.0 + uneven(gain))
 
 
 class _Edges:
@@ -146,79 +154,103 @@ class _Moments:
     """The moments of weights around every point, in units of those that the kernel has."""
 
     def __init__(self, cloud, distance, weights, unit, report):
-        pairs = cloud.pairs
-        self._pairs, self._weights, self._unit, self._report = pairs, weights, unit, report
-        self._ends = pairs.first, pairs.second
-        self._blocks = blocks(len(weights), _BLOCK)
-        self._basis = np.empty((2, _TERMS, len(weights)), dtype=np.float32)  # seven digits, of terms about one
-        # Fresh memory of this size costs as much as what is worked out in it, so it is used again.
-        self._factor = np.empty(len(weights))
-        self._spare = [np.empty((2, len(weights))) for _ in range(min(os.cpu_count() or 1, _AT_ONCE))]
+        pairs, lengths = cloud.pairs, cloud.pairs.lengths
+        self._weights, self._unit, self._report = weights, unit, report
+        self._patches = pairs.patches
+        # The ways from both ends, in the tangent planes there over h; next to boundaries, the terms of some pairs.
+        self._ways = np.empty((2, 2, len(weights)), dtype=np.float32)  # seven digits, of numbers about one
         places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
         tangents = frames(cloud.normals)[:, :, 1:].transpose(2, 1, 0).copy()
-        near, edges = cloud.boundary.reached(pairs.lengths), _Edges(cloud, tangents)
+        near, edges = cloud.boundary.reached(lengths), _Edges(cloud, tangents)
+        edge = np.where(near, np.arange(len(near)), -1)
 
-        def describe(block):
-            i, j = ends = [index[block] for index in self._ends]
-            chord, left, right = places[:, j] - places[:, i], normals[:, i], normals[:, j]
+        def describe(patch):
+            ends, reach = (patch.first, patch.second), distance[patch.pairs]
+            chord, left, right = patch.second(places) - patch.first(places), patch.first(normals), patch.second(normals)
             right *= np.where(_dot(left, right) < 0.0, -1.0, 1.0)
             # How far the geodesic bends away from the chord, to third order, within the tangent plane.
             turn = (_dot(chord, right) - _dot(chord, left)) / 6.0
-            ways = chord + turn * right, turn * left - chord
-            for basis, end, way in zip(self._basis[:, :, block], ends, ways, strict=True):
-                x, y = (_dot(way, axis[:, end]) for axis in tangents)
-                size = distance[block] / (np.maximum(np.hypot(x, y), 1e-300) * pairs.lengths[end])
-                x, y = x * size, y * size
-                basis[:] = x * x + y * y, x, y, x * x - y * y, 2.0 * x * y
-                rows = np.flatnonzero(near[end])
-                if len(rows):
-                    basis[:, rows] = edges.terms(end[rows], x[rows], y[rows])
+            at_edges = []
+            for stored, end, way in zip(self._ways, ends, (chord + turn * right, turn * left - chord), strict=True):
+                x, y = (_dot(way, end(axis)) for axis in tangents)
+                size = reach / (np.maximum(np.hypot(x, y), 1e-300) * end(lengths))
+                stored[:, patch.pairs] = x, y = x * size, y * size
+                point = end(edge)
+                rows = np.flatnonzero(point >= 0)
+                at_edges.append((rows, edges.terms(point[rows], x[rows], y[rows]) if len(rows) else 0.0))
+            return at_edges
 
-        on_all_cores(describe, self._blocks, report)
+        self._at_edges = on_all_cores(describe, self._patches, report)
 
     def factor(self, terms):
-        """Return the factor of each pair's weight, (p,), until the next call."""
-        terms = terms.T.copy()
+        """Return the factor of each pair's weight, (p,)."""
+        terms, result = terms.T.copy(), np.empty(len(self._weights))
 
-        def evaluate(block):
-            power = np.zeros(block.stop - block.start)
-            for end, basis in zip(self._ends, self._basis, strict=True):
-                own = end[block]
-                for values, part in zip(terms, basis, strict=True):
-                    power += values[own] * part[block]
-            np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST), out=self._factor[block])
+        def evaluate(patch, basis):
+            result[patch.pairs] = _factor(patch, basis, terms)
 
-        on_all_cores(evaluate, self._blocks, self._report)
-        return self._factor
+        self._on_patches(evaluate)
+        return result
 
     def of(self, terms):
         """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
-        weights = self.factor(terms)
-        weights *= self._weights
-        return np.stack(self._sums((weights, part) for part in self._basis.swapaxes(0, 1)), axis=1)
+        terms = terms.T.copy()
+
+        def sums(patch, basis):
+            basis *= self._weights[patch.pairs] * _factor(patch, basis, terms)
+            return patch.over_first(*basis[0]), patch.over_second(*basis[1])
+
+        return self._total(sums, _TERMS)
 
     def curvature(self):
         """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
+        places = [(i, j) for i in range(_TERMS) for j in range(i + 1)]
+
+        def sums(patch, basis):
+            weighted = self._weights[patch.pairs] * basis
+            first, second = ([own[i] * other[j] for i, j in places] for own, other in zip(weighted, basis, strict=True))
+            return patch.over_first(*first), patch.over_second(*second)
+
+        left, right = np.transpose(places)
         result = np.empty((len(self._unit), _TERMS, _TERMS))
-        places = [(a, b) for a in range(_TERMS) for b in range(a + 1)]
-        sums = self._sums((self._weights, self._basis[:, a], self._basis[:, b]) for a, b in places)
-        for (a, b), values in zip(places, sums, strict=True):
-            result[:, a, b] = result[:, b, a] = values
+        result[:, left, right] = result[:, right, left] = self._total(sums, len(places))
         return result
 
-    def _sums(self, products):
-        """Sum products of quantities of pairs, as each of their points sees them, at both ends, in the unit."""
+    def _total(self, sums, count):
+        """Add up sums over the first and the second points of each patch, and return them in the unit, (m, count)."""
+        total = np.zeros((count, len(self._unit)))
+        for patch, (first, second) in zip(self._patches, self._on_patches(sums), strict=True):
+            total[:, patch.rows] += first
+            total[:, patch.columns] += second
+        return (total / self._unit).T
 
-        def add(factors):
-            space = self._spare.pop()
-            np.multiply(*factors[:2], out=space)
-            for factor in factors[2:]:
-                space *= factor
-            total = self._pairs.half(space[0]).sum(axis=1) + self._pairs.half(space[1]).sum(axis=0)
-            self._spare.append(space)
-            return total / self._unit
+    def _on_patches(self, function):
+        """Call a function with each patch and the terms of its pairs, (2, 5, pairs), as each end sees them."""
 
-        return on_all_cores(add, list(products), self._report, len(self._spare))
+        def call(number):
+            patch = self._patches[number]
+            basis = np.empty((2, _TERMS, patch.pairs.stop - patch.pairs.start))
+            for part, way, (rows, terms) in zip(
+                basis, self._ways[:, :, patch.pairs], self._at_edges[number], strict=True
+            ):
+                square, x, y, difference, product = part
+                x[:], y[:] = way
+                np.multiply(x, x, out=square)
+                np.multiply(y, y, out=product)
+                np.subtract(square, product, out=difference)
+                square += product
+                np.multiply(2.0 * x, y, out=product)
+                part[:, rows] = terms
+            return function(patch, basis)
+
+        return on_all_cores(call, range(len(self._patches)), self._report)
+
+
+def _factor(patch, basis, terms):
+    """Return the factor of the weights of a patch, from the terms of its pairs and their coefficients, (5, m)."""
+    power = np.einsum("tp,tp->p", basis[0], patch.first(terms))
+    power += np.einsum("tp,tp->p", basis[1], patch.second(terms))
+    return np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST))
 
 
 def _dot(left, right):

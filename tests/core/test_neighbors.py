@@ -4,10 +4,11 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from benchmarks.samplings import random_sphere, uneven_sphere
+from core.geometry import patches
 from core.geometry.bandwidth import smoothing_lengths
 from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
-from core.geometry.pairs import find_pairs
+from core.geometry.pairs import Pairs, find_pairs
 from core.options import LaplacianOptions
 
 
@@ -27,6 +28,35 @@ def test_pairs_are_all_within_three_mean_lengths_each_once(spread):
     assert set(found) == expected_pairs(points, lengths)
     assert np.all(np.diff(first) >= 0)
     np.testing.assert_allclose(distance, np.linalg.norm(points[first] - points[second], axis=1), atol=1e-14)
+
+
+def test_patches_hold_each_pair_once_and_sum_at_both_ends(monkeypatch):
+    monkeypatch.setattr(patches, "_PAIRS", 500)
+    rng = np.random.default_rng(4)
+    count = 300
+    # The last points have no pairs of which they are the first, some in between neither.
+    first, second = np.nonzero(np.triu(rng.random((count, count)) < 0.1, 1) & (np.arange(count) % 7 > 0)[:, None])
+    pairs = Pairs(rng.random((count, 3)), np.ones(count), first.astype(np.int32), second.astype(np.int32), None)
+    assert len(pairs.patches) > 5
+    assert [row for patch in pairs.patches for row in range(patch.pairs.start, patch.pairs.stop)] == list(
+        range(len(first))
+    )
+    values, weights = rng.random((2, count)), rng.random((3, len(first)))
+    sums, exact = np.zeros((2, 2, 3, count))
+    for patch in pairs.patches:
+        assert np.array_equal(patch.first(values), values[:, first[patch.pairs]])
+        assert np.array_equal(patch.second(values), values[:, second[patch.pairs]])
+        assert np.allclose(patch.mean(values[0]), pairs.mean(values[0])[patch.pairs], rtol=1e-15)
+        sums[0][:, patch.rows] += patch.over_first(*weights[:, patch.pairs])
+        sums[1][:, patch.columns] += patch.over_second(*weights[:, patch.pairs])
+    for total, end in zip(exact, (first, second), strict=True):
+        np.add.at(total.T, end, weights.T)
+    assert np.allclose(sums, exact, rtol=1e-13)
+
+
+def test_no_pairs_make_no_patches():
+    none = np.zeros(0, dtype=np.int32)
+    assert Pairs(np.zeros((4, 3)), np.ones(4), none, none, np.zeros(0)).patches == []
 
 
 def test_support_may_hold_every_point():

@@ -1,0 +1,94 @@
+"""Pairs by blocks that fit the cache: what pairs have from the points at their ends, and the sums at these."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy import sparse
+
+_PAIRS = 1 << 16  # of a patch, about: of fewer, and Python's share of the work grows
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Some of the pairs, ordered by their first points, and the points at their ends.
+
+    Attributes
+    ----------
+    pairs : slice
+        Which of all pairs.
+    rows : ndarray, (k,) int
+        The first points, each once.
+    columns : ndarray, (l,) int
+        The second points, each once.
+    counts : ndarray, (k,) int
+        How many pairs each first point has.
+    ends : csc_array, (l, k)
+        Which second point each pair leads to; its values are no one's.
+    """
+
+    pairs: slice
+    rows: np.ndarray
+    columns: np.ndarray
+    counts: np.ndarray
+    ends: sparse.csc_array
+
+    def first(self, values):
+        """Return quantities of points, (..., m), at the first point of each pair, (..., pairs)."""
+        return np.repeat(values[..., self.rows], self.counts, axis=-1)
+
+    def second(self, values):
+        """Return quantities of points, (..., m), at the second point of each pair, (..., pairs)."""
+        return np.take(values[..., self.columns], self.ends.indices, axis=-1)
+
+    def mean(self, values):
+        """Return the mean of a point quantity over both ends of each pair."""
+        return 0.5 * (self.first(values) + self.second(values))
+
+    def over_first(self, *values):
+        """Return the sums of quantities of pairs, (pairs,) each, over the pairs of each first point, (q, k)."""
+        return np.stack([np.add.reduceat(row, self.ends.indptr[:-1]) for row in values])
+
+    def over_second(self, *values):
+        """Return the sums of quantities of pairs, (pairs,) each, over the pairs of each second point, (q, l)."""
+        result, ones, none = np.empty((len(values), len(self.columns))), np.ones(len(self.rows)), self.ends.data
+        for row, total in zip(values, result, strict=True):
+            self.ends.data = row
+            total[:] = self.ends @ ones
+        self.ends.data = none
+        return result
+
+
+def divide_pairs(start, second):
+    """Divide pairs into patches.
+
+    Parameters
+    ----------
+    start : ndarray, (m + 1,) int
+        Where the pairs of each first point start.
+    second : ndarray, (pairs,) int32
+        The second point of each pair.
+
+    Returns
+    -------
+    list of Patch
+    """
+    cuts = np.unique(np.searchsorted(start, np.append(np.arange(0, start[-1], _PAIRS), start[-1])))
+    return [_patch(start[low : high + 1], second, low) for low, high in pairwise(cuts)]
+
+
+def _patch(start, second, low):
+    pairs = slice(start[0], start[-1])
+    second = second[pairs]
+    known = np.flatnonzero(np.diff(start))
+    start = np.append(start[known], start[-1]) - start[0]
+    # The place of a point among the columns is read from a table, over the points from the least to the greatest.
+    least = second.min()
+    column = second - least
+    table = np.zeros(column.max() + 1, dtype=np.int32)
+    table[column] = 1
+    columns = np.flatnonzero(table)
+    table[columns] = np.arange(len(columns), dtype=np.int32)
+    place = table[column]
+    ends = sparse.csc_array((place, place, start), shape=(len(columns), len(known)))
+    return Patch(pairs, low + known, least + columns, np.diff(start), ends)
