@@ -8,8 +8,8 @@ from pathlib import Path
 from .errors import NotEnoughMemoryError
 
 # Bytes for each neighbour of a point, at the peak of a build: resident memory of builds of 50,000 points of a sphere,
-# beyond that before, with 40, 117 and 233 neighbours a point (5.5, 10.9 and 18.8 kB a point; 9.3 kB of a million).
-_PER_NEIGHBOR = 70
+# beyond that before, with 40, 116 and 230 neighbours a point (3.6, 6.4 and 11.4 kB a point; 5.2 kB of a million).
+_PER_NEIGHBOR = 42
 _ALONE = 43  # neighbours that would take as much as what each point needs for itself
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
 _ADAPTIVE = 0.13  # neighbours of "adaptive" kernels against "local" ones on random points, which have the most
