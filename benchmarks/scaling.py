@@ -1,4 +1,4 @@
-"""How time and memory of every stage grow with the number of points, and the tufted Laplacian beside it.
+"""How time and memory of every stage grow with the number of points, with two peers beside it.
 
     python -m benchmarks.scaling [points ...]
 
@@ -16,6 +16,8 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+import potpourri3d
+from scipy.spatial import cKDTree
 
 import core
 from core.geometry import cloud
@@ -87,6 +89,7 @@ def run_operator(count):
     return watch, {
         "operator": operator,
         "operator gigabytes": peak,
+        "queries": time_queries(points, built.stiffness.nnz // count),
         "pairs a row": built.stiffness.nnz / count,
         "matrix gigabytes": (built.stiffness.data.nbytes + built.stiffness.indices.nbytes) / 1e9,
         "error": error_of(spectrum.eigenvalues),
@@ -101,14 +104,24 @@ def run_applications(count):
     watch.run("smoothing", core.smooth_points, built, core.exponential(0.1))
     fixed = np.flatnonzero(low | high)
     watch.run("harmonic field", core.harmonic_field, built, fixed, high[fixed].astype(float))
-    watch.run("geodesics, first source", core.geodesic_distance, built, [0])
-    watch.run("geodesics, next source", core.geodesic_distance, built, [1])
+    geodesics = watch.run("geodesics, set-up", core.Geodesics, built)
+    watch.run("geodesics, a source", geodesics.distance, [0])
     watch.run("segmentation", core.segment, built, 6)
     watch.run("binding", core.Deformer, built, high, low)
     belt = np.abs(points[:, 2]) < 0.5
     ends = np.abs(points[belt, 2]) > 0.47
     watch.run("minimal surface", core.minimal_surface, points[belt], ends)
     return watch, {}
+
+
+def time_queries(points, neighbors):
+    """Measure the searches that no operator can do without: of the nearest points, and of those within the kernel."""
+    began = time.perf_counter()
+    tree = cKDTree(points)
+    for count in (41, neighbors + 1):
+        for rows in np.array_split(points, len(points) * count // (1 << 22) + 1):
+            tree.query(rows, count, workers=-1)
+    return time.perf_counter() - began
 
 
 def run_peer(count):
@@ -119,7 +132,16 @@ def run_peer(count):
     return watch, {"error": error_of(values)}
 
 
-RUNS = {"operator": run_operator, "applications": run_applications, "peer": run_peer}
+def run_heat(count):
+    """Measure distances by the heat method on the points."""
+    watch, points = Watch(), random_sphere(count)
+    solver = watch.run("geodesics, set-up", potpourri3d.PointCloudHeatSolver, points)
+    solver.compute_distance(1)  # the first call makes factors
+    watch.run("geodesics, a source", solver.compute_distance, 0)
+    return watch, {}
+
+
+RUNS = {"operator": run_operator, "applications": run_applications, "peer": run_peer, "heat": run_heat}
 
 
 def measure(run, count):
@@ -148,7 +170,7 @@ def main(counts):
     few = [count for count in counts if count <= LARGEST]
     results = {run: [measure(run, count) for count in (counts if run == "operator" else few)] for run in RUNS}
     tables = [_stages("Operator", results["operator"], counts), _stages("Applications", results["applications"], few)]
-    tables += [_whole(results["operator"], counts), _against_peer(results, few)]
+    tables += [_whole(results["operator"], counts), _against_peer(results, few), _geodesics(results, few)]
     _plot(results, counts, few)
     tables[0].plots.append(PICTURE)
     text = "\n".join(table.markdown() for table in tables)
@@ -166,13 +188,14 @@ def _stages(title, results, counts):
 
 
 def _whole(results, counts):
-    header = ["points", "operator, s", "peak GB", "matrix GB", f"{MODES} modes, s", "pairs a row", "eigenvalues off by"]
+    header = ["points", "operator, s", "tree queries, s", f"{MODES} modes, s", "peak GB", "matrix GB", "pairs a row"]
     rows = [
-        [f"{count:,}", f"{result['operator']:.1f}", f"{result['operator gigabytes']:.2f}"]
-        + [f"{result['matrix gigabytes']:.2f}", f"{result['seconds'][f'{MODES} modes']:.1f}"]
-        + [f"{result['pairs a row']:.0f}", f"{100.0 * result['error']:.2g} %"]
+        [f"{count:,}", f"{result['operator']:.1f}", f"{result['queries']:.1f}"]
+        + [f"{result['seconds'][f'{MODES} modes']:.1f}", f"{result['operator gigabytes']:.2f}"]
+        + [f"{result['matrix gigabytes']:.2f}", f"{result['pairs a row']:.0f}", f"{100.0 * result['error']:.2g} %"]
         for count, result in zip(counts, results, strict=True)
     ]
+    header.append("eigenvalues off by")
     return Table("As a whole", header, rows)
 
 
@@ -185,6 +208,17 @@ def _against_peer(results, counts):
     header = ["points", "this project, s", "tufted, s", "times", "eigenvalues off by", "tufted"]
     note = f"Operator and {MODES} modes, against the tufted Laplacian on the triangles of potpourri3d."
     return Table("Against a peer", header, rows, note)
+
+
+def _geodesics(results, counts):
+    names = "geodesics, set-up", "geodesics, a source"
+    rows = [
+        [f"{count:,}", *(f"{run['seconds'][name]:.2f}" for name in names for run in runs)]
+        for count, *runs in zip(counts, results["applications"], results["heat"], strict=True)
+    ]
+    header = ["points", "set-up, s", "heat method", "each source, s", "heat method"]
+    note = "Distances from one point, after those from another, against the heat method of potpourri3d on points."
+    return Table("Geodesics", header, rows, note)
 
 
 def _plot(results, counts, few):

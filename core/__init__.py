@@ -16,6 +16,7 @@ of the unit sphere, where answers are known:
 from .applications import (
     CoarseDeformer,
     Deformer,
+    Geodesics,
     MinimalSurface,
     PointBlend,
     band,
@@ -65,6 +66,7 @@ __all__ = [
     "CoarseDeformer",
     "ComponentError",
     "Deformer",
+    "Geodesics",
     "InvalidPointsError",
     "LaplaceBeltrami",
     "LaplacianOptions",

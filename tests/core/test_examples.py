@@ -11,6 +11,7 @@ import core
 SHOWN = [
     "CoarseDeformer",
     "Deformer",
+    "Geodesics",
     "LaplaceBeltrami.apply",
     "LaplaceBeltrami.eigenpairs",
     "LaplacianOptions",

@@ -117,6 +117,15 @@ def test_masks_are_sets_too(operators):
     assert np.all(found[~mask] > 0.0)
 
 
+def test_lengths_serve_many_sources(operators):
+    laplacian = operators("even sphere")
+    geodesics = core.Geodesics(laplacian)
+    for sources in ([0], [3, 1500], laplacian.points[:, 2] > 0.9):
+        np.testing.assert_array_equal(geodesics.distance(sources), core.geodesic_distance(laplacian, sources))
+    with pytest.raises(core.InvalidPointsError, match="no sources"):
+        geodesics.distance([])
+
+
 @pytest.mark.parametrize(("sources", "text"), [([], "no sources"), ([5000], "below 4000"), ([0.5], "whole numbers")])
 def test_bad_sources(operators, sources, text):
     with pytest.raises(core.InvalidPointsError, match=text):
