@@ -87,6 +87,10 @@ def spacing_of(distance):
 def fading_weights(distance):
     """Return weights that fall from 1 to 0 at the last neighbour, (n, k).
 
-    Which of several neighbours at the same last distance was found then makes no difference.
+    Which of several neighbours at the same last distance was found then makes no difference. Only where nearly all of
+    them are that far, such as around the pole of circles of latitude, all count alike.
     """
-    return (1.0 - (distance / distance[:, -1:]) ** 2) ** 2
+    weights = (1.0 - (distance / distance[:, -1:]) ** 2) ** 2
+    tied = weights[:, 1:].sum(axis=1) < 1.0
+    weights[tied] = 1.0
+    return weights

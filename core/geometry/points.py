@@ -3,11 +3,15 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
 
 FEWEST = 5  # points of a boundary that is given
+_SAME = 1e-9  # of the median radius: no closer points are told apart, as areas between them would drown in rounding
+_LARGEST = 1e60  # coordinates [L], and its inverse the least extent: further powers of lengths must be numbers, too
 
 
 def check_points(points):
@@ -48,8 +52,18 @@ def check_points(points):
             f"{bad} of {len(result)} points have coordinates that are not finite (NaN or infinity). Delete these"
             " points."
         )
-    extent = np.ptp(result, axis=0).max()
     largest = np.abs(result).max()
+    if largest > _LARGEST:
+        raise InvalidPointsError(
+            f"Some of the {len(result)} points lie {largest:.3g} from the origin: what has the size of squares would"
+            f" be no numbers there. Delete these points, or scale the points to less than {_LARGEST:g}."
+        )
+    extent = np.ptp(result, axis=0).max()
+    if 0.0 < extent < 1.0 / _LARGEST:
+        raise InvalidPointsError(
+            f"The {len(result)} points span only {extent:.3g}: what has the size of squares would be no numbers there."
+            f" Scale the points to more than {1.0 / _LARGEST:g}."
+        )
     if given.dtype.kind == "f" and extent < 8192.0 * np.finfo(given.dtype).eps * largest:
         raise InvalidPointsError(
             f"The {len(result)} points lie {largest:.3g} from the origin but span only {extent:.3g}:"
@@ -122,9 +136,8 @@ def scale_points(points, needed):
     scale = float(np.sqrt(np.mean(np.sum(centered**2, axis=1))))
     if scale > 0.0:
         centered /= scale
-    distinct, first, inverse, copies = np.unique(
-        centered, axis=0, return_index=True, return_inverse=True, return_counts=True
-    )
+    distinct, first, inverse = _merge(centered)
+    copies = np.bincount(inverse)
     if len(distinct) < needed:
         among = f" among {len(points)}" if len(distinct) < len(points) else ""
         raise TooFewPointsError(
@@ -139,7 +152,37 @@ def scale_points(points, needed):
     order = cKDTree(distinct).indices
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    return ScaledPoints(distinct[order], scale, rank[inverse.reshape(-1)], copies[order], first[order])
+    return ScaledPoints(distinct[order], scale, rank[inverse], copies[order], first[order])
+
+
+def _merge(points):
+    """Take points at one place as one.
+
+    Returns
+    -------
+    distinct : ndarray, (m, 3)
+    first : ndarray, (m,) int
+        The first point at each of their places.
+    inverse : ndarray, (n,) int
+        The place of each point.
+    """
+    distinct, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    reach = _SAME * np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1))
+    while reach > 0.0 and len(distinct) > 1:
+        distance, near = cKDTree(distinct).query(distinct, k=2, distance_upper_bound=reach, workers=-1)
+        close = np.flatnonzero(np.isfinite(distance[:, 1]))
+        if not len(close):
+            break
+        # Every one of them is joined to its nearest, so that each round leaves at most half of them.
+        joined = sparse.csr_array(
+            (np.ones(len(close), dtype=bool), (close, near[close, 1])), shape=(len(distinct),) * 2
+        )
+        _, kept, place = np.unique(
+            connected_components(joined, directed=False)[1], return_index=True, return_inverse=True
+        )
+        distinct, first, inverse = distinct[kept], first[kept], place[inverse]
+    return distinct, first, inverse
 
 
 def as_mask(chosen, count):
