@@ -112,7 +112,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
     free = free[cKDTree(laplacian.points[free]).indices]  # neighbours near in memory make the products faster
     load = load[free] + laplacian.areas[free] * source[free]
     matrix = matrix[free][:, free]
-    result[free] = solve_symmetric(matrix, load, result[free], 1.0 / matrix.diagonal(), report)
+    result[free] = solve_symmetric(matrix, load, result[free], report)
     if laplacian.options.symbol_correction:
         result[loose] -= SECOND_MOMENT / 8.0 * laplacian.kernel_widths[loose] ** 2 * source[loose]
     result[loose] += level - _means(laplacian.areas, result, component, loose)
