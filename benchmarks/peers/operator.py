@@ -103,7 +103,7 @@ class Operator:
         load = self.mass * source
         load = load - self.mass * (load.sum() / self.mass.sum())
         if self.stiffness.nnz > _WIDE * len(load):
-            solution = solve_symmetric(self.stiffness, load, scaling=1.0 / self.stiffness.diagonal())
+            solution = solve_symmetric(self.stiffness, load)
         else:
             solution = np.append(0.0, factors(self.stiffness[1:, 1:]).solve(load[1:]))  # any level serves
         return solution - self.mass @ solution / self.mass.sum()

@@ -104,15 +104,15 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
     free = np.flatnonzero(known & ~is_fixed)
     if not len(free):
         return result
-    if inside.any():
-        matrix, load = _with_fixed_points(laplacian, inside, np.where(is_fixed, result, 0.0), free, report)
-    else:
-        matrix, load = laplacian.stiffness, np.zeros(count)
-    report("Equations", 0.5)
     free = free[cKDTree(laplacian.points[free]).indices]  # neighbours near in memory make the products faster
-    load = load[free] + laplacian.areas[free] * source[free]
-    matrix = matrix[free][:, free]
-    result[free] = solve_symmetric(matrix, load, result[free], 1.0 / matrix.diagonal(), report)
+    load = laplacian.areas[free] * source[free]
+    if inside.any():
+        matrix, pull = _with_fixed_points(laplacian, inside, np.where(is_fixed, result, 0.0), free, report)
+        load += pull
+    else:
+        matrix = laplacian.stiffness[free][:, free]
+    report("Equations", 0.5)
+    result[free] = solve_symmetric(matrix, load, result[free], report)
     if laplacian.options.symbol_correction:
         result[loose] -= SECOND_MOMENT / 8.0 * laplacian.kernel_widths[loose] ** 2 * source[loose]
     result[loose] += level - _means(laplacian.areas, result, component, loose)
@@ -244,7 +244,7 @@ def _without_mean(areas, source, component, rows):
 
 
 def _with_fixed_points(laplacian, fixed, values, free, report):
-    """Return a stiffness and a load whose rows of free points take account of the fixed ones."""
+    """Return the stiffness of the free points, (k, k), and the load, (k,), that the fixed ones are to them."""
     report("Equations", 0.1)
     spacing = mean_spacing(laplacian)
     edge = _edge_distance(laplacian, fixed, spacing)
@@ -260,16 +260,14 @@ def _with_fixed_points(laplacian, fixed, values, free, report):
         narrow, narrow_own, narrow_load = _weights(narrow_laplacian(laplacian, _NARROW), fixed, values)
         weights = _blend(weights, wide) + _blend(narrow, 1.0 - wide)
         own, load = wide * own + (1.0 - wide) * narrow_own, wide * load + (1.0 - wide) * narrow_load
-    across = sparse.coo_array(weights[free][:, np.flatnonzero(fixed)])
+    rows = weights[free]
+    across = sparse.coo_array(rows[:, np.flatnonzero(fixed)])
     i, j = free[across.row], np.flatnonzero(fixed)[across.col]
     pulled = across.data * (1.0 + edge[j] / np.maximum(edge[i], _GRAZING * spacing[i]))
-    count = len(fixed)
-    load = load + np.bincount(i, pulled * values[j], count)
-    inner = weights[free][:, free]
-    diagonal = own + np.bincount(i, pulled, count)
-    diagonal[free] += inner.sum(axis=1)
-    place = sparse.csr_array((np.ones(len(free)), (free, np.arange(len(free)))), shape=(count, len(free)))
-    return (sparse.diags_array(diagonal) - place @ inner @ place.T).tocsr(), load
+    inner = rows[:, free]
+    diagonal = own[free] + np.bincount(across.row, pulled, len(free)) + inner.sum(axis=1)
+    load = load[free] + np.bincount(across.row, pulled * values[j], len(free))
+    return (sparse.diags_array(diagonal) - inner).tocsr(), load
 
 
 def _blend(weights, share):

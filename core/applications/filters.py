@@ -1,5 +1,8 @@
 """Filters of functions on the points by the frequencies they are made of (section 4 of the paper, Figure 12)."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from scipy.fft import dct
 from scipy.sparse.linalg import LinearOperator, eigsh
@@ -8,7 +11,7 @@ from scipy.special import expit
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
-from ..operator import symmetric_form
+from ..operator import Rows, symmetric_form
 
 _NODES = 4096  # at which a response is read
 _DEGREE = 800  # of a polynomial, at most
@@ -245,30 +248,33 @@ def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False,
     """
     report = progress or (lambda stage, fraction: None)
     values = check_values(values, len(laplacian.areas))
-    report("Filter", 0.0)
-    order, root, multiply = corrected_operator(laplacian, dirichlet, raw)
-    report("Filter", 0.0)
-    top = highest_eigenvalue(multiply, len(order))
-    coefficients = _polynomial(response, top, tolerance)
+    done = 0.0
 
+    def tell():
+        report("Filter", done)
+
+    tell()
     columns = values.reshape(len(values), -1)
-    before = columns[order] / root[:, None]
-    result = coefficients[0] * before
-    if len(coefficients) > 1:
-        now = (2.0 / top) * multiply(before) - before
-        result += coefficients[1] * now
-        for k in range(2, len(coefficients)):
-            if k % 10 == 0:
-                report("Filter", k / len(coefficients))
-            before, now = now, (4.0 / top) * multiply(now) - 2.0 * now - before
-            result += coefficients[k] * now
     filtered = respond(response, np.zeros(1))[0] * columns
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        order, root, multiply = corrected_operator(laplacian, dirichlet, raw, pool, tell)
+        top = highest_eigenvalue(multiply, len(order))
+        coefficients = _polynomial(response, top, tolerance)
+        before = columns[order] / root[:, None]
+        result = coefficients[0] * before
+        if len(coefficients) > 1:
+            now = (2.0 / top) * multiply(before) - before
+            result += coefficients[1] * now
+            for k in range(2, len(coefficients)):
+                done = k / len(coefficients)
+                before, now = now, (4.0 / top) * multiply(now) - 2.0 * now - before
+                result += coefficients[k] * now
     filtered[order] = root[:, None] * result
     return filtered.reshape(values.shape)
 
 
-def corrected_operator(laplacian, dirichlet=False, raw=False):
-    """Return the negated operator with the symbol correction as a product with a symmetric matrix.
+def corrected_operator(laplacian, dirichlet, raw, pool, report):
+    """Return the negated operator with the symbol correction as a product with a symmetric matrix, on all cores.
 
     Returns
     -------
@@ -277,14 +283,16 @@ def corrected_operator(laplacian, dirichlet=False, raw=False):
     multiply : callable
         Of (m, k) arrays: ``S y + mu2 / 8 S (h^2 S y)``, or S y without the correction. Positive semi-definite.
     """
-    order, root, matrix = symmetric_form(laplacian, laplacian.dirichlet[0] if dirichlet else laplacian.stiffness)
+    stiffness = laplacian.dirichlet[0] if dirichlet else laplacian.stiffness
+    order, root, matrix = symmetric_form(laplacian, stiffness, report)
+    rows = Rows(matrix, pool, report)
     if raw or not laplacian.options.symbol_correction:
-        return order, root, lambda y: matrix @ y
+        return order, root, lambda y: rows @ y
     squared = (SECOND_MOMENT / 8.0) * laplacian.kernel_widths[order, None] ** 2
 
     def multiply(y):
-        product = matrix @ y
-        return product + matrix @ (squared * product)
+        product = rows @ y
+        return product + rows @ (squared * product)
 
     return order, root, multiply
 

@@ -1,13 +1,13 @@
 """New places for the points: smoothed or sharpened by frequency, faired without eigenvectors, moved by a mode."""
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
 from ..operator import solve_symmetric
-from .filters import chebyshev_filter, corrected_operator, fairing, spectral_filter
+from .filters import chebyshev_filter, fairing, spectral_filter
 from .sizes import SurfaceSize, match_size
 
 _KEPT = (None, "area", "volume")
@@ -296,14 +296,13 @@ def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     base[known] = _centers(laplacian, laplacian.areas)[component[known]]
     if dirichlet:
         boundary = boundary_places(laplacian)
-        pull = laplacian.dirichlet[1]
-        order, root, multiply = corrected_operator(laplacian, dirichlet=True, raw=True)
-        # As distances from the centre: where there is no boundary the equations are singular, and all stays in place.
-        force = (pull @ np.where(laplacian.near_boundary[:, None], boundary - base, 0.0))[order] * root[:, None]
-        operator = LinearOperator((len(order),) * 2, matvec=multiply, dtype=np.float64)
-        base[order] += root[:, None] * np.column_stack(
-            [solve_symmetric(operator, column, progress=progress) for column in force.T]
-        )
+        stiffness, pull = laplacian.dirichlet
+        # As distances from the centre: where nothing is coupled with a boundary all stays in place.
+        force = pull @ np.where(laplacian.near_boundary[:, None], boundary - base, 0.0)
+        coupled = connected_components(stiffness, directed=False)[1]
+        rows = np.flatnonzero(known & np.isin(coupled, coupled[pull.diagonal() > 0.0]))
+        rows = rows[cKDTree(points[rows]).indices]  # neighbours near in memory make the products faster
+        base[rows] += solve_symmetric(stiffness[rows][:, rows], force[rows], progress=progress)
     return base
 
 

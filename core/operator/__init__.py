@@ -4,6 +4,7 @@ from .areas import SOLVERS, AreaSolution, estimate_areas
 from .cholesky import factorize
 from .curvature import mean_curvature
 from .factors import dissect, sparsify
+from .hierarchy import Rows
 from .laplacian import LaplaceBeltrami, build_laplacian, narrow_laplacian
 from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_symmetric
 from .spectrum import Spectrum, symmetric_form

@@ -6,9 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from scipy.linalg import eigh
 
-from .hierarchy import Level, build_levels, solve_roughly
+from .hierarchy import SMALL, Level, build_levels, solve_roughly
 
-_SMALL = 1000  # unknowns that are solved whole in a tenth of a second
 _DENSE = 4000  # in ten seconds; where the coarsest version has more, this is not the way
 _BEYOND = 0.1  # how far beyond the last eigenvalue wanted, as a share of it, the block of vectors reaches
 _GUARDS = 4  # vectors that it has more, at least
@@ -42,7 +41,7 @@ def coarse_to_fine(matrix, slowest, count, tolerance, report):
         Ascending, orthonormal.
     """
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        least = max(_SMALL, 5 * count)
+        least = max(SMALL, 5 * count)
         levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report)
         if not levels or last.shape[0] > max(least, _DENSE):
             return None

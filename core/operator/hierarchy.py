@@ -1,12 +1,15 @@
-"""Coarse versions of a symmetric matrix, and the approximate inverse that they make together."""
+"""Coarse versions of a symmetric matrix, and the approximate inverses that they make together."""
 
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import pinvh
+from scipy.sparse.linalg import LinearOperator
 
-_PART = 1 << 20  # entries of a matrix that are multiplied in one go: some hundredths of a second
+SMALL = 1000  # unknowns that are solved whole in a tenth of a second
+PART = 1 << 20  # entries of a matrix that are multiplied in one go: some hundredths of a second
 _STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
 # first about 20 become one, with the others fewer
 _SMOOTHED = 0.3  # smoothing takes out the errors whose eigenvalues are at least this share of the largest
@@ -26,7 +29,7 @@ class Rows:
 
     def __init__(self, matrix, pool, report):
         self._map, self._report, self._count = pool.map, report, matrix.shape[0]
-        starts = np.append(np.arange(0, max(matrix.nnz, 1), _PART), matrix.nnz)
+        starts = np.append(np.arange(0, max(matrix.nnz, 1), PART), matrix.nnz)
         cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
         self._slices = [slice(first, last) for first, last in pairwise(cuts)]
         self._parts = []
@@ -39,16 +42,17 @@ class Rows:
     def __matmul__(self, other):
         """Multiply with an array, (m, k), or a sparse one."""
         if sparse.issparse(other):
-            return sparse.vstack(list(self._each(lambda rows, part: part @ other)), format="csr")
+            return sparse.vstack(list(self.each(lambda rows, part: part @ other)), format="csr")
         result = np.empty((self._count, other.shape[1]), dtype=other.dtype)
 
         def fill(rows, part):
             result[rows] = part @ other
 
-        list(self._each(fill))
+        list(self.each(fill))
         return result
 
-    def _each(self, function):
+    def each(self, function):
+        """Yield what a function makes of each slice of the rows and the part of the matrix there."""
         for result in self._map(function, self._slices, self._parts):
             self._report()
             yield result
@@ -112,15 +116,15 @@ def build_levels(matrix, slowest, least, enough, pool, report):
     """
     levels, mass = [], None
     while matrix.shape[0] > least:
-        n, diagonal = matrix.shape[0], matrix.diagonal()
+        n, diagonal, rows = matrix.shape[0], matrix.diagonal(), Rows(matrix, pool, report)
         for share in _STRONG:
-            part = aggregates(matrix, diagonal, share, report)
+            part = aggregates(rows, diagonal, share, report)
             if part.max() >= enough:
                 break
         norm = np.sqrt(np.bincount(part, slowest**2))
         if 2 * len(norm) > n:
             break
-        rows, top = Rows(matrix, pool, report), largest_eigenvalue(matrix, diagonal, report)
+        top = largest_eigenvalue(rows, diagonal)
         plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1)), shape=(n, len(norm)))
         prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ (rows @ plain)).tocsr()
         restriction = prolongation.T.tocsr()
@@ -129,13 +133,13 @@ def build_levels(matrix, slowest, least, enough, pool, report):
         levels.append(
             Level(
                 matrix=rows,
-                rough=Rows(matrix.astype(np.float32), pool, report),
+                rough=Rows(_single(matrix), pool, report),
                 mass=mass,
                 top=top * diagonal.max(),
                 steps=[(1.0 / (w * diagonal))[:, None].astype(np.float32) for w in (middle - half, middle + half)],
                 prolongation=Rows(prolongation, pool, report),
-                extension=Rows(prolongation.astype(np.float32), pool, report),
-                restriction=Rows(restriction.astype(np.float32), pool, report),
+                extension=Rows(_single(prolongation), pool, report),
+                restriction=Rows(_single(restriction), pool, report),
             )
         )
         matrix = back @ (rows @ prolongation)
@@ -144,23 +148,28 @@ def build_levels(matrix, slowest, least, enough, pool, report):
     return levels, matrix, mass
 
 
-def aggregates(matrix, diagonal, share, report=lambda: None):
-    """Part the unknowns into the neighbourhoods of roots, no two of which are strongly coupled.
+def _single(matrix):
+    """Return a matrix in single precision, with the same indices in memory: neither may be sorted then."""
+    return sparse.csr_array((matrix.data.astype(np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def aggregates(matrix, diagonal, share, report):
+    """Part the unknowns of a matrix, given by `Rows`, into neighbourhoods of roots, of which no two couple strongly.
 
     Returns
     -------
     ndarray, (n,) int
         Number of each unknown's part.
     """
+
+    def strong(rows, part):
+        row = np.repeat(np.arange(rows.start, rows.stop, dtype=np.int32), np.diff(part.indptr))
+        itself = row == part.indices
+        kept = itself | (-part.data > share * np.minimum(diagonal[row], diagonal[part.indices]))
+        return row[kept], part.indices[kept], np.where(itself[kept], np.inf, -part.data[kept])
+
+    row, column, weight = (np.concatenate(values) for values in zip(*matrix.each(strong), strict=True))
     n = len(diagonal)
-    row = np.repeat(np.arange(n, dtype=np.int32), np.diff(matrix.indptr))
-    report()
-    weight = -matrix.data
-    weight[row == matrix.indices] = np.inf
-    report()
-    kept = weight > share * np.minimum(diagonal[row], diagonal[matrix.indices])
-    report()
-    row, column, weight = row[kept], matrix.indices[kept], weight[kept]
     first = np.searchsorted(row, np.arange(n, dtype=np.int32))
     rank = np.random.default_rng(0).permutation(n).astype(np.int32)
     waiting, root = rank.copy(), np.zeros(n, dtype=bool)
@@ -176,11 +185,10 @@ def aggregates(matrix, diagonal, share, report=lambda: None):
     return (np.cumsum(root) - 1)[chosen]
 
 
-def largest_eigenvalue(matrix, diagonal, report=lambda: None):
-    """Estimate the largest eigenvalue of the matrix over its diagonal, rather too large than too small."""
+def largest_eigenvalue(matrix, diagonal):
+    """Estimate the largest eigenvalue of the matrix over its diagonal; of raw scans, up to a fifth too low."""
     y = np.random.default_rng(0).standard_normal(len(diagonal))
     for _ in range(10):  # leaves less than a tenth
-        report()
         y /= np.linalg.norm(y)
         y, before = (matrix @ y[:, None])[:, 0] / diagonal, y
     return 1.1 * np.linalg.norm(y) / np.linalg.norm(before)
@@ -215,10 +223,73 @@ def solve_roughly(levels, load, shifts, wanted):
             return known
         load = load - level.duals @ share
     result = level.extension @ solve_roughly(levels[1:], level.restriction @ load, shifts, wanted)
-    for step in level.steps:
+    _smooth(level, load, result, level.steps)
+    result += known
+    return result
+
+
+def approximate_inverse(matrix, pool, report):
+    """Return an approximate inverse that is symmetric, for conjugate gradients.
+
+    Parameters
+    ----------
+    matrix : csr_array, (n, n)
+        Symmetric positive semi-definite; it hardly changes constants. No diagonal entry is zero.
+    pool, report
+        As of `Rows`.
+
+    Returns
+    -------
+    LinearOperator, (n, n), or None
+        A V-cycle in single precision; none where coarse versions do not help.
+    """
+    levels, last, _ = build_levels(matrix, np.ones(matrix.shape[0]), SMALL, 0, pool, report)
+    if not levels or last.shape[0] > SMALL:
+        return None
+    for level in levels:
+        _shorten(level)
+    inverse = pinvh(last.toarray())  # of constants, where nothing is fixed, it makes nothing
+
+    def multiply(load):
+        size = np.linalg.norm(load) or 1.0  # single precision has no smaller numbers than 1e-38
+        return size * _cycle(levels, inverse, (load[:, None] / size).astype(np.float32))[:, 0].astype(np.float64)
+
+    return LinearOperator(matrix.shape, matvec=multiply, dtype=np.float64)
+
+
+def _shorten(level):
+    """Shorten the steps of smoothing so far that they surely enlarge no error, which keeps the inverse positive.
+
+    Two steps do not if ``1 / first + 1 / second``, here with the diagonal, is more than any eigenvalue, and these are
+    not more than the largest sum over a row of sizes (Gershgorin). The estimated largest eigenvalue may be too low.
+    """
+    room = sum(1.0 / step[:, 0] for step in level.steps)
+
+    def excess(rows, part):
+        return np.max(np.add.reduceat(np.abs(part.data), part.indptr[:-1]) / room[rows])
+
+    share = np.float32(1.0 / max(1.0, *level.matrix.each(excess)))
+    level.steps = [share * step for step in level.steps]
+
+
+def _cycle(levels, inverse, load):
+    """Smooth as much before the correction by the next level as after it, which makes both together symmetric."""
+    if not levels:
+        return (inverse @ load).astype(np.float32)
+    level = levels[0]
+    result = level.steps[0] * load
+    _smooth(level, load, result, level.steps[1:])
+    rest = level.rough @ result
+    np.subtract(load, rest, out=rest)
+    result += level.extension @ _cycle(levels[1:], inverse, level.restriction @ rest)
+    _smooth(level, load, result, level.steps)
+    return result
+
+
+def _smooth(level, load, result, steps):
+    """Improve a result in place by some steps over the diagonal."""
+    for step in steps:
         change = level.rough @ result
         np.subtract(load, change, out=change)
         change *= step
         result += change
-    result += known
-    return result

@@ -1,0 +1,165 @@
+"""Equations solved with coarse versions of their matrix: the direct answer, in as few steps for many points."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+import core
+from benchmarks.samplings import random_sphere
+from core.operator import solvers
+from core.operator.hierarchy import approximate_inverse
+from core.operator.solvers import conjugate_gradients, solve_symmetric
+
+CLOUDS = ["random sphere", "random torus", "random square", "density jump"]
+
+
+def silent():
+    pass
+
+
+def kernel_matrix(points, reach):
+    """Stiffness with weights that fall off to zero at a distance."""
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    half = sparse.coo_array(((1.0 - distance / reach) ** 2, pairs.T), shape=(len(points),) * 2)
+    weights = (half + half.T).tocsr()
+    return (sparse.diags_array(weights.sum(axis=1)) - weights).tocsr()
+
+
+def fixed_ends(laplacian):
+    """Matrix and load of a harmonic function with values 0 and 1 at the ends."""
+    x = laplacian.points[:, 0]
+    low, high = np.quantile(x, [0.05, 0.95])
+    free = np.flatnonzero((x > low) & (x < high))
+    matrix = laplacian.stiffness[free]
+    return matrix[:, free], -(matrix @ (x >= high))
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Have coarse versions used for any number of points."""
+    monkeypatch.setattr(solvers, "_FEW", 0)
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+def test_fixed_points(operators, coarse, name):
+    matrix, load = fixed_ends(operators(name))
+    exact = splu(matrix.tocsc()).solve(load)
+    np.testing.assert_allclose(solve_symmetric(matrix, load), exact, rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+def test_nothing_fixed(operators, coarse, name):
+    laplacian = operators(name)
+    load = laplacian.areas * laplacian.points[:, 0]
+    load -= load.mean()
+    exact = np.append(0.0, splu(laplacian.stiffness[1:, 1:].tocsc()).solve(load[1:]))
+    found = solve_symmetric(laplacian.stiffness, load)
+    np.testing.assert_allclose(found - found[0], exact, rtol=0.0, atol=1e-8 * np.ptp(exact))
+
+
+def test_several_right_hand_sides_and_a_start(operators, coarse):
+    matrix, load = fixed_ends(operators("random torus"))
+    both = np.column_stack([load, np.random.default_rng(0).normal(size=len(load)), 0.0 * load])
+    exact = splu(matrix.tocsc()).solve(both)
+    for start in (None, np.ones_like(both)):
+        found = solve_symmetric(matrix, both, start)
+        np.testing.assert_allclose(found, exact, rtol=0.0, atol=1e-8 * np.abs(exact).max())
+    assert not solve_symmetric(matrix, both)[:, 2].any()
+
+
+def test_components_do_not_mix(operators, coarse):
+    """A loose component stays where it started, next to one with fixed points, and next to another one like it."""
+    matrix, load = fixed_ends(operators("random torus"))
+    loose = operators("coarse torus").stiffness
+    whole = sparse.block_diag([matrix, loose, loose], format="csr")
+    found = solve_symmetric(whole, np.append(load, np.zeros(2 * loose.shape[0])))
+    np.testing.assert_allclose(found[: len(load)], splu(matrix.tocsc()).solve(load), rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(found[len(load) :], 0.0, atol=1e-12)
+
+
+def test_fields_are_the_same(operators, monkeypatch):
+    laplacian = operators("random square")
+    fixed = np.flatnonzero(np.abs(laplacian.points[:, 0] - 0.5) > 0.47)
+    values = np.sin(5.0 * laplacian.points[fixed, 1])
+    plain = core.harmonic_field(laplacian, fixed, values), core.smoothing_base(laplacian, dirichlet=True)
+    monkeypatch.setattr(solvers, "_FEW", 0)
+    coarse = core.harmonic_field(laplacian, fixed, values), core.smoothing_base(laplacian, dirichlet=True)
+    for one, other in zip(plain, coarse, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-7)  # plain steps end that far from the exact answer
+
+
+def test_the_number_of_steps_hardly_grows():
+    steps = []
+    for count in (2000, 8000, 32000):
+        points = random_sphere(count)
+        matrix = kernel_matrix(points, 20.0 / np.sqrt(count))  # as wide as the operator's
+        load = points[:, 2] - points[:, 2].mean()
+        with ThreadPoolExecutor() as pool:
+            inverse = approximate_inverse(matrix, pool, silent)
+            found = conjugate_gradients(matrix, load, scaling=inverse)
+        assert found.converged
+        steps.append(found.products)
+    assert max(steps) <= min(steps) + 4
+    assert max(steps) < 20
+
+
+@pytest.mark.parametrize("twins", [0, 500])
+def test_the_inverse_is_symmetric_and_positive(twins):
+    """Also where points in pairs next to each other have by far the largest eigenvalues, which are not estimated."""
+    points = random_sphere(3000)
+    matrix = kernel_matrix(points, 0.15)
+    row = np.arange(0, 2 * twins, 2)
+    heavy = 1e3 * matrix.diagonal().max() * np.ones(twins)
+    pairs = sparse.coo_array((heavy, (row, row + 1)), shape=matrix.shape)
+    pairs = pairs + pairs.T
+    matrix = (matrix + sparse.diags_array(pairs.sum(axis=1)) - pairs + sparse.eye_array(3000) * 1e-3).tocsr()
+    x, y = np.random.default_rng(0).normal(size=(2, 3000))
+    with ThreadPoolExecutor() as pool:
+        inverse = approximate_inverse(matrix, pool, silent)
+        one, other = inverse * x, inverse * y
+    np.testing.assert_allclose(y @ one, x @ other, rtol=0.0, atol=1e-5 * np.linalg.norm(y) * np.linalg.norm(one))
+    assert x @ one > 0.0
+    assert y @ other > 0.0
+
+
+def test_the_result_does_not_depend_on_cores(operators, coarse, monkeypatch):
+    matrix, load = fixed_ends(operators("random sphere"))
+    found = []
+    for cores in (1, 3):
+        monkeypatch.setattr(os, "cpu_count", lambda cores=cores: cores)
+        found.append(solve_symmetric(matrix, load))
+    np.testing.assert_array_equal(found[0], found[1])
+
+
+def test_where_coarse_versions_do_not_help(coarse):
+    """Nothing is coupled, or all of it repels: the plain steps go on."""
+    for share in (0.0, 0.3):
+        value = np.linspace(1.0, 1e4, 3000)
+        root = np.sqrt(value[1:] * value[:-1])
+        matrix = sparse.diags_array([share * root, value, share * root], offsets=[-1, 0, 1]).tocsr()
+        exact = np.sin(np.arange(3000.0))
+        found = solve_symmetric(matrix, matrix @ exact)
+        np.testing.assert_allclose(found, exact, atol=1e-5)
+
+
+def test_it_can_be_stopped_at_any_time(operators, coarse):
+    matrix, load = fixed_ends(operators("random sphere"))
+    seen = []
+    solve_symmetric(matrix, load, progress=lambda stage, fraction: seen.append(fraction))
+    assert seen == sorted(seen)
+    assert seen[-1] < 1.0
+    for last in range(0, len(seen), 5):
+        left = iter(range(last))
+
+        def stop(stage, fraction, left=left):
+            if next(left, None) is None:
+                raise core.Cancelled
+
+        with pytest.raises(core.Cancelled):
+            solve_symmetric(matrix, load, progress=stop)
