@@ -1,6 +1,9 @@
 """Every setting of the operator, with defaults that serve scans."""
 
 from dataclasses import dataclass
+from numbers import Integral, Real
+
+import numpy as np
 
 from .errors import PointCloudError
 
@@ -11,6 +14,7 @@ _CHOICES = {
     "boundary": ("auto", "off"),
     "projection": ("auto", "off", "quadric", "plane"),
 }
+_SWITCHES = "orient", "sheets", "curvature_correction", "symbol_correction"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,13 +101,18 @@ class LaplacianOptions:
     def __post_init__(self):
         for name, choices in _CHOICES.items():
             value = getattr(self, name)
-            if value not in choices:
+            if not isinstance(value, str) or value not in choices:
                 raise PointCloudError(f"Option {name} is {value!r}. Choose one of {', '.join(choices)}.")
-        if int(self.neighbors) != self.neighbors or self.neighbors < 6:
+        for name in _SWITCHES:
+            value = getattr(self, name)
+            if not isinstance(value, bool | np.bool_):
+                raise PointCloudError(f"Option {name} is {value!r}. Use True or False.")
+        if not isinstance(self.neighbors, Integral) or self.neighbors < 6:
             raise PointCloudError(f"Option neighbors is {self.neighbors!r}. Use a whole number of at least 6.")
         for name in ("bandwidth_factor", "regularization"):
-            if not getattr(self, name) > 0.0:
-                raise PointCloudError(f"Option {name} is {getattr(self, name)!r}. Use a number above zero.")
+            value = getattr(self, name)
+            if not isinstance(value, Real) or not 0.0 < value < np.inf:
+                raise PointCloudError(f"Option {name} is {value!r}. Use a number above zero.")
         # About 9 factor^2 neighbors points share a support of 3 h on an even sample; ten keep a plane well determined.
         narrow = 0.3 if self.bandwidth == "adaptive" else 1.0
         if 9.0 * (narrow * self.bandwidth_factor) ** 2 * self.neighbors < 10.0:
@@ -151,3 +160,15 @@ class LaplacianOptions:
             curvature_correction=False,
             symbol_correction=False,
         )
+
+
+def check_options(options):
+    """Check that options are `LaplacianOptions`.
+
+    Raises
+    ------
+    PointCloudError
+        They are something else.
+    """
+    if not isinstance(options, LaplacianOptions):
+        raise PointCloudError(f"The options are {options!r}. Use LaplacianOptions(...).")

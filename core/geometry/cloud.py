@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import ComponentError
-from ..options import LaplacianOptions
+from ..options import LaplacianOptions, check_options
 from .bandwidth import depth, mean_gaps, smoothing_lengths
 from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
 from .cells import measure_cells
@@ -128,6 +128,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     """
     report = progress or (lambda stage, fraction: None)
     report("Normals", 0.0)
+    check_options(options)
     points = check_points(points)
     needed = options.neighbors + 1
     scaled = scale_points(points, needed)
@@ -382,7 +383,7 @@ def _notices(duplicates, left_out, share, noise, narrow):
     noisy, filling = np.mean(noise > 0.0), np.mean(noise > FILLING)
     level = noise.mean() / max(noisy, 1e-300)
     texts = {
-        f"Points that lie exactly on another one: {duplicates}. They share one area.": duplicates,
+        f"Points that lie on another one: {duplicates}. They share one area.": duplicates,
         f"Noise of {level:.2f} of the spacing was smoothed within the operator, at {noisy:.0%} of the points.": noisy
         > filling,
         "Noise of more than half the spacing was smoothed within the operator, and details with it: areas may be off by"

@@ -9,7 +9,7 @@ from ..errors import InvalidPointsError
 from ..geometry import arc_length, check_points, move_apart, projected_distance, read_cloud
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
-from ..options import LaplacianOptions
+from ..options import LaplacianOptions, check_options
 from .areas import NO_AREA, solve_areas
 from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
 from .stiffness import assemble_stiffness
@@ -299,6 +299,7 @@ def build_laplacian(
     [0. 2. 2. 2.]
     """
     report = progress or (lambda stage, fraction: None)
+    check_options(options)
     points = check_points(points)
     check_memory(len(points), options)
 

@@ -142,6 +142,35 @@ def test_the_input_is_left_alone(sphere):
     np.testing.assert_array_equal(laplacian.points, before)
 
 
+@pytest.mark.parametrize("size", [1e-300, 1e-70, 1e70, 1e200, 1e308])
+def test_sizes_whose_squares_are_no_numbers(sphere, size):
+    with pytest.raises(core.InvalidPointsError, match="squares"):
+        core.build_laplacian(size * sphere)
+
+
+def test_one_point_out_of_all_bounds(sphere):
+    with pytest.raises(core.InvalidPointsError, match="squares"):
+        core.build_laplacian(np.concatenate([sphere, [[1e308, 0.0, 0.0], [-1e308, 0.0, 0.0]]]))
+
+
+@pytest.mark.parametrize("size", [1e-55, 1e55])
+def test_sizes_at_the_bounds_follow_the_law_of_scale(sphere, size):
+    there, here = core.build_laplacian(size * sphere), core.build_laplacian(sphere)
+    np.testing.assert_allclose(there.areas / size / size, here.areas, rtol=1e-9)
+    np.testing.assert_allclose(there.gaussian_curvature * size * size, here.gaussian_curvature, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("rings", "meridians"), [(9, 18), (13, 24), (16, 18)])
+@pytest.mark.parametrize("projection", ["auto", "plane"])
+def test_globes(rings, meridians, projection):
+    """Their poles are many points at one place but for rounding, and have many neighbours at one distance."""
+    up, around = np.meshgrid(np.linspace(0.0, np.pi, rings), 2.0 * np.pi * np.arange(meridians) / meridians)
+    points = np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], axis=2).reshape(-1, 3)
+    laplacian = core.build_laplacian(points, options=core.LaplacianOptions(projection=projection))
+    assert np.all(np.isfinite(laplacian.normals))
+    assert np.all(laplacian.areas > 0.0)
+
+
 class TestDuplicates:
     @pytest.fixture
     def clouds(self, sphere):
@@ -151,7 +180,23 @@ class TestDuplicates:
         return sphere, doubled[order], order
 
     def test_a_notice_counts_them(self, clouds):
-        assert any("exactly on another one: 50." in notice for notice in core.build_laplacian(clouds[1]).notices)
+        assert any("on another one: 50." in notice for notice in core.build_laplacian(clouds[1]).notices)
+
+    @pytest.mark.parametrize("apart", [1e-17, 1e-14, 1e-10])
+    @pytest.mark.parametrize("copies", [1, 20])
+    def test_rounding_tells_no_points_apart(self, sphere, apart, copies):
+        rng = np.random.default_rng(1)
+        near = [sphere + apart * rng.standard_normal(sphere.shape) for _ in range(copies)]
+        laplacian, single = core.build_laplacian(np.concatenate([sphere, *near])), core.build_laplacian(sphere)
+        assert laplacian.notices == [f"Points that lie on another one: {copies * len(sphere)}. They share one area."]
+        np.testing.assert_allclose(laplacian.areas[: len(sphere)] * (copies + 1), single.areas, rtol=1e-6)
+
+    def test_a_heap_is_one_point(self, sphere):
+        heap = sphere[7] + 1e-12 * np.random.default_rng(2).standard_normal((20_000, 3))
+        assert len(scale_points(np.concatenate([sphere, heap]), 100).points) == len(sphere)
+
+    def test_small_objects_with_a_stray_point_far_off_stay_whole(self, sphere):
+        assert len(scale_points(np.concatenate([sphere, [[1e10, 0.0, 0.0]]]), 100).points) == len(sphere) + 1
 
     def test_they_share_one_area(self, clouds):
         single, doubled, order = clouds
