@@ -31,7 +31,7 @@ def read_blocks(file, path, skipped=()):
                 raise InvalidPointsError(
                     f"{path} has a line of {_LONGEST:,} characters or more, which is no point. Export it again."
                 )
-            while len(end) == _LONGEST:
+            while len(end) == _LONGEST and end[-1] not in ("\n", ord("\n")):
                 end = file.readline(_LONGEST)
         yield lines
 

@@ -370,6 +370,12 @@ class TestOddFilesThatAreRead:
         (tmp_path / "a.xyz").write_text(f"#{long}\n1 2 3\n//{long}\n4 5 6")
         assert read_points(tmp_path / "a.xyz").points.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
 
+    @pytest.mark.parametrize("length", [65_535, 65_536, 99_999, 100_000, 165_535, 165_536, 165_537, 265_536])
+    def test_the_line_behind_a_long_one(self, tmp_path, length):
+        """At the lengths at which blocks and pieces of lines end."""
+        (tmp_path / "a.obj").write_text("#" * (length - 1) + "\nv 1 2 3\nv 4 5 6\n")
+        assert len(read_points(tmp_path / "a.obj").points) == 2
+
     def test_lines_across_blocks(self, tmp_path):
         """Text is read in blocks, whose ends fall between any two characters of these lines."""
         points = np.arange(90_000.0).reshape(-1, 3)
