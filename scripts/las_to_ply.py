@@ -11,6 +11,7 @@ from core import PointCloudError
 from core.files import PointTable, write_points
 
 COLUMNS = ("intensity", "classification", "return_number")  # of every LAS file
+PACKED = 100  # bytes of points in one of a LAZ file at most; 5 to 20 are usual
 COLORS = ("red", "green", "blue")
 
 
@@ -27,7 +28,16 @@ def read_las(path) -> PointTable:
         It is no such file, or broken, or empty.
     """
     try:
-        las = laspy.read(path)
+        with laspy.open(path) as reader:
+            header, size = reader.header, path.stat().st_size
+            held = PACKED * size if header.are_points_compressed else size - header.offset_to_point_data
+            if header.point_count * header.point_format.size > held:  # before there is memory for so many
+                raise PointCloudError(
+                    f"{path} is too short for the {header.point_count:,} points that its header names. Copy it again."
+                )
+            las = reader.read()
+    except PointCloudError:
+        raise
     except (laspy.errors.LaspyException, OSError, ValueError) as error:
         raise PointCloudError(f"{path} cannot be read as a LAS or LAZ file: {error}") from error
     if len(las.points) == 0:

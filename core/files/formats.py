@@ -1,33 +1,23 @@
 """Which file is read and written how, by the ending of its name."""
 
+import os
+import struct
 import zipfile
+import zlib
 
 import numpy as np
 
-from ..errors import InvalidPointsError, PointCloudError
+from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
+from .arrays import read_array
+from .lines import brief
 from .ply import read_ply, write_ply
 from .table import PointTable, check_table
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
 
 _LASER = (".las", ".laz")
-
-
-def _read_array(path) -> PointTable:
-    """Read an array (n, 3) of numpy, or the one named points among several."""
-    try:
-        loaded = np.load(path, allow_pickle=False)
-        if not isinstance(loaded, np.ndarray):  # several, whatever the file is called
-            with loaded:
-                loaded = loaded["points"]
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile) as error:
-        raise InvalidPointsError(
-            f"{path} holds no array of points: {str(error).strip(chr(39))}. Save it again."
-        ) from None
-    if loaded.ndim != 2 or loaded.shape[1] != 3 or loaded.dtype.kind not in "iuf":
-        raise InvalidPointsError(f"{path} holds {loaded.dtype} of the shape {loaded.shape}. Points are numbers (n, 3).")
-    return PointTable(loaded.astype(np.float64), single=loaded.dtype == np.float32)
-
+# What the modules that readers use raise about broken files; RuntimeError of archives with a password.
+_FAULTS = (ValueError, OverflowError, EOFError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile)
 
 _READERS = {
     ".ply": read_ply,
@@ -36,8 +26,8 @@ _READERS = {
     ".pts": read_scan,
     ".csv": read_columns,
     ".txt": read_columns,
-    ".npy": _read_array,
-    ".npz": _read_array,
+    ".npy": read_array,
+    ".npz": read_array,
 }
 READABLE = tuple(_READERS)
 WRITABLE = (".ply", ".xyz", ".csv")
@@ -67,13 +57,24 @@ def read_points(path) -> PointTable:
         )
     if suffix not in _READERS:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
-    if not path.is_file():
+    if not os.path.isfile(path):  # that of pathlib fails at folders that may not be read
         raise PointCloudError(f"There is no file {path}. Check its name and folder.")
     try:
-        table = check_table(_READERS[suffix](path), path)
+        with np.errstate(invalid="ignore", over="ignore"):  # in numbers that are refused, or kept as infinite
+            table = _READERS[suffix](path)
+    except PointCloudError:
+        raise
     except OSError as error:
         raise PointCloudError(f"{path} cannot be read: {error.strerror or error}. Check the file.") from error
-    step = float(np.spacing(np.float32(np.abs(table.points).max())))
+    except MemoryError as error:
+        raise NotEnoughMemoryError(
+            f"{path} needs more memory than is free. Divide the file, or free memory."
+        ) from error
+    except _FAULTS as error:
+        raise InvalidPointsError(
+            f"{path} is broken: {brief(str(error).strip('.'))}. Copy or export it again."
+        ) from error
+    step = float(np.spacing(np.float32(check_table(table, path))))
     if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
         table.notices.append(
             f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in"

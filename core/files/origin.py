@@ -4,6 +4,7 @@ import numpy as np
 
 _FINE = 1e-5  # step of single precision that does not hurt, as a share of the extent ...
 _FINEST = 1e-3  # ... and in all: a millimetre where the unit is the metre
+_POINT = 1e-30  # extent below which points are at one place, for single precision and for powers of ten
 _SHARED = 1e-4  # step for the sake of a common origin; about four times finer than what `check_points` refuses
 
 
@@ -19,7 +20,8 @@ def is_coarse(points) -> bool:
 
 def _extent(points):
     """Longest side of the box around the points; that of points at one place counts as one."""
-    return float(np.ptp(points, axis=0).max()) or 1.0
+    extent = float(np.ptp(points, axis=0).max())
+    return extent if extent > _POINT else 1.0
 
 
 def choose_origin(points, known=None):

@@ -1,12 +1,13 @@
 """PLY, the Stanford polygon format: the vertices and their properties, in text or binary."""
 
 import os
-from itertools import islice
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from .lines import brief, is_number, read_blocks
 from .table import PointTable, from_columns, to_columns
 
 _CODES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
@@ -38,21 +39,21 @@ def read_ply(path) -> PointTable:
         names = [element.name for element in elements]
         if "vertex" not in names:
             raise InvalidPointsError(
-                f"{path} has no vertices, only {', '.join(names) or 'nothing'}. It holds no points."
+                f"{path} has no vertices, only {brief(', '.join(names)) or 'nothing'}. It holds no points."
             )
         vertex = elements[names.index("vertex")]
         before = [element for element in elements[: names.index("vertex")] if element.count]
         for element in (vertex, *before):
             if None in element.types:
                 raise InvalidPointsError(
-                    f"{path} has lists in its element {element.name}, before or among its points. Save it again"
+                    f"{path} has lists in its element {brief(element.name)}, before or among its points. Save it again"
                     " with plain vertices first."
                 )
         read = _read_text if order is None else _read_binary
         columns = read(file, order, before, vertex, path)
     table = from_columns(dict(zip(vertex.names, columns, strict=True)), path)
     table.notices += [
-        f"{path.name}: left out {element.count} {element.name} elements. Only points are read."
+        f"{path.name}: left out {element.count} {brief(element.name)} elements. Only points are read."
         for element in elements
         if element is not vertex and element.count
     ]
@@ -85,7 +86,8 @@ def _read_header(file, path):
                 elements[-1].types.append(_TYPES[kind])
             case _:
                 raise InvalidPointsError(
-                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PLY file."
+                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PLY file. Export it"
+                    " again."
                 )
     raise InvalidPointsError(f"{path} has a header without an end. Export it again.")
 
@@ -105,20 +107,42 @@ def _read_binary(file, order, before, vertex, path):
 
 
 def _read_text(file, order, before, vertex, path):
-    first, width = sum(element.count for element in before), len(vertex.names)
-    lines = list(islice(filter(bytes.strip, file), first, first + vertex.count))
-    if len(lines) < vertex.count:
-        raise _too_short(path, len(lines), vertex.count)
-    try:
-        values = np.loadtxt(lines, ndmin=2, comments=None, encoding="ascii") if lines else np.empty((0, width))
-    except ValueError:
-        values = np.empty((0, 0))
-    if values.shape != (vertex.count, width):
-        _refuse_row(lines, width, path)
-    # The text may hold more digits than the float that the header names.
-    return [
-        column.astype("f8" if code[0] == "f" else code) for column, code in zip(values.T, vertex.types, strict=True)
-    ]
+    begin, width = file.tell(), len(vertex.names)
+
+    def rows():
+        """Return the lines of the points from the first on; there may be fewer than the header names."""
+        file.seek(begin)
+        first = sum(element.count for element in before)
+        filled = filter(bytes.strip, chain.from_iterable(read_blocks(file, path)))
+        return islice(filled, first, first + vertex.count)
+
+    lines = rows()
+    line = next(lines, None)
+    if line is None:
+        values = np.empty((0, width))
+    else:
+        try:
+            values = np.loadtxt(chain([line], lines), ndmin=2, comments=None, encoding="ascii")
+        except ValueError:
+            _refuse_row(rows(), width, path)
+            raise
+    if values.shape[1] != width:
+        _refuse_row(rows(), width, path)
+    if len(values) < vertex.count:
+        raise _too_short(path, len(values), vertex.count)
+    return [_typed(column, code) for column, code in zip(values.T, vertex.types, strict=True)]
+
+
+def _typed(column, code):
+    """Give numbers of text the type that the header names, unless that would lose what the text holds.
+
+    It may hold more digits than the float of the header, and numbers that are no whole ones, or too large.
+    """
+    if code[0] != "f":
+        limits = np.iinfo(code)
+        if limits.min <= column.min() and column.max() <= limits.max:  # neither is NaN
+            return column.astype(code)
+    return column.astype("f8")
 
 
 def _too_short(path, found, count):
@@ -131,13 +155,14 @@ def _refuse_row(lines, width, path):
     """Say which of some lines does not hold so many numbers."""
     for number, line in enumerate(lines, start=1):
         words = line.decode("ascii", errors="replace").split()
-        try:
-            wrong = "" if len(words) == width else f"{len(words)} numbers where the header names {width} properties"
-            [float(word) for word in words]
-        except ValueError as error:
-            wrong = str(error)
-        if wrong:
-            raise InvalidPointsError(f"{path}, point {number}: {wrong}. Correct the file.")
+        odd = next((word for word in words if not is_number(word)), None)
+        if len(words) != width:
+            wrong = f"{len(words)} numbers where the header names {width} properties"
+        elif odd is not None:
+            wrong = f"could not convert string to float: {brief(odd)!r}"
+        else:
+            continue
+        raise InvalidPointsError(f"{path}, point {number}: {wrong}. Correct the file.")
 
 
 def write_ply(path, table, double=True):

@@ -7,11 +7,13 @@ from itertools import chain, count
 import numpy as np
 
 from ..errors import InvalidPointsError, TooFewPointsError
+from .lines import brief
 
 NORMAL = "normal"  # the attribute that files call nx ny nz
 _NORMALS = ("nx", "ny", "nz")
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _AXES = ("x", "y", "z")
+_FARTHEST = 1e30  # of a coordinate, below the end of single precision, so that differences are numbers, too
 
 
 @dataclass
@@ -53,7 +55,7 @@ def from_columns(columns, path):
     missing = [axis for axis in _AXES if axis not in named]
     if missing:
         raise InvalidPointsError(
-            f"{path} has no {' '.join(missing)} among its columns {', '.join(columns)}. Each point needs x y z."
+            f"{path} has no {' '.join(missing)} among its columns {brief(', '.join(columns))}. Each point needs x y z."
         )
     left = dict(columns)
 
@@ -64,7 +66,7 @@ def from_columns(columns, path):
         return [left.pop(named[name]) for name in names]
 
     places = take(_AXES)
-    table = PointTable(np.stack(places, axis=1).astype(np.float64))
+    table = PointTable(np.stack(places, axis=1, dtype=np.float64))
     table.single = any(place.dtype == np.float32 for place in places)
     colors = next(filter(None, map(take, _COLORS)), None)
     if colors is not None:
@@ -94,7 +96,7 @@ def _unit_colors(colors, alpha):
     result[:, :3] = values / full
     if alpha is not None:
         result[:, 3] = alpha[0] / (full if alpha[0].dtype == values.dtype else max(1.0, float(alpha[0].max())))
-    return np.clip(result, 0.0, 1.0)
+    return np.fmin(np.fmax(result, 0.0), 1.0)  # NaN becomes 0
 
 
 def to_columns(table) -> dict:
@@ -120,14 +122,17 @@ def _free_name(name, columns):
     return next(free for free in chain([name], numbered) if free not in columns)
 
 
-def check_table(table, path):
-    """Refuse a file without points, or with coordinates that are no places, and return it."""
+def check_table(table, path) -> float:
+    """Refuse a file without points, or with coordinates that are no places, and return the largest coordinate."""
     if len(table.points) == 0:
         raise TooFewPointsError(f"{path} has no points. Give a file with points.")
-    bad = np.flatnonzero(~np.isfinite(table.points).all(axis=1))
-    if len(bad):
-        raise InvalidPointsError(
-            f"{path}: {len(bad)} of {len(table.points)} points have coordinates that are not finite (NaN or"
-            f" infinity), the first of them is point {bad[0] + 1}. Delete these points from the file."
-        )
-    return table
+    largest = float(np.abs(table.points).max())
+    if largest <= _FARTHEST:
+        return largest
+    bad, what = np.flatnonzero(~np.isfinite(table.points).all(axis=1)), "not finite (NaN or infinity)"
+    if len(bad) == 0:
+        bad, what = np.flatnonzero((np.abs(table.points) > _FARTHEST).any(axis=1)), f"beyond {_FARTHEST:g}"
+    raise InvalidPointsError(
+        f"{path}: {len(bad)} of {len(table.points)} points have coordinates that are {what}, the first of them is"
+        f" point {bad[0] + 1}. Delete these points from the file."
+    )

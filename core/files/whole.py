@@ -29,6 +29,7 @@ def replacing(path):
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        part.unlink(missing_ok=True)  # of a writer that was killed; a link there would lead elsewhere
         try:
             yield part
             os.replace(part, path)

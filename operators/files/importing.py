@@ -1,5 +1,6 @@
 """File > Import: points of files as objects, coordinates of any size with all their digits."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -143,7 +144,7 @@ def _read_all(paths, progress):
     tables = []
     for number, path in enumerate(paths):
         progress("Read", number / len(paths))
-        state = path.stat() if path.is_file() else None
+        state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
         key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
         tables.append(cache.fetch(key, lambda path=path: read_points(path)))
     return tables

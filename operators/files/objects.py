@@ -77,8 +77,9 @@ def add_object(name, table, collection, known=None, with_attributes=True):
     mesh.vertices.add(len(table.points))
     mesh.attributes["position"].data.foreach_set("vector", (table.points - origin).astype(np.float32).reshape(-1))
     if with_attributes:
-        for column, values in table.attributes.items():
-            _add_attribute(mesh, column, values)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is too large for single precision becomes infinite
+            for column, values in table.attributes.items():
+                _add_attribute(mesh, column, values)
         if table.colors is not None:
             layer = mesh.color_attributes.new("Color", "BYTE_COLOR", "POINT")
             layer.data.foreach_set("color_srgb", table.colors.reshape(-1))

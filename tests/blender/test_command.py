@@ -400,3 +400,56 @@ class TestVerbs:
         assert code == 1
         assert "shares its mesh" in line["error"]
         assert run("segment", tmp_path / "a.blend", "--object", "Cloud", "--make-single-user")[0] == 0
+
+
+class TestNothingBreaks:
+    @pytest.mark.parametrize(
+        ("name", "data"),
+        [
+            (
+                "a.ply",
+                b"ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\nproperty float x\nend_header\n",
+            ),
+            ("a.xyz", b"1 2 3\n1_0 2 3\n"),
+            ("a.csv", b"1," * 1_000_000),
+            ("a.pts", b"1000000000000\n1 2 3\n"),
+            ("a.obj", b"v 1 2 \0\n"),
+            ("a.npy", b"\x93NUMPY\1\0\x0a\0(((((((((("),
+            ("a.npz", b"PK\3\4" + bytes(100)),
+            ("a.txt", b""),
+            ("a.blend", b"BLENDER-v405" + bytes(100)),
+            ("b.blend", b"garbage"),
+        ],
+    )
+    def test_broken_inputs_give_an_error_in_one_line(self, run, tmp_path, name, data):
+        (tmp_path / name).write_bytes(data)
+        code, (line,) = run("analyze", tmp_path / name, "--out", tmp_path / "out.ply")
+        assert code == 1
+        assert line.keys() == {"file", "error"}
+        assert str(tmp_path / name) in line["error"]
+        assert [path.name for path in tmp_path.iterdir()] == [name]
+
+    @pytest.mark.parametrize("suffix", ["ply", "xyz", "csv", "npz", "blend"])
+    @pytest.mark.parametrize("verb", ["analyze", "smooth"])
+    @pytest.mark.parametrize("fault", [BrokenPipeError("nobody listens"), KeyboardInterrupt()])
+    def test_a_fault_in_the_progress_leaves_the_output(
+        self, extension, run, tmp_path, monkeypatch, suffix, verb, fault
+    ):
+        stages = importlib.import_module(f"{extension.__name__}.operators.running.stages")
+
+        def fail(*_):
+            raise fault
+
+        monkeypatch.setattr(stages.Stages, "__call__", fail)
+        write_obj(tmp_path / "in.obj")
+        output = tmp_path / f"out.{suffix}"
+        output.write_text("before")
+        arguments = (verb, tmp_path / "in.obj", "--out", output)
+        if isinstance(fault, OSError):
+            code, (line,) = run(*arguments)
+            assert (code, line["error"]) == (1, "nobody listens")
+        else:
+            with pytest.raises(KeyboardInterrupt):
+                run(*arguments)
+        assert output.read_text() == "before"
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["in.obj", output.name]

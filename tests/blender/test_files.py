@@ -373,3 +373,9 @@ class TestMenus:
         assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".las", ".laz"}
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
+
+
+def test_values_beyond_single_precision(tmp_path):
+    (tmp_path / "a.csv").write_text("x,y,z,heat,lb_component\n1,2,3,1e300,nan\n4,5,6,nan,1\n7,8,10,1,2\n")
+    heat = attribute(run_import(tmp_path / "a.csv"), "heat")
+    assert_array_equal(heat, np.array([np.inf, np.nan, 1.0], np.float32))

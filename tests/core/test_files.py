@@ -1,12 +1,14 @@
 """Point files: what is written is read again, coordinates keep their digits, and broken files are refused."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from core import PointCloudError
+from core import Cancelled, PointCloudError
 from core.files import PointTable, choose_origin, is_coarse, read_points, replacing, write_points
 
 FAR = np.array([446_000.0, 4_000_000.0, 120.0])
@@ -315,6 +317,11 @@ class TestOrigin:
         points = 1e-2 * (POINTS - FAR) + 1000.0
         assert choose_origin(points).tolist() != [0.0, 0.0, 0.0]
 
+    def test_points_closer_than_single_precision_tells_are_at_one_place(self):
+        points = np.array([[0.0, 0.0, 0.0], [5e-324, 1e-310, 1e-40]])
+        assert choose_origin(points).tolist() == [0.0, 0.0, 0.0]
+        assert choose_origin(points + FAR).tolist() == FAR.tolist()
+
     def test_one_point_far_away(self):
         assert choose_origin(FAR[None]).tolist() == FAR.tolist()
 
@@ -339,6 +346,66 @@ def test_a_failed_writer_leaves_the_file(tmp_path):
         fail()
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [Path(path)]
+
+
+def test_a_writer_that_is_stopped_leaves_the_file_and_nothing_else(tmp_path):
+    (tmp_path / "a.npz").write_text("before")
+    for fault in (KeyboardInterrupt, Cancelled, ZeroDivisionError):
+
+        def write(fault=fault):
+            with replacing(tmp_path / "a.npz") as part:
+                part.write_text("half")
+                raise fault
+
+        with pytest.raises(fault):
+            write()
+        assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.npz", "before")]
+
+
+KILLED = """
+import os, pathlib, sys
+from core.files import replacing
+with replacing(pathlib.Path(sys.argv[1])) as part:
+    part.write_text("half")
+    os._exit(9)  # which does what a kill does: nothing more
+"""
+
+
+def test_a_writer_that_is_killed_leaves_the_file(tmp_path):
+    path = tmp_path / "a.ply"
+    write_points(path, PointTable(POINTS))
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], cwd=Path(__file__).parents[2])
+    assert done.returncode == 9
+    assert_array_equal(read_points(path).points, POINTS)
+    write_points(path, PointTable(POINTS[:3]))
+    assert len(read_points(path).points) == 3
+    assert list(tmp_path.iterdir()) == [path]  # what the other left is gone, too
+
+
+@pytest.mark.parametrize("name", ["a.ply", "a.xyz", "a.csv"])
+def test_a_full_disk_leaves_the_file(tmp_path, name):
+    resource = pytest.importorskip("resource")
+    path = tmp_path / name
+    write_points(path, PointTable(POINTS))
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))  # fails in the midst of writing, as a full disk
+    try:
+        with pytest.raises(PointCloudError, match="cannot be written: .*. Choose another place."):
+            write_points(path, PointTable(np.tile(POINTS, (10, 1))))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert_allclose(read_points(path).points, POINTS, rtol=0.0, atol=1e-9)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="making links needs rights there")
+def test_a_link_in_place_of_the_temporary_file_is_not_followed(tmp_path):
+    (tmp_path / "other").write_text("other")
+    (tmp_path / ".a.part.ply").symlink_to(tmp_path / "other")
+    write_points(tmp_path / "a.ply", PointTable(POINTS))
+    assert (tmp_path / "other").read_text() == "other"
+    assert not (tmp_path / "a.ply").is_symlink()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.ply", "other"]
 
 
 def test_places_that_cannot_be_written_or_read(tmp_path):

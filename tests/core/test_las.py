@@ -73,3 +73,14 @@ def test_broken_files(convert, tmp_path):
         with pytest.raises(SystemExit, match=text):  # said, without a traceback
             convert(tmp_path / name)
     assert not list(tmp_path.glob("*.ply"))
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_a_header_that_names_too_many_points(convert, tmp_path, name):
+    """They are refused before there is memory for them."""
+    write_las(tmp_path / name)
+    data = bytearray((tmp_path / name).read_bytes())
+    data[107:111] = b"\xff\xff\xff\x7f"  # their number
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(SystemExit, match="too short for the 2,147,483,647 points .* Copy it again"):
+        convert(tmp_path / name)

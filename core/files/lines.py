@@ -1,0 +1,50 @@
+"""Text in blocks of lines: all lines of a file at once would take many times its size."""
+
+from ..errors import InvalidPointsError
+
+_BLOCK = 2**16  # characters that are read at once
+_LONGEST = 100_000  # characters of a line, thousands of columns
+_BRIEF = 100  # characters of what a text of an error quotes
+
+
+def read_blocks(file, path, skipped=()):
+    """Yield lists of lines, without their ends, of an open file of characters or bytes.
+
+    Parameters
+    ----------
+    file : file object
+    path : pathlib.Path
+        Its name, for the text of the error.
+    skipped : tuple of str
+        How lines begin that may be of any length; only the beginning of a longer one is told.
+
+    Raises
+    ------
+    InvalidPointsError
+        A line is too long to be a point.
+    """
+    while block := file.read(_BLOCK):
+        end = file.readline(_LONGEST)
+        lines = (block + end).splitlines()
+        if max(map(len, lines)) >= _LONGEST:
+            if any(len(line) >= _LONGEST and not line.startswith(skipped) for line in lines):
+                raise InvalidPointsError(
+                    f"{path} has a line of {_LONGEST:,} characters or more, which is no point. Export it again."
+                )
+            while len(end) == _LONGEST and end[-1] not in ("\n", ord("\n")):
+                end = file.readline(_LONGEST)
+        yield lines
+
+
+def is_number(word) -> bool:
+    """Tell whether a word is a number for numpy, which takes fewer than Python: no 1_0, and no digits but 0 to 9."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return word.isascii() and "_" not in word
+
+
+def brief(text) -> str:
+    """Return the beginning of a text that came from a file."""
+    return text if len(text) <= _BRIEF else f"{text[:_BRIEF]}..."
