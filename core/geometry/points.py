@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
 
 FEWEST = 5  # points of a boundary that is given
-_SAME = 1e-9  # of the median radius: no closer points are told apart, as areas between them would drown in rounding
+_SAME = 1e-9  # of the scale: no closer points are told apart, as areas between them would drown in rounding
 _LARGEST = 1e60  # coordinates [L], and its inverse the least extent: further powers of lengths must be numbers, too
 
 
@@ -156,7 +156,7 @@ def scale_points(points, needed):
 
 
 def _merge(points):
-    """Take points at one place as one.
+    """Take points at one place, in scaled coordinates, as one.
 
     Returns
     -------
@@ -168,9 +168,8 @@ def _merge(points):
     """
     distinct, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
     inverse = inverse.reshape(-1)
-    reach = _SAME * np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1))
-    while reach > 0.0 and len(distinct) > 1:
-        distance, near = cKDTree(distinct).query(distinct, k=2, distance_upper_bound=reach, workers=-1)
+    while len(distinct) > 1:
+        distance, near = cKDTree(distinct).query(distinct, k=2, distance_upper_bound=_SAME, workers=-1)
         close = np.flatnonzero(np.isfinite(distance[:, 1]))
         if not len(close):
             break

@@ -195,9 +195,6 @@ class TestDuplicates:
         heap = sphere[7] + 1e-12 * np.random.default_rng(2).standard_normal((20_000, 3))
         assert len(scale_points(np.concatenate([sphere, heap]), 100).points) == len(sphere)
 
-    def test_small_objects_with_a_stray_point_far_off_stay_whole(self, sphere):
-        assert len(scale_points(np.concatenate([sphere, [[1e10, 0.0, 0.0]]]), 100).points) == len(sphere) + 1
-
     def test_they_share_one_area(self, clouds):
         single, doubled, order = clouds
         areas = np.empty(len(doubled))
