@@ -50,7 +50,7 @@ def conjugate_gradients(matrix, load, start=None, scaling=1.0, rtol=1e-9, produc
     scaling : float, ndarray, (m,), or LinearOperator, (m, m)
         Preconditioner, such as the inverse of the diagonal.
     rtol : float
-        Of the residual against the load.
+        Of the residual against the load, or against that of the first guess where it is larger.
     products : int
         Most products with the matrix.
     report : callable
@@ -62,7 +62,7 @@ def conjugate_gradients(matrix, load, start=None, scaling=1.0, rtol=1e-9, produc
     """
     values = np.zeros_like(load) if start is None else start.copy()
     residual = load.copy() if start is None else load - matrix @ values
-    goal = rtol * np.linalg.norm(load)
+    goal = rtol * max(np.linalg.norm(load), np.linalg.norm(residual))
     direction = moment = None
     for step in range(products):
         if np.linalg.norm(residual) <= goal:
