@@ -95,8 +95,8 @@ class Geodesics:
     >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
     >>> points = np.column_stack([ring.real, ring.imag, z])
     >>> geodesics = core.Geodesics(core.build_laplacian(points))
-    >>> print([geodesics.distance([pole])[400].round(1) for pole in (0, 799)])
-    [1.6, 1.6]
+    >>> print(*(geodesics.distance([pole])[400].round(1) for pole in (0, 799)))
+    1.6 1.6
     """
 
     def __init__(self, laplacian, *, progress=None):

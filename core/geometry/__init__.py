@@ -2,7 +2,7 @@
 
 from .cloud import estimate_normals, read_cloud
 from .components import SMALLEST, move_apart
-from .distances import arc_length, arc_squared, circle_arc, pair_heights, projected_distance
+from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights, projected_distance
 from .nearest import ROUNDS, SMOOTH, find_nearest
 from .points import FEWEST, as_indices, as_mask, check_points, check_values
 from .prolongation import Prolongation

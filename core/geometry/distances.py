@@ -141,9 +141,9 @@ def pair_heights(first, second, points, normals):
     """
     chord = second(points) - first(points)
     left, right = first(normals), second(normals)
-    return chord, _dot(chord, left), _dot(chord, right), _dot(left, right)
+    return chord, dots(chord, left), dots(chord, right), dots(left, right)
 
 
-def _dot(left, right):
+def dots(left, right):
     """Return the inner products of the columns of two arrays, (p,)."""
     return np.einsum("cp,cp->p", left, right)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from ..blocks import on_all_cores
 from ..kernel import SUPPORT
 from .patches import divide_pairs
 
@@ -45,6 +46,30 @@ class Pairs:
     def half(self, values):
         """Return a pair quantity as the (m, m) CSR matrix U that holds each pair once; the whole is U + U.T."""
         return sparse.csr_array((values, self.second, self.start), shape=(len(self.points),) * 2)
+
+    def over_ends(self, values, count, report=lambda: None):
+        """Return the sums over the pairs of each point of what they have at that end, (count, m).
+
+        Parameters
+        ----------
+        values : callable
+            Returns of a patch the quantities, (pairs,) each, that its pairs have at their first points, and as many
+            that they have at their second points.
+        count : int
+            How many quantities.
+        report : callable
+            Called after each patch; may raise `Cancelled`.
+        """
+
+        def sums(patch):
+            first, second = values(patch)
+            return patch.over_first(*first), patch.over_second(*second)
+
+        total = np.zeros((count, len(self.points)))
+        for patch, (first, second) in zip(self.patches, on_all_cores(sums, self.patches, report), strict=True):
+            total[:, patch.rows] += first
+            total[:, patch.columns] += second
+        return total
 
     @functools.cached_property
     def patches(self):

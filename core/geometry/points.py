@@ -98,9 +98,9 @@ class ScaledPoints:
     first: np.ndarray
 
     @property
-    def duplicates(self):
-        """Number of points beyond the first at their place."""
-        return len(self.inverse) - len(self.points)
+    def shared(self):
+        """Whether some of the caller's points are at one place."""
+        return self.copies.max() > 1
 
     def scatter(self, quantity, neutral):
         """Return a quantity of the distinct points for the caller's; those left out get the neutral value."""

@@ -18,6 +18,7 @@ _FLOOR = 0.5  # least area in units of the density area; keeps the ratios of The
 _DEGREES = 100, 50  # of the polynomials of two rounds: the second makes up for what the floor changed in the first
 _WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] can tell from zero
 _EVEN = 1e-9  # changes of h, as a share, that are none
+_MANY = 1 << 20  # pairs from which a product takes longer than to begin threads
 NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
 
 
@@ -174,7 +175,10 @@ class KernelMatrix:
 
     def __matmul__(self, values):
         self._report()
-        first, second = on_all_cores(lambda half: half @ values, self._halves)
+        if self._halves[0].nnz < _MANY:
+            first, second = (half @ values for half in self._halves)
+        else:
+            first, second = on_all_cores(lambda half: half @ values, self._halves)
         return self._diagonal * values + first + second
 
 

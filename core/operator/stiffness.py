@@ -89,7 +89,7 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
         del balance  # its memory is needed
         images = replace(images, weights=images.weights * factor, fourth=images.fourth * factor)
         widths = _widths(pairs, distance, areas, weights, images, alone)
-    if scaled.copies.max() > 1:
+    if scaled.shared:
         whole = _symmetric(scaled, pairs.first, pairs.second, weights, own)
         stiffness = (sparse.diags_array(whole.sum(axis=1), format="csr") - whole).tocsr()
     else:
@@ -146,12 +146,12 @@ def _widths(pairs, distance, areas, weights, images, alone):
 
     It is a mean over the neighbours, as the operator would make much of what differs from point to point by chance.
     """
-    total, moment = np.zeros((2, len(areas)))
-    for patch in pairs.patches:
-        values = weights[patch.pairs], weights[patch.pairs] * distance[patch.pairs] ** 4
-        for rows, sums in ((patch.rows, patch.over_first(*values)), (patch.columns, patch.over_second(*values))):
-            total[rows] += sums[0]
-            moment[rows] += sums[1]
+
+    def moments(patch):
+        own = weights[patch.pairs]
+        return [[own, own * distance[patch.pairs] ** 4]] * 2
+
+    total, moment = pairs.over_ends(moments, 2)
     for rows, added in (
         (pairs.first[images.rows], images.fourth),
         (pairs.second[images.rows], images.fourth),
@@ -170,7 +170,7 @@ def _symmetric(scaled, first, second, values, own):
     Points at the same place share what theirs has.
     """
     n, m = len(scaled.inverse), len(own)
-    if scaled.copies.max() > 1:
+    if scaled.shared:
         known = np.flatnonzero(scaled.inverse >= 0)
         row = scaled.inverse[known]
         spread = sparse.csr_array((1.0 / scaled.copies[row], (known, row)), shape=(n, m))

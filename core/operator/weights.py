@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blocks import on_all_cores
-from ..geometry import frames
+from ..geometry import dots, frames
 from ..kernel import SECOND_MOMENT, SUPPORT
 from .curvature import second_moment, uneven
 
@@ -116,12 +116,12 @@ def _trace(cloud, weights, areas):
     middle, which is on the side of the wider kernel more often.
     """
     pairs, squared = cloud.pairs, cloud.pairs.lengths**2
-    gain = np.zeros(len(squared))
-    for patch in pairs.patches:
+
+    def changes(patch):
         change = weights[patch.pairs] * (patch.second(squared) - patch.first(squared))
-        gain[patch.rows] += patch.over_first(change)[0]
-        gain[patch.columns] -= patch.over_second(change)[0]
-    gain *= (SECOND_MOMENT / 8.0) / areas
+        return [change], [-change]
+
+    gain = pairs.over_ends(changes, 1)[0] * (SECOND_MOMENT / 8.0) / areas
     return second_moment(pairs.lengths, cloud.gaussian_curvature) * (1.0 + uneven(gain))
 
 
@@ -155,8 +155,7 @@ class _Moments:
 
     def __init__(self, cloud, distance, weights, unit, report):
         pairs, lengths = cloud.pairs, cloud.pairs.lengths
-        self._weights, self._unit, self._report = weights, unit, report
-        self._patches = pairs.patches
+        self._pairs, self._weights, self._unit, self._report = pairs, weights, unit, report
         # The ways from both ends, in the tangent planes there over h; next to boundaries, the terms of some pairs.
         self._ways = np.empty((2, 2, len(weights)), dtype=np.float32)  # seven digits, of numbers about one
         places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
@@ -167,12 +166,12 @@ class _Moments:
         def describe(patch):
             ends, reach = (patch.first, patch.second), distance[patch.pairs]
             chord, left, right = patch.second(places) - patch.first(places), patch.first(normals), patch.second(normals)
-            right *= np.where(_dot(left, right) < 0.0, -1.0, 1.0)
+            right *= np.where(dots(left, right) < 0.0, -1.0, 1.0)
             # How far the geodesic bends away from the chord, to third order, within the tangent plane.
-            turn = (_dot(chord, right) - _dot(chord, left)) / 6.0
+            turn = (dots(chord, right) - dots(chord, left)) / 6.0
             at_edges = []
             for stored, end, way in zip(self._ways, ends, (chord + turn * right, turn * left - chord), strict=True):
-                x, y = (_dot(way, end(axis)) for axis in tangents)
+                x, y = (dots(way, end(axis)) for axis in tangents)
                 size = reach / (np.maximum(np.hypot(x, y), 1e-300) * end(lengths))
                 stored[:, patch.pairs] = x, y = x * size, y * size
                 point = end(edge)
@@ -180,70 +179,62 @@ class _Moments:
                 at_edges.append((rows, edges.terms(point[rows], x[rows], y[rows]) if len(rows) else 0.0))
             return at_edges
 
-        self._at_edges = on_all_cores(describe, self._patches, report)
+        at_edges = on_all_cores(describe, pairs.patches, report)
+        self._at_edges = {patch.pairs.start: found for patch, found in zip(pairs.patches, at_edges, strict=True)}
 
     def factor(self, terms):
         """Return the factor of each pair's weight, (p,)."""
         terms, result = terms.T.copy(), np.empty(len(self._weights))
 
-        def evaluate(patch, basis):
-            result[patch.pairs] = _factor(patch, basis, terms)
+        def evaluate(patch):
+            result[patch.pairs] = _factor(patch, self._basis(patch), terms)
 
-        self._on_patches(evaluate)
+        on_all_cores(evaluate, self._pairs.patches, self._report)
         return result
 
     def of(self, terms):
         """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
         terms = terms.T.copy()
 
-        def sums(patch, basis):
+        def weighted(patch):
+            basis = self._basis(patch)
             basis *= self._weights[patch.pairs] * _factor(patch, basis, terms)
-            return patch.over_first(*basis[0]), patch.over_second(*basis[1])
+            return basis
 
-        return self._total(sums, _TERMS)
+        return self._sums(weighted, _TERMS)
 
     def curvature(self):
         """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
         places = [(i, j) for i in range(_TERMS) for j in range(i + 1)]
 
-        def sums(patch, basis):
+        def products(patch):
+            basis = self._basis(patch)
             weighted = self._weights[patch.pairs] * basis
-            first, second = ([own[i] * other[j] for i, j in places] for own, other in zip(weighted, basis, strict=True))
-            return patch.over_first(*first), patch.over_second(*second)
+            return [[own[i] * other[j] for i, j in places] for own, other in zip(weighted, basis, strict=True)]
 
         left, right = np.transpose(places)
         result = np.empty((len(self._unit), _TERMS, _TERMS))
-        result[:, left, right] = result[:, right, left] = self._total(sums, len(places))
+        result[:, left, right] = result[:, right, left] = self._sums(products, len(places))
         return result
 
-    def _total(self, sums, count):
-        """Add up sums over the first and the second points of each patch, and return them in the unit, (m, count)."""
-        total = np.zeros((count, len(self._unit)))
-        for patch, (first, second) in zip(self._patches, self._on_patches(sums), strict=True):
-            total[:, patch.rows] += first
-            total[:, patch.columns] += second
-        return (total / self._unit).T
+    def _sums(self, values, count):
+        """Return the sums of what pairs have at both ends, in the unit, (m, count)."""
+        return (self._pairs.over_ends(values, count, self._report) / self._unit).T
 
-    def _on_patches(self, function):
-        """Call a function with each patch and the terms of its pairs, (2, 5, pairs), as each end sees them."""
-
-        def call(number):
-            patch = self._patches[number]
-            basis = np.empty((2, _TERMS, patch.pairs.stop - patch.pairs.start))
-            for part, way, (rows, terms) in zip(
-                basis, self._ways[:, :, patch.pairs], self._at_edges[number], strict=True
-            ):
-                square, x, y, difference, product = part
-                x[:], y[:] = way
-                np.multiply(x, x, out=square)
-                np.multiply(y, y, out=product)
-                np.subtract(square, product, out=difference)
-                square += product
-                np.multiply(2.0 * x, y, out=product)
-                part[:, rows] = terms
-            return function(patch, basis)
-
-        return on_all_cores(call, range(len(self._patches)), self._report)
+    def _basis(self, patch):
+        """Return the terms of the pairs of a patch, (2, 5, pairs), as each end sees them."""
+        result = np.empty((2, _TERMS, patch.pairs.stop - patch.pairs.start))
+        at_edges = self._at_edges[patch.pairs.start]
+        for basis, way, (rows, terms) in zip(result, self._ways[:, :, patch.pairs], at_edges, strict=True):
+            square, x, y, difference, product = basis
+            x[:], y[:] = way
+            np.multiply(x, x, out=square)
+            np.multiply(y, y, out=product)
+            np.subtract(square, product, out=difference)
+            square += product
+            np.multiply(2.0 * x, y, out=product)
+            basis[:, rows] = terms
+        return result
 
 
 def _factor(patch, basis, terms):
@@ -251,7 +242,3 @@ def _factor(patch, basis, terms):
     power = np.einsum("tp,tp->p", basis[0], patch.first(terms))
     power += np.einsum("tp,tp->p", basis[1], patch.second(terms))
     return np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST))
-
-
-def _dot(left, right):
-    return np.einsum("cp,cp->p", left, right)
