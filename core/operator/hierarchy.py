@@ -36,8 +36,10 @@ class Rows:
         for rows in self._slices:
             pointers = matrix.indptr[rows.start : rows.stop + 1]
             entries = slice(pointers[0], pointers[-1])
-            part = (matrix.data[entries], matrix.indices[entries], pointers - pointers[0])
-            self._parts.append(sparse.csr_array(part, shape=(len(pointers) - 1, matrix.shape[1])))
+            part = sparse.csr_array((len(pointers) - 1, matrix.shape[1]), dtype=matrix.dtype)
+            # Set afterwards, for the constructor would copy what is a small part of an array.
+            part.data, part.indices, part.indptr = matrix.data[entries], matrix.indices[entries], pointers - pointers[0]
+            self._parts.append(part)
 
     def __matmul__(self, other):
         """Multiply with an array, (m, k), or a sparse one."""
