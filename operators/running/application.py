@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from bpy.props import BoolProperty
 
 from ...core import PointCloudError
+from ..objects.all_or_nothing import all_or_nothing
 from ..objects.handlers import tell
 from ..objects.options import laplacian_options
 from ..objects.reading import TYPES, obstacle, read_points, sharing_objects
@@ -74,13 +75,16 @@ class ApplicationOperator(Tool, JobOperator):
 
     def finish(self, context, objects, results):
         """Write what was computed, and report it."""
+        sharing = [other for obj in objects for other in sharing_objects(obj)]
+        with all_or_nothing([*objects, *sharing]):
+            texts = self.write_all(context, objects, results)
+            self.conclude(context, objects)
         for reason in self._left_out:
             self.report({"WARNING"}, f"Left out: {reason}.")
-        for *notices, line in self.write_all(context, objects, results):
+        for *notices, line in texts:
             for notice in notices:
                 self.report({"WARNING"}, notice)
             self.report({"INFO"}, line)
-        self.conclude(context, objects)
         return {"FINISHED"}
 
     def conclude(self, context, objects):

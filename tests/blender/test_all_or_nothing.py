@@ -1,0 +1,132 @@
+"""What fails while results are written leaves everything as it was, wherever it fails."""
+
+import inspect
+import sys
+
+import bpy
+import pytest
+
+from tests.blender.clouds import add_group, add_object, everything, grid_points, sphere_points
+
+SKIPPED = inspect.CO_GENERATOR, "all_or_nothing.py"  # what Python ends by itself, and what puts things back
+
+
+class Fault:
+    """Memory that runs out at one of the calls of the extension's functions while results are written."""
+
+    def __init__(self, extension, number):
+        self._folder, self._left = extension.__path__[0], number
+        self._writing, self.happened = False, False
+
+    def _trace(self, frame, event, argument):
+        code = frame.f_code
+        if not code.co_filename.startswith(self._folder):
+            return
+        self._writing |= code.co_name == "write_all"
+        if not self._writing or code.co_flags & SKIPPED[0] or code.co_filename.endswith(SKIPPED[1]):
+            return
+        self._left -= 1
+        if self._left < 0:
+            sys.settrace(None)
+            self.happened = True
+            raise MemoryError("injected")
+
+    def __enter__(self):
+        sys.settrace(self._trace)
+        return self
+
+    def __exit__(self, *_):
+        sys.settrace(None)
+
+
+def scene():
+    """All that the objects hold."""
+    return {obj.name: everything(obj) for obj in bpy.data.objects}
+
+
+def fail_everywhere(extension, make, name, step=3, **settings):
+    """Let an operator fail at one call after the other, and find everything as it was; return how often it failed."""
+    failures, spoiled = 0, True
+    for number in range(0, 4000, step):
+        if spoiled:
+            bpy.ops.wm.read_homefile(use_empty=True)
+            make()
+            before, spoiled = scene(), False
+        with Fault(extension, number) as fault:
+            try:
+                getattr(bpy.ops.meshfree, name)(**settings)
+                spoiled = True
+            except RuntimeError:
+                failures += 1
+        if spoiled and not fault.happened:
+            return failures
+        assert spoiled or scene() == before, number  # spoiled: Blender goes on when a setting's own function fails
+    raise AssertionError("it never ends")
+
+
+def handled():
+    """A sphere whose ends are handle and anchor, with results of other settings, and a shape key."""
+    points = sphere_points(400)
+    obj = add_object(points)
+    for name, members in {"Handle": points[:, 2] > 0.9, "Anchor": points[:, 2] < -0.9}.items():
+        add_group(obj, name, members)
+        add_group(obj, {"Handle": "Source", "Anchor": "Value"}[name], members)
+    bpy.ops.meshfree.analyze(modes=6)
+    obj.meshfree.neighbors += 1
+    return obj
+
+
+def keyed():
+    obj = handled()
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Own").value = 0.3
+    return obj
+
+
+def shared():
+    """Two objects of one mesh."""
+    obj = handled()
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    other.select_set(True)
+    return obj
+
+
+def film():
+    points, boundary = grid_points(20, 15)
+    obj = add_object(points)
+    add_group(obj, "Fixed", boundary)
+    return obj
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "settings"),
+    [
+        (handled, "analyze", {"modes": 4}),
+        (shared, "analyze", {}),
+        (handled, "spectrum", {}),
+        (handled, "segment", {"parts": 3, "vertex_groups": True}),
+        (handled, "signature", {"count": 3, "modes": 10}),
+        (handled, "smooth", {"target": "IN_PLACE"}),
+        (keyed, "smooth", {}),
+        (handled, "mode_shape", {"animate": True}),
+        (handled, "harmonic_field", {}),
+        (handled, "geodesic_distance", {}),
+        (handled, "deform_bind", {"step": 37}),
+        (film, "minimal_surface", {"target": "IN_PLACE"}),
+        (film, "minimal_surface", {}),
+    ],
+)
+def test_failure_while_writing_changes_nothing(extension, make, name, settings):
+    assert fail_everywhere(extension, make, name, **settings) > 3
+
+
+def parted():
+    obj = handled()
+    bpy.ops.meshfree.segment(parts=3)
+    return obj
+
+
+def test_parts_stay_one_object_if_separating_fails(extension):
+    assert fail_everywhere(extension, parted, "separate_by_segment") > 3
+    assert len(bpy.data.objects) == 3
