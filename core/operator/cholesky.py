@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.linalg.lapack import dpotrf, dtrtri
 
 from ..blocks import blocks
+from ..dense import product
 from ..errors import SolverError
 
 _BANDS = 6  # in which the lower half of a matrix is gone through
@@ -70,11 +71,11 @@ def factorize(matrix, starts, report=lambda fraction: None):
                 f"The equations of {count} points have no single solution. Fix some points on every component."
             )
         inverse = dtrtri(own, lower=1)[0]
-        below = front[width:, :width] @ inverse.T
+        below = product(front[width:, :width], inverse.T)
         factors.append(start, end, rows, inverse, below)
         if len(rows):
             left = front[width:, width:]
-            left -= below @ below.T
+            left -= product(below, below.T)
             children[parent[number]].append((rows, left))
         report(done[number])
     return factors.solve
@@ -129,15 +130,15 @@ class Factors:
 
     def append(self, start, end, rows, inverse, below):
         """Add the next part: its unknowns from start to end, the later rows, the inverse factor, and that below it."""
-        self._parts.append((start, end, rows, np.concatenate([inverse, -below @ inverse])))
+        self._parts.append((start, end, rows, np.concatenate([inverse, -product(below, inverse)])))
 
     def solve(self, right):
         """Solve for a right-hand side, (m,) or (m, k)."""
         values = np.array(np.reshape(right, (self._count, -1)).T, dtype=np.float64, order="C")
         for start, end, rows, part in self._parts:
-            found = values[:, start:end] @ part.T
+            found = product(values[:, start:end], part.T)
             values[:, start:end] = found[:, : end - start]
             values[:, rows] += found[:, end - start :]
         for start, end, rows, part in reversed(self._parts):
-            values[:, start:end] = np.concatenate([values[:, start:end], values[:, rows]], axis=1) @ part
+            values[:, start:end] = product(np.concatenate([values[:, start:end], values[:, rows]], axis=1), part)
         return values.T.reshape(np.shape(right))

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from scipy.linalg import eigh
 
+from ..dense import product
 from .hierarchy import SMALL, Level, build_levels, solve_roughly
 
 _DENSE = 4000  # in ten seconds; where the coarsest version has more, this is not the way
@@ -99,8 +100,8 @@ def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
             drift, count = np.inf, vectors.shape[1]
         if drift > 0.1 * tolerance:
             drift, image = 0.0, level.matrix @ vectors
-            values, turn = eigh(vectors.T @ image, vectors.T @ _weighed(level.mass, vectors))
-            vectors, image = vectors @ turn, image @ turn
+            values, turn = eigh(product(vectors.T, image), product(vectors.T, _weighed(level.mass, vectors)))
+            vectors, image = product(vectors, turn), product(image, turn)
         report()
         dual = _weighed(level.mass, vectors)
         residual = image - dual * values
@@ -128,29 +129,29 @@ def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
         relative = shifts / np.float32(values[size - 1])
         change = solve_roughly(levels, load, relative, size)
         for _ in range(_CYCLES - 1):
-            change -= found @ (dual.T @ change)
+            change -= product(found, product(dual.T, change))
             rest = level.rough @ change
             np.subtract(load, rest, out=rest)
             rest += _weighed(rough_mass, change) * shifts
             change += solve_roughly(levels, rest, relative, size)
-        change -= found @ (dual.T @ change)
+        change -= product(found, product(dual.T, change))
         change /= _lengths(change)
         report()
         # The best combinations of both, in an orthonormal basis of the changes.
-        lengths, basis = np.linalg.eigh((change.T @ _weighed(rough_mass, change)).astype(np.float64))
+        lengths, basis = eigh(product(change.T, _weighed(rough_mass, change)).astype(np.float64))
         kept = lengths > 1e-5 * lengths[-1]  # the others drown in rounding
         basis = basis[:, kept] / np.sqrt(lengths[kept])
-        coupling = norms[:, None] * (residual.T @ change) @ basis
+        coupling = norms[:, None] * product(residual.T, change) @ basis
         report()
         changed = level.rough @ change
-        own = basis.T @ (change.T @ changed) @ basis
-        values, parts = np.linalg.eigh(np.block([[np.diag(values), coupling], [coupling.T, own]]))
+        own = basis.T @ product(change.T, changed) @ basis
+        values, parts = eigh(np.block([[np.diag(values), coupling], [coupling.T, own]]))
         values, parts = values[:count], parts[:, :count]
         share = (basis @ parts[count:]).astype(np.float32)
         report()
-        vectors, image = vectors @ parts[:count], image @ parts[:count]
-        vectors += change @ share
-        image += changed @ share
+        vectors, image = product(vectors, parts[:count]), product(image, parts[:count])
+        vectors += product(change, share)
+        image += product(changed, share)
         lost = np.linalg.norm(share[:, :wanted], axis=0).max()
         drift += np.finfo(np.float32).eps * level.top * lost / _scale(values, wanted)
 

@@ -8,6 +8,8 @@ from scipy import sparse
 from scipy.linalg import pinvh
 from scipy.sparse.linalg import LinearOperator
 
+from ..dense import product
+
 SMALL = 1000  # unknowns that are solved whole in a tenth of a second
 PART = 1 << 20  # entries of a matrix that are multiplied in one go: some hundredths of a second
 _STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
@@ -219,11 +221,11 @@ def solve_roughly(levels, load, shifts, wanted):
         floor = values[min(wanted, len(values) - 1)]
         shift = shifts * values[wanted - 1]
         distance = np.where(np.arange(len(values))[:, None] < wanted, np.maximum(values, floor), values - shift)
-        share = level.vectors.T @ load
-        known = level.vectors @ (share / np.maximum(distance, 0.1 * floor)).astype(np.float32)
+        share = product(level.vectors.T, load)
+        known = product(level.vectors, (share / np.maximum(distance, 0.1 * floor)).astype(np.float32))
         if len(levels) == 1:
             return known
-        load = load - level.duals @ share
+        load = load - product(level.duals, share)
     result = level.extension @ solve_roughly(levels[1:], level.restriction @ load, shifts, wanted)
     _smooth(level, load, result, level.steps)
     result += known

@@ -1,0 +1,31 @@
+"""Products by scipy's BLAS are those of numpy."""
+
+import numpy as np
+import pytest
+
+from core import dense
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("work", [1, 1000, 1 << 27])
+@pytest.mark.parametrize(
+    ("m", "k", "n"), [(500, 7, 5), (7, 500, 5), (6, 6, 6), (1, 1, 1), (3, 4, 90), (0, 3, 2), (3, 0, 2)]
+)
+def test_product_of_all_orders(monkeypatch, dtype, work, m, k, n):
+    monkeypatch.setattr(dense, "_WORK", work)
+    rng = np.random.default_rng(0)
+    for flip_left in (False, True):
+        for flip_right in (False, True):
+            left = rng.standard_normal((k, m) if flip_left else (m, k)).astype(dtype)
+            right = rng.standard_normal((n, k) if flip_right else (k, n)).astype(dtype)
+            left, right = left.T if flip_left else left, right.T if flip_right else right
+            result = dense.product(left, right)
+            assert result.dtype == dtype
+            assert result.flags.c_contiguous
+            np.testing.assert_allclose(result, left @ right, rtol=0, atol=1e4 * np.finfo(dtype).eps)
+
+
+def test_product_of_parts_of_matrices():
+    rng = np.random.default_rng(0)
+    left, right = rng.standard_normal((50, 20)), rng.standard_normal((30, 9))
+    np.testing.assert_allclose(dense.product(left[5:, 3:15], right[::2][:12, 1:]), left[5:, 3:15] @ right[::2][:12, 1:])
