@@ -6,8 +6,10 @@ _registered = []
 def _modules():
     """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
     try:
-        import scipy.sparse  # noqa: F401
-    except ImportError:  # none of the wheels is for this Python
+        from . import core  # noqa: F401
+    except ImportError as error:  # no wheel is for this Python, or another extension brings a scipy that is no good
+        if (error.name or "").partition(".")[0] != "scipy":
+            raise
         from .ui import missing
 
         return (missing,)

@@ -1,14 +1,25 @@
-"""What stands in the sidebar in place of all panels where the bundled scipy does not fit this Blender."""
+"""What stands in the sidebar in place of all panels where there is no scipy that serves."""
 
 import sys
 
 import bpy
 
-_LINES = (
-    "Mesh-Free Laplacian does nothing here:",
-    f"it brings no scipy for Python {sys.version_info.major}.{sys.version_info.minor}.",
-    "Get a newer version of it, or use Blender 4.2 to 5.2.",
-)
+
+def _lines():
+    """Say what is wrong, and what to do."""
+    try:
+        import scipy
+    except ImportError:
+        return (
+            "Mesh-Free Laplacian does nothing here:",
+            f"it brings no scipy for Python {sys.version_info.major}.{sys.version_info.minor}.",
+            "Get a newer version of it, or use Blender 4.2 to 5.2.",
+        )
+    return (
+        "Mesh-Free Laplacian does nothing here:",
+        f"scipy {scipy.__version__}, which something else brings, does not serve it.",
+        "Disable the extension that brings it, and restart Blender.",
+    )
 
 
 class MESHFREE_PT_missing(bpy.types.Panel):
@@ -21,7 +32,7 @@ class MESHFREE_PT_missing(bpy.types.Panel):
 
     def draw(self, context):
         column = self.layout.column(align=True)
-        for line, icon in zip(_LINES, ("ERROR", "BLANK1", "BLANK1"), strict=True):
+        for line, icon in zip(_lines(), ("ERROR", "BLANK1", "BLANK1"), strict=True):
             column.label(text=line, icon=icon)
 
 
@@ -30,4 +41,4 @@ CLASSES = (MESHFREE_PT_missing,)
 
 def attach():
     """Say it in the console too."""
-    print(*_LINES)
+    print(*_lines())

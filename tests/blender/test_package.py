@@ -143,18 +143,23 @@ told()
 """
 
 
-def test_without_a_scipy_for_this_python_it_says_so(archive, tmp_path):
-    """Nothing but a panel is registered, with one line in the console, and it can be switched off."""
-    (tmp_path / "without.py").write_text(WITHOUT_SCIPY)
+def run_apart(tmp_path, script, *arguments):
+    """Run a script in a Blender of its own, with an empty user folder; return the lines that it writes."""
+    (tmp_path / "script.py").write_text(script)
     (tmp_path / "user").mkdir()
     done = subprocess.run(
-        [sys.executable, str(tmp_path / "without.py"), str(archive)],
+        [sys.executable, str(tmp_path / "script.py"), *map(str, arguments)],
         env={"BLENDER_USER_RESOURCES": str(tmp_path / "user"), "PATH": "", "HOME": str(tmp_path)},
         capture_output=True,
         text=True,
         timeout=120,
     )
-    lines = (done.stdout + done.stderr).splitlines()
+    return (done.stdout + done.stderr).splitlines()
+
+
+def test_without_a_scipy_for_this_python_it_says_so(archive, tmp_path):
+    """Nothing but a panel is registered, with one line in the console, and it can be switched off."""
+    lines = run_apart(tmp_path, WITHOUT_SCIPY, archive)
     python = f"{sys.version_info.major}.{sys.version_info.minor}"
     told = f"Mesh-Free Laplacian does nothing here: it brings no scipy for Python {python}. Get a newer version of it,"
     assert len([line for line in lines if line.startswith(told)]) == 1
@@ -163,3 +168,118 @@ def test_without_a_scipy_for_this_python_it_says_so(archive, tmp_path):
         "RESULT ['MESHFREE_PT_missing'] False ['bl_ext.user_default.meshfree_laplacian']",
         "RESULT [] False []",
     ]
+
+
+OTHER_SCIPY = """
+import sys
+import bpy
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+for path in sys.argv[1:]:
+    bpy.ops.extensions.package_install_files(filepath=path, repo="user_default", enable_on_install=True)
+import scipy
+print("RESULT", scipy.__version__, [name for name in dir(bpy.types) if "MESHFREE_PT" in name])
+"""
+MANIFEST = """
+schema_version = "1.0.0"
+id = "other"
+version = "1.0.0"
+name = "Other"
+tagline = "Another extension that brings a scipy"
+maintainer = "nobody"
+type = "add-on"
+blender_version_min = "4.2.0"
+license = ["SPDX:GPL-3.0-or-later"]
+wheels = ["./wheels/{}"]
+"""
+
+
+def other_extension(path, scipy, files):
+    """Make the zip of an extension that brings a scipy of some version, given by its files."""
+    wheel, information = path.parent / f"scipy-{scipy}-py3-none-any.whl", f"scipy-{scipy}.dist-info"
+    files = files | {
+        f"{information}/METADATA": f"Metadata-Version: 2.1\nName: scipy\nVersion: {scipy}\n",
+        f"{information}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    record = "".join(f"{name},,\n" for name in [*files, f"{information}/RECORD"])
+    with zipfile.ZipFile(wheel, "w") as opened:
+        for name, text in (files | {f"{information}/RECORD": record}).items():
+            opened.writestr(name, text)
+    with zipfile.ZipFile(path, "w") as opened:
+        opened.writestr("blender_manifest.toml", MANIFEST.format(wheel.name))
+        opened.writestr("__init__.py", "def register():\n    pass\n\n\ndef unregister():\n    pass\n")
+        opened.write(wheel, f"wheels/{wheel.name}")
+    return path
+
+
+def test_where_another_scipy_does_not_serve_it_says_so(archive, tmp_path):
+    """Blender takes the newest of all that extensions bring."""
+    other = other_extension(tmp_path / "other.zip", "99.0", {"scipy/__init__.py": "__version__ = '99.0'\n"})
+    lines = run_apart(tmp_path, OTHER_SCIPY, other, archive)
+    assert "RESULT 99.0 ['MESHFREE_PT_missing']" in lines
+    assert len([line for line in lines if "scipy 99.0, which something else brings, does not serve it." in line]) == 1
+    assert not [line for line in lines if "Traceback" in line]
+
+
+def test_an_older_scipy_of_another_extension_does_not_matter(archive, tmp_path):
+    other = other_extension(tmp_path / "other.zip", "0.1", {"scipy/__init__.py": "__version__ = '0.1'\n"})
+    (line,) = [line for line in run_apart(tmp_path, OTHER_SCIPY, other, archive) if line.startswith("RESULT")]
+    assert line.startswith("RESULT 1.15.3 ")
+    assert "MESHFREE_PT_missing" not in line
+
+
+LIFE = """
+import sys
+from pathlib import Path
+import bpy
+
+NAME = "bl_ext.user_default.meshfree_laplacian"
+bpy.ops.wm.read_factory_settings(use_empty=True)
+user = Path(bpy.utils.resource_path("USER"))
+
+
+def install(path):
+    bpy.ops.extensions.package_install_files(filepath=path, repo="user_default", enable_on_install=True)
+
+
+def ours():
+    return sorted(path.name for path in (user / "extensions").rglob("*meshfree*"))
+
+
+install(sys.argv[1])
+obj = bpy.data.objects.new("Cloud", bpy.data.meshes.new("Cloud"))
+obj.meshfree.neighbors = 33
+folder = user / "extensions/user_default/meshfree_laplacian"
+print("OLD", (folder / "core/former.py").exists())
+install(sys.argv[2])
+print("NEW", (folder / "core/former.py").exists(), obj.meshfree.neighbors, NAME in bpy.context.preferences.addons)
+for _ in range(20):
+    bpy.ops.preferences.addon_disable(module=NAME)
+    bpy.ops.preferences.addon_enable(module=NAME)
+print("AGAIN", obj.meshfree.neighbors, len([name for name in dir(bpy.types) if name == "MESHFREE_OT_analyze"]))
+index = next(i for i, repo in enumerate(bpy.context.preferences.extensions.repos) if repo.module == "user_default")
+bpy.ops.extensions.package_uninstall(repo_index=index, pkg_id="meshfree_laplacian")
+left = [name for name in dir(bpy.types) if "MESHFREE" in name]
+print("GONE", ours(), left, NAME in bpy.context.preferences.addons, list((user / "extensions").rglob("scipy")))
+"""
+
+
+def test_it_takes_the_place_of_an_older_version_and_leaves_nothing(archive, tmp_path):
+    older, line = tmp_path / "older.zip", 'version = "{}"'
+    with zipfile.ZipFile(archive) as packed, zipfile.ZipFile(older, "w") as opened:
+        for name in packed.namelist():
+            content = packed.read(name)
+            if name == "blender_manifest.toml":
+                now = line.format(package.read_manifest()["version"]).encode()
+                assert now in content
+                content = content.replace(now, line.format("0.1.0").encode())
+            opened.writestr(name, content)
+        opened.writestr("core/former.py", "")
+    lines = run_apart(tmp_path, LIFE, older, archive)
+    assert [line for line in lines if line.split(" ")[0] in ("OLD", "NEW", "AGAIN", "GONE")] == [
+        "OLD True",
+        "NEW False 33 True",
+        "AGAIN 33 1",
+        "GONE [] [] False []",
+    ]
+    assert not [line for line in lines if "Traceback" in line]
