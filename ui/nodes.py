@@ -2,10 +2,11 @@
 
 import bpy
 
-from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, is_intact, new_group
+from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, has_input, is_intact, new_group
 from . import colormaps
 from .value_range import CLASSES, STEPPED
 
+MOST = "Viewport Points"  # input of the display: how many it draws there
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
@@ -18,7 +19,7 @@ _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 def display_group():
     """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
-        if DISPLAY_TAG in group and group.library is None and is_intact(group):
+        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, MOST):
             return group
     group = new_group("Mesh-Free Display", DISPLAY_TAG)
     radius = add_input(group, "Radius", "Float", "Size of the points")
@@ -26,27 +27,39 @@ def display_group():
     radius.default_value = 0.01
     radius.min_value = 0.0
     add_input(group, "Material", "Material", "Colors of the points")
+    most = add_input(group, MOST, "Int", "How many points the viewport draws at most, larger ones then; 0 for all")
+    most.min_value = 0
 
     given = add_node(group, "NodeGroupInput", 0, 0)
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
     loose = add_node(group, "FunctionNodeCompare", 1, -200, data_type="INT", operation="EQUAL")
     parts = add_node(group, "GeometryNodeSeparateComponents", 1, 0)
-    points = add_node(group, "GeometryNodeMeshToPoints", 2, -100)
-    given_points = add_node(group, "GeometryNodeSetPointRadius", 2, -300)
-    faces = add_node(group, "GeometryNodeDeleteGeometry", 2, 100)  # loose vertices would be drawn over the points
-    joined = add_node(group, "GeometryNodeJoinGeometry", 3, 0)
-    colored = add_node(group, "GeometryNodeSetMaterial", 4, 0)
-    result = add_node(group, "NodeGroupOutput", 5, 0)
+    drawn, larger = _thinned(group, given, parts)
+    chosen = add_node(group, "FunctionNodeBooleanMath", 2, -400, operation="AND")
+    size = add_node(group, "ShaderNodeMath", 2, -600, operation="MULTIPLY")
+    points = add_node(group, "GeometryNodeMeshToPoints", 3, -100)
+    given_points = add_node(group, "GeometryNodeSetPointRadius", 3, -300)
+    given_drawn = add_node(group, "GeometryNodeSeparateGeometry", 4, -300)
+    faces = add_node(group, "GeometryNodeDeleteGeometry", 3, 100)  # loose vertices would be drawn over the points
+    joined = add_node(group, "GeometryNodeJoinGeometry", 5, 0)
+    colored = add_node(group, "GeometryNodeSetMaterial", 6, 0)
+    result = add_node(group, "NodeGroupOutput", 7, 0)
     compared = next(socket for socket in loose.inputs if socket.name == "A" and socket.type == "INT")
     for source, target in (
         (neighbors.outputs["Face Count"], compared),
-        (loose.outputs["Result"], points.inputs["Selection"]),
+        (loose.outputs["Result"], chosen.inputs[0]),
+        (drawn, chosen.inputs[1]),
+        (given.outputs["Radius"], size.inputs[0]),
+        (larger, size.inputs[1]),
+        (chosen.outputs[0], points.inputs["Selection"]),
         (given.outputs["Geometry"], parts.inputs["Geometry"]),
         (parts.outputs["Mesh"], points.inputs["Mesh"]),
         (parts.outputs["Point Cloud"], given_points.inputs["Points"]),
-        (given.outputs["Radius"], given_points.inputs["Radius"]),
-        (given_points.outputs["Points"], joined.inputs["Geometry"]),
-        (given.outputs["Radius"], points.inputs["Radius"]),
+        (size.outputs[0], given_points.inputs["Radius"]),
+        (given_points.outputs["Points"], given_drawn.inputs["Geometry"]),
+        (drawn, given_drawn.inputs["Selection"]),
+        (given_drawn.outputs["Selection"], joined.inputs["Geometry"]),
+        (size.outputs[0], points.inputs["Radius"]),
         (points.outputs["Points"], joined.inputs["Geometry"]),
         (loose.outputs["Result"], faces.inputs["Selection"]),
         (parts.outputs["Mesh"], faces.inputs["Geometry"]),
@@ -57,6 +70,28 @@ def display_group():
     ):
         group.links.new(source, target)
     return group
+
+
+def _thinned(group, given, parts):
+    """Add the nodes that choose which points the viewport draws; return that, and by what their radius grows.
+
+    They are chosen at random, so that no pattern of a scanner shows, and cover what all would.
+    """
+    counts = [
+        add_node(group, "GeometryNodeAttributeDomainSize", 2, -800 - 200 * row, component=kind)
+        for row, kind in enumerate(("MESH", "POINTCLOUD"))
+    ]
+    for node, part in zip(counts, ("Mesh", "Point Cloud"), strict=True):
+        group.links.new(parts.outputs[part], node.inputs["Geometry"])
+    viewport = add_node(group, "GeometryNodeIsViewport", 2, -1200)
+    limited = _math(group, 3, -1200, "GREATER_THAN", given.outputs[MOST], 0.0)
+    limited = _math(group, 4, -1200, "MULTIPLY", limited, viewport.outputs[0])
+    count = _math(group, 3, -800, "ADD", *(node.outputs["Point Count"] for node in counts))
+    share = _math(group, 4, -800, "MINIMUM", _math(group, 3, -1000, "DIVIDE", given.outputs[MOST], count), 1.0)
+    share = _math(group, 5, -800, "POWER", share, limited)  # one where there is no limit
+    random = add_node(group, "FunctionNodeRandomValue", 5, -1000, data_type="FLOAT")
+    drawn = _math(group, 6, -1000, "LESS_THAN", random.outputs["Value"], _math(group, 6, -800, "ADD", share, 1e-6))
+    return drawn, _math(group, 6, -600, "POWER", share, -0.5)
 
 
 def color_plain(material, groups):

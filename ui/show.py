@@ -3,6 +3,7 @@
 import math
 
 import bpy
+import gpu
 
 from ..operators.deform.binding import positions_now
 from ..operators.objects.attributes import MEAN_CURVATURE, read_attribute
@@ -12,10 +13,11 @@ from ..operators.objects.modifiers import DISPLAY_TAG, get_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
 from . import colormaps, legend
 from .display import NAME, component, find_display, find_material, numbers, shown_attribute, without_unreached
-from .nodes import color_by_direction, color_by_number, color_plain, display_group, is_plain
+from .nodes import MOST, color_by_direction, color_by_number, color_plain, display_group, is_plain
 from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
+_MOST_WITHOUT_CARD = 20_000  # points that two processors draw five times a second, with the rest of the window
 _NO_SPACING = 0.01  # stands in where points are too few to have one
 
 
@@ -56,9 +58,16 @@ def _add_display(obj):
     if new:
         modifier = obj.modifiers.new(NAME, "NODES")
         modifier.node_group = display_group()
+        set_input(modifier, MOST, viewport_points())
     modifier.use_pin_to_last = True
     obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
     return modifier, new
+
+
+def viewport_points() -> int:
+    """How many points the viewport is to draw at most, so that it can be turned; 0 for all."""
+    without_card = not bpy.app.background and gpu.platform.device_type_get() == "SOFTWARE"
+    return _MOST_WITHOUT_CARD if without_card else 0
 
 
 def recolor(obj):

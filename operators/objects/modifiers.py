@@ -35,6 +35,11 @@ def is_intact(group) -> bool:
     return set(group.get(_INPUTS, {}).values()) <= _inputs(group).keys()
 
 
+def has_input(group, name: str) -> bool:
+    """Whether nodes of ours have an input, which those that an earlier version made may lack."""
+    return name in group.get(_INPUTS, {})
+
+
 def _inputs(group):
     """Names of the inputs of a node group by their identifiers."""
     items = [item for item in group.interface.items_tree if item.item_type == "SOCKET" and item.in_out == "INPUT"]

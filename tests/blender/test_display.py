@@ -59,6 +59,26 @@ def test_points_carry_the_attribute_a_radius_and_the_material(display, obj):
     assert [material.name for material in materials] == [display.find_material(obj).name]
 
 
+@pytest.mark.parametrize("kind", ["MESH", "POINTCLOUD"])
+def test_a_limited_viewport_draws_a_share_of_the_points_which_cover_as_much(display, modifiers, obj, kind):
+    if kind == "POINTCLOUD":
+        if bpy.app.version < (4, 5):
+            pytest.skip("Meshes become point clouds from Blender 4.5 on")
+        bpy.ops.meshfree.convert()
+    ((count, _, radii, _),) = display_points(obj)
+    modifiers.set_input(display.find_display(obj), "Viewport Points", 250)
+    obj.update_tag()
+    ((fewer, _, larger, _),) = display_points(obj)
+    assert count == 1000
+    assert 200 < fewer < 300
+    assert larger == pytest.approx(2.0 * radii[0])
+    modifiers.set_input(display.find_display(obj), "Viewport Points", 1000)
+    obj.update_tag()
+    ((fewer, _, larger, _),) = display_points(obj)
+    assert fewer == 1000
+    assert larger == pytest.approx(radii)
+
+
 def test_no_loose_vertex_is_drawn_over_the_points(obj):
     # A selected object's loose vertices would cover its colors in orange; its own mesh keeps them all.
     assert len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices) == 0
