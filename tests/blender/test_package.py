@@ -1,5 +1,6 @@
 """The zip: its content, its manifest, the bundled scipy, and that nothing stays behind when it is switched off."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -51,6 +52,26 @@ def test_every_bundled_wheel_has_a_pinned_hash(archive, packed, tmp_path):
     sums = {package.sha256(Path(packed.extract(name, tmp_path))) for name in wheels}
     assert len(sums) == len(wheels) == 2
     assert sums <= package.pinned_hashes()
+
+
+COVERED = {  # licenses of what a wheel brings, by the one that the manifest names for it
+    "BSD-3-Clause-Attribution": "SPDX:BSD-3-Clause",
+    "GPL-3.0-with-GCC-exception": "SPDX:GPL-3.0-or-later",
+    "LGPL-2.1-or-later": "SPDX:LGPL-2.1-or-later",
+}
+
+
+def test_manifest_names_the_licenses_of_all_that_the_wheels_bring(packed, manifest, tmp_path):
+    for name in packed.namelist():
+        if name.endswith(".whl"):
+            with zipfile.ZipFile(packed.extract(name, tmp_path)) as wheel:
+                (text,) = [wheel.read(item).decode() for item in wheel.namelist() if item.endswith("info/LICENSE.txt")]
+                (about,) = [wheel.read(item).decode() for item in wheel.namelist() if item.endswith("info/METADATA")]
+            found = re.findall(r"^License: *(\S+)", text, re.MULTILINE)
+            assert len(found) == len(re.findall(r"^Name: ", text, re.MULTILINE)) > 3
+            assert {COVERED[license] for license in found} <= set(manifest["license"])
+            assert re.findall(r"^Classifier: License :: (.*)", about, re.MULTILINE) == ["OSI Approved :: BSD License"]
+            assert re.findall(r"^Requires-Dist: ([a-z_-]+)[^;]*$", about, re.MULTILINE) == ["numpy"]
 
 
 def test_every_platform_and_python_has_one_pinned_wheel(manifest):
