@@ -1,11 +1,12 @@
-"""Products of dense matrices by scipy's BLAS: the numpy of a Blender may be built without a fast one."""
+"""Dense matrices: products by scipy's BLAS, as numpy may be built without a fast one; inverses of many small ones."""
 
 import numpy as np
 from scipy.linalg import get_blas_funcs
 
-from .blocks import blocks
+from .blocks import blocks, on_all_cores
 
 _WORK = 1 << 27  # multiplications in one go: some hundredths of a second, in which nothing else in Python can run
+_BLOCK = 1 << 13  # small matrices
 
 
 def product(left, right):
@@ -42,3 +43,27 @@ def _multiply(gemm, left, right, **settings):
 def _in_columns(matrix):
     """Return the transpose of a matrix as it lies in memory, and whether it is to be transposed for that."""
     return (matrix.T, False) if matrix.flags.c_contiguous else (matrix, True)
+
+
+def inverses(matrices):
+    """Return the inverses of small symmetric positive definite matrices, (n, k, k), by elimination in all at once.
+
+    numpy hands each of them to LAPACK, whose threads may wait for each other longer than they work: where other
+    programs run, 100,000 of them then take seconds.
+    """
+    result = np.empty(matrices.shape)
+
+    def invert(part):
+        rows = np.moveaxis(matrices[part], 0, -1).astype(np.float64, order="C")
+        for pivot in range(len(rows)):
+            column = rows[:, pivot].copy()
+            rows[pivot, pivot] = 1.0
+            rows[pivot] /= column[pivot]
+            for other in range(len(rows)):
+                if other != pivot:
+                    rows[other, pivot] = 0.0
+                    rows[other] -= column[other] * rows[pivot]
+        result[part] = np.moveaxis(rows, -1, 0)
+
+    on_all_cores(invert, blocks(len(matrices), _BLOCK))
+    return result

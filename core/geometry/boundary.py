@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..blocks import blocks, on_all_cores
+from ..dense import inverses
 from ..kernel import SUPPORT
 from .components import label_connected
 from .distances import arc_squared
@@ -303,7 +304,7 @@ def _parabola(t, e, weight):
     """Fit e = a + b t + c t^2, with c shrunk as far as chance may have made it; return it and the scatter about it."""
     basis = np.stack([np.ones_like(t), t, t * t], axis=2)
     weighted = np.swapaxes(basis * weight[:, :, None], 1, 2)
-    inverse = np.linalg.inv(weighted @ basis + 1e-9 * np.eye(3))
+    inverse = inverses(weighted @ basis + 1e-9 * np.eye(3))
     fit = (inverse @ weighted @ e[:, :, None])[:, :, 0]
     residual = e - np.einsum("ikb,ib->ik", basis, fit)
     total = weight.sum(axis=1)
@@ -346,7 +347,7 @@ def given_boundary(nearest, normals, distance):
         u, v = np.moveaxis(offset @ tangents, 2, 0)
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
         weighted = np.swapaxes(basis * nearest.weight[block][:, :, None], 1, 2)
-        fit = np.linalg.solve(weighted @ basis + 1e-9 * np.eye(6), weighted @ distance[index][:, :, None])[:, :, 0]
+        fit = (inverses(weighted @ basis + 1e-9 * np.eye(6)) @ (weighted @ distance[index][:, :, None]))[:, :, 0]
         # Of the line at this distance; the boundary's own is the next.
         level = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
         boundary.curvature[block, 0] = level / np.maximum(1.0 + level * distance[block], 0.5)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blocks import on_all_cores
+from ..dense import inverses
 from ..geometry import dots, frames
 from ..kernel import SECOND_MOMENT, SUPPORT
 from .curvature import second_moment, uneven
@@ -71,7 +72,7 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     """
     lengths = cloud.pairs.lengths
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
-    inverse = np.linalg.inv(moments.curvature() + _RIDGE * np.eye(_TERMS))
+    inverse = inverses(moments.curvature() + _RIDGE * np.eye(_TERMS))
     goal = np.zeros((len(areas), _TERMS))
     goal[:, 0] = 1.0
     terms, before, turns = np.zeros_like(goal), None, []

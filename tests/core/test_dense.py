@@ -29,3 +29,22 @@ def test_product_of_parts_of_matrices():
     rng = np.random.default_rng(0)
     left, right = rng.standard_normal((50, 20)), rng.standard_normal((30, 9))
     np.testing.assert_allclose(dense.product(left[5:, 3:15], right[::2][:12, 1:]), left[5:, 3:15] @ right[::2][:12, 1:])
+
+
+@pytest.mark.parametrize("size", [1, 3, 6])
+def test_inverses_of_many_small_matrices(monkeypatch, size):
+    monkeypatch.setattr(dense, "_BLOCK", 7)
+    half = np.random.default_rng(0).standard_normal((30, size, size))
+    matrices = half @ np.swapaxes(half, 1, 2) + 1e-3 * np.eye(size)
+    found = dense.inverses(matrices)
+    np.testing.assert_allclose(found @ matrices, np.broadcast_to(np.eye(size), matrices.shape), atol=1e-9)
+    assert dense.inverses(matrices[:0]).shape == (0, size, size)
+
+
+def test_inverses_of_all_but_singular_matrices():
+    """As of neighbours on a line, whose fits a small ridge makes solvable."""
+    direction = np.array([0.6, 0.0, 0.8])
+    matrix = np.outer(direction, direction) + 1e-9 * np.eye(3)
+    found = dense.inverses(matrix[None])[0]
+    np.testing.assert_allclose(found @ direction, direction / (1.0 + 1e-9), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found @ [0.0, 1.0, 0.0], [0.0, 1e9, 0.0], rtol=1e-6)
