@@ -169,6 +169,11 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
             f"{parts} parts were asked for, but the {n} points lie in {components} components that cannot be"
             f" joined. Ask for at least {components}, or delete the small ones."
         )
+    if parts > components and components + parts >= n // 3:  # as many modes as n points carry
+        raise TooFewPointsError(
+            f"{parts} parts need {components + parts + 1} modes, but {n} points carry at most {n // 3}. Ask for fewer"
+            " parts."
+        )
     if spectrum is not None and len(spectrum.eigenvectors) != n:
         raise InvalidPointsError(
             f"The spectrum has {len(spectrum.eigenvectors)} points, the operator {n}. Compute it for the same operator."

@@ -41,6 +41,8 @@ class ExportOperator(JobOperator, ExportHelper):
         reason = self.obstacle(context)
         if reason:  # since the file browser opened
             raise PointCloudError(f"{reason}.")
+        if not path.name:
+            raise PointCloudError("No file is named to write to. Give a File Path.")
         write = self.plan(context, context.object)
         return self.work(context, [], lambda progress: write(path, progress))
 

@@ -241,8 +241,8 @@ def save(path, obj, arrays):
 
 def save_arrays(path, arrays):
     """Write arrays by name; an older file stays if that fails."""
-    with replacing(path) as part:
-        np.savez(part, **arrays)
+    with replacing(path) as part, part.open("wb") as file:  # by name, numpy would write to another with its own ending
+        np.savez(file, **arrays)
 
 
 def analysis_arrays(place, laplacian, curvature, spectrum) -> dict:

@@ -117,7 +117,9 @@ def write_attribute(data, name: str, values, data_type: str = ""):
     data_type : str
         As Blender names it; empty for that of our own results.
     """
-    data_type = data_type or type_of(name)
+    if not data_type:
+        data_type = type_of(name)
+        check_size(name, values)
     storage = _STORAGE[data_type]
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
     if len(values) != storage.components * point_count(data):
@@ -134,6 +136,16 @@ def write_attribute(data, name: str, values, data_type: str = ""):
     if attribute is None or attribute.name != name:
         raise RuntimeError(f"Blender made no attribute named {name} on {data.name}")
     attribute.data.foreach_set(storage.key, values)
+
+
+def check_size(name: str, values):
+    """Refuse numbers for an attribute that are too large for the single precision in which Blender keeps them."""
+    sizes = np.abs(values)
+    largest = np.max(sizes, initial=0.0, where=np.isfinite(sizes))
+    if largest > np.finfo(np.float32).max:
+        raise PointCloudError(
+            f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. Scale them down."
+        )
 
 
 def read_attribute(data, name: str):

@@ -4,7 +4,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core import PointCloudError
-from .attributes import own_positions, write_own_positions
+from .attributes import check_size, own_positions, write_own_positions
 from .modifiers import is_own
 from .reading import key_positions, shape_keys
 
@@ -68,6 +68,7 @@ def write_positions(obj, reading, points, target: str, name: str):
     bpy.types.ShapeKey or None
     """
     moved = reading.local(points - reading.points)
+    check_size("position", moved)
     if target == "IN_PLACE" or obj.type != "MESH":
         write_own_positions(obj.data, own_positions(obj.data) + moved)
         return None

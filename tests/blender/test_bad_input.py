@@ -210,3 +210,33 @@ def test_colors_of_a_missing_or_unfit_attribute():
         with pytest.raises(RuntimeError, match=text):
             bpy.ops.meshfree.colormap(attribute=name)
     assert everything(obj) == before
+
+
+def test_results_beyond_single_precision_are_refused(extension):
+    obj = add_object(1e25 * sphere_points(200))  # areas of 1e49
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=r"lb_area has numbers up to \d.*e\+49.* beyond the 3e38"):
+        bpy.ops.meshfree.analyze()
+    assert everything(obj) == before
+    obj = add_object(sphere_points(200))
+    obj.scale = (0.5, 0.5, 0.5)
+    bpy.context.view_layer.update()
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match="position has numbers up to"):
+        bpy.ops.meshfree.mode_shape(amplitude=3.4e38)
+    assert everything(obj) == before
+
+
+def test_an_export_takes_the_name_of_a_file():
+    add_object(sphere_points(200))
+    with pytest.raises(RuntimeError, match="No file is named"):
+        bpy.ops.meshfree.export_operator(filepath="")
+
+
+@pytest.mark.parametrize("name", ["operator", "operator.npz", "operator.txt"])
+def test_an_export_writes_the_file_that_is_named_and_no_other(tmp_path, name):
+    add_object(sphere_points(200))
+    assert bpy.ops.meshfree.export_operator(filepath=str(tmp_path / name)) == {"FINISHED"}
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    with np.load(tmp_path / name) as arrays:
+        assert len(arrays["areas"]) == 200

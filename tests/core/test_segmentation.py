@@ -325,6 +325,7 @@ class TestSegment:
             (True, core.TooFewPointsError, "True parts"),
             (1, core.ComponentError, "2 components"),
             (900, core.TooFewPointsError, "900 parts need"),
+            (10**30, core.TooFewPointsError, "parts need"),
         ],
     )
     def test_impossible_numbers_of_parts(self, two_spheres, parts, error, match):
