@@ -8,7 +8,7 @@ BOOT := $(shell for python in "$(PYTHON)" python3.11 python3.13 python3 python "
 	"$$python" -c "import sys; sys.exit(sys.version_info < (3, 8))" >/dev/null 2>&1 && echo "$$python" && break; done)
 run = $(if $(BOOT),"$(BOOT)",$(error No Python is found: install Python 3.11 or 3.13, or name it by PYTHON=...)) -B scripts/
 
-.PHONY: help demo convert test test-all test-gui build validate lint benchmark pictures clean
+.PHONY: help demo convert test test-all test-gui build validate audit lint benchmark pictures clean
 
 help: ## Show this list (default)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -33,6 +33,9 @@ build: ## Build one zip per platform into dist/
 
 validate: ## Build, and run Blender's validator on every zip
 	@$(run)package.py --validate
+
+audit: ## Ask the public database of vulnerabilities about the wheels that the zips bring (needs the internet)
+	@$(run)environments.py audit -m pip_audit --vulnerability-service osv --disable-pip --requirement wheels.txt
 
 lint: ## Check style and format
 	@$(run)environments.py lint -m ruff check .
