@@ -33,6 +33,7 @@ from .applications import (
     minimal_surface,
     modes_needed,
     nodal_domains,
+    roughness,
     segment,
     signature_energies,
     signature_times,
@@ -56,7 +57,15 @@ from .errors import (
 )
 from .geometry import Prolongation, blue_noise_subset, check_points, estimate_normals
 from .memory import points_that_fit
-from .operator import LaplaceBeltrami, Spectrum, build_laplacian, estimate_areas, mean_curvature
+from .operator import (
+    LaplaceBeltrami,
+    PrincipalCurvatures,
+    Spectrum,
+    build_laplacian,
+    estimate_areas,
+    mean_curvature,
+    principal_curvatures,
+)
 from .options import LaplacianOptions
 from .paper import Stability, check_stability
 
@@ -75,6 +84,7 @@ __all__ = [
     "NotEnoughMemoryError",
     "PointBlend",
     "PointCloudError",
+    "PrincipalCurvatures",
     "Prolongation",
     "SolverError",
     "Spectrum",
@@ -103,6 +113,8 @@ __all__ = [
     "modes_needed",
     "nodal_domains",
     "points_that_fit",
+    "principal_curvatures",
+    "roughness",
     "segment",
     "signature_energies",
     "signature_times",

@@ -41,6 +41,23 @@ def result(attribute):
     return take
 
 
+def shape_index(path):
+    """The shape index: caps, ridges, saddles, valleys and cups."""
+    obj = coral()
+    bpy.ops.meshfree.principal_curvatures(show=False)
+    single(obj, "lb_shape_index", path)
+
+
+def roughness(path):
+    """The roughness of the shape, with noise between two heights."""
+    points, places = demo.Coral().sample(demo.POINTS), np.random.default_rng(1)
+    rough = np.abs(points[:, 2]) < 0.3
+    points[rough] += 0.3 * SPACING * places.standard_normal((np.count_nonzero(rough), 3))
+    obj = studio.make_object(points, "Coral")
+    bpy.ops.meshfree.roughness(show=False)
+    single(obj, "lb_roughness", path)
+
+
 def mode(path):
     """One vibration mode."""
     obj = coral()
@@ -146,6 +163,8 @@ PICTURES = {
     "smooth": smooth,
     "mode_shape": mode_shape,
     "segment": segment,
+    "shape_index": shape_index,
+    "roughness": roughness,
     "signature": signature,
     "distance": distance,
     "field": field,

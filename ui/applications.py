@@ -5,6 +5,18 @@ import bpy
 from .panel import ReadyPanel
 
 
+class MESHFREE_PT_curvature(ReadyPanel, bpy.types.Panel):
+    """How the surface bends, and how rough it is"""
+
+    bl_label = "Curvature"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator("meshfree.principal_curvatures", text="Principal Curvatures...")
+        column.operator("meshfree.roughness", text="Roughness...")
+
+
 class MESHFREE_PT_shape(ReadyPanel, bpy.types.Panel):
     """Shapes by frequency"""
 
@@ -53,6 +65,7 @@ class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
 
 
 CLASSES = (
+    MESHFREE_PT_curvature,
     MESHFREE_PT_shape,
     MESHFREE_PT_segment,
     MESHFREE_PT_fields,

@@ -6,6 +6,7 @@ from ..operators.files.importing import OWN
 
 _TOOLS = (
     ("analyze", "spectrum", "colormap", "legend"),
+    ("principal_curvatures", "roughness"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
     ("geodesic_distance", "harmonic_field"),

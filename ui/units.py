@@ -1,9 +1,24 @@
 """In which unit the numbers of an attribute are written."""
 
-from ..operators.objects.attributes import AREA, DISPLACEMENT, DISTANCE, GAUSSIAN_CURVATURE, MEAN_CURVATURE
+from ..operators.objects.attributes import (
+    AREA,
+    CURVATURE_1,
+    CURVATURE_2,
+    CURVEDNESS,
+    DISPLACEMENT,
+    DISTANCE,
+    GAUSSIAN_CURVATURE,
+    MEAN_CURVATURE,
+    ROUGHNESS,
+)
 
 EIGENVALUE_POWER = -2
-_POWERS = {AREA: 2, MEAN_CURVATURE: -1, GAUSSIAN_CURVATURE: -2, DISTANCE: 1, DISPLACEMENT: 1}  # of a length
+_POWERS = {  # of a length
+    AREA: 2,
+    GAUSSIAN_CURVATURE: -2,
+    **dict.fromkeys((MEAN_CURVATURE, CURVATURE_1, CURVATURE_2, CURVEDNESS), -1),
+    **dict.fromkeys((DISTANCE, DISPLACEMENT, ROUGHNESS), 1),
+}
 _METERS = {
     "KILOMETERS": ("km", 1000.0),
     "METERS": ("m", 1.0),

@@ -9,4 +9,4 @@ from .geodesics import Geodesics, geodesic_distance
 from .minimal_surface import MinimalSurface, minimal_surface
 from .segmentation import modes_needed, nodal_domains, segment
 from .selection import grow
-from .smoothing import PointBlend, displace_by_mode, fair_points, smooth_points, smoothing_base
+from .smoothing import PointBlend, displace_by_mode, fair_points, roughness, smooth_points, smoothing_base

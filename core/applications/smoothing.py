@@ -1,4 +1,7 @@
-"""New places for the points: smoothed or sharpened by frequency, faired without eigenvectors, moved by a mode."""
+"""New places for the points: smoothed or sharpened by frequency, faired without eigenvectors, moved by a mode.
+
+And how far they are from the smooth ones.
+"""
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -12,6 +15,7 @@ from .sizes import SurfaceSize, match_size
 
 _KEPT = (None, "area", "volume")
 _TOLERANCE = 1e-5  # of the factors: the coordinates are large next to the spacing
+_DETAIL = 6.0  # smoothing lengths of a wavelength below which details are taken as rough
 _AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 
@@ -208,6 +212,57 @@ def fair_points(
         progress=progress,
         base=base,
     )
+
+
+def roughness(laplacian, wavelength=None, *, progress=None):
+    """Measure how far the points stick out of the smooth surface.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Its normals must agree in sign, as those from quadrics do, and others with ``LaplacianOptions(orient=True)``.
+    wavelength : float, optional
+        Size of the details [L] of which one half counts: finer ones count whole, wider ones are shape. If not given,
+        6 times the median smoothing length.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n,)
+        Distance from the smooth surface along the normal [L], positive where a point lies on the side that the normals
+        point to. Zero for points that the operator leaves out.
+
+    Raises
+    ------
+    PointCloudError
+        A wavelength that is not above zero.
+
+    See Also
+    --------
+    fair_points : Makes the smooth surface.
+    principal_curvatures : How the surface itself bends.
+
+    Examples
+    --------
+    One point of the unit sphere is 0.02 too far out:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points[400] *= 1.02
+    >>> rough = core.roughness(core.build_laplacian(points))
+    >>> print(np.argmax(np.abs(rough)), rough[400].round(2))
+    400 0.02
+    """
+    if wavelength is None:
+        wavelength = _DETAIL * np.median(laplacian.smoothing_lengths)
+    if not 0.0 < wavelength < np.inf:
+        raise PointCloudError(f"The wavelength of the roughness is {wavelength!r}. Use a number above zero.")
+    smooth = fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2, progress=progress)
+    return np.einsum("ij,ij->i", laplacian.points - smooth, laplacian.normals)
 
 
 def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):

@@ -73,8 +73,10 @@ class Cloud:
         Unit normals.
     moved : ndarray, (m, 3)
         How far the points were moved to smooth noise.
-    mean_curvature, gaussian_curvature : ndarray, (m,)
-        Of local quadrics; the latter is zero where the options do not ask for it.
+    shape_operator : ndarray, (m, 3, 3)
+        Second fundamental form of local quadrics, positive where the surface bends away from the normal.
+    gaussian_curvature : ndarray, (m,)
+        Of local quadrics; zero where the options do not ask for it.
     cell_areas : ndarray, (m,)
         Areas of the points' Voronoi cells.
     spacing : ndarray, (m,)
@@ -94,7 +96,7 @@ class Cloud:
     component: np.ndarray
     normals: np.ndarray
     moved: np.ndarray
-    mean_curvature: np.ndarray
+    shape_operator: np.ndarray
     gaussian_curvature: np.ndarray
     cell_areas: np.ndarray
     spacing: np.ndarray
@@ -175,7 +177,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         component=sample.component,
         normals=own,
         moved=sample.moved,
-        mean_curvature=0.5 * side * np.trace(quadrics.shape_operator, axis1=1, axis2=2),
+        shape_operator=side[:, None, None] * quadrics.shape_operator,
         gaussian_curvature=gaussian,
         cell_areas=cells.areas,
         spacing=nearest.spacing,

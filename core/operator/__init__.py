@@ -2,7 +2,7 @@
 
 from .areas import SOLVERS, AreaSolution, estimate_areas
 from .cholesky import factorize
-from .curvature import mean_curvature
+from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
 from .factors import dissect, sparsify
 from .hierarchy import Rows
 from .laplacian import LaplaceBeltrami, build_laplacian, narrow_laplacian

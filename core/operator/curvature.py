@@ -1,7 +1,10 @@
-"""Curvature: its effect on the kernel, and the mean curvature from the operator applied to the coordinates."""
+"""Curvature: its effect on the kernel, the mean one from the operator applied to the coordinates, principal ones."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry import frames
 from ..kernel import SECOND_MOMENT
 
 _UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which it is known
@@ -57,6 +60,7 @@ def mean_curvature(laplacian):
     See Also
     --------
     LaplaceBeltrami.apply : What it is computed by.
+    principal_curvatures : Both curvatures that it is the mean of.
     estimate_normals : The normals alone.
 
     Examples
@@ -78,3 +82,77 @@ def mean_curvature(laplacian):
     curvature = -0.5 * np.einsum("ij,ij->i", laplacian.apply(centered), laplacian.normals)
     # At a boundary the natural operator takes the surface as level across it.
     return np.where(laplacian.near_boundary, laplacian.mean_curvature, curvature)
+
+
+@dataclass(frozen=True, eq=False)
+class PrincipalCurvatures:
+    """The greatest and the least curvature of a surface at each point, made by `principal_curvatures`.
+
+    Attributes
+    ----------
+    first, second : ndarray, (n,)
+        Greatest and least curvature of the curves across the surface [1 / L], with the sign of `mean_curvature`.
+    direction : ndarray, (n, 3)
+        Unit tangent along which the first is met; the second is met across it. Where both are alike it is arbitrary,
+        and its sign is so everywhere.
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    direction: np.ndarray
+
+    @property
+    def shape_index(self):
+        """The kind of shape, (n,): 1 a cap, 1/2 a ridge, 0 a saddle, -1/2 a valley, -1 a cup; 0 where it is flat."""
+        return np.arctan2(self.first + self.second, self.first - self.second) * (2.0 / np.pi)
+
+    @property
+    def curvedness(self):
+        """How strongly the surface is curved, whatever its shape, (n,) [1 / L]: root mean square of both."""
+        return np.hypot(self.first, self.second) / np.sqrt(2.0)
+
+
+def principal_curvatures(laplacian):
+    """Compute the principal curvatures: their mean by the operator, their difference and direction by local quadrics.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Its normals fix the signs: outward ones give a sphere of radius R twice 1 / R.
+
+    Returns
+    -------
+    PrincipalCurvatures
+        Zero, with an arbitrary direction, at points that were left out.
+
+    See Also
+    --------
+    mean_curvature : Their mean.
+
+    References
+    ----------
+    Koenderink, van Doorn. Surface shape and curvature scales. 1992. For shape index and curvedness.
+
+    Examples
+    --------
+    On the unit sphere, a cap everywhere, both are one:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> curvatures = core.principal_curvatures(core.build_laplacian(points))
+    >>> print(curvatures.first.mean().round(1), curvatures.second.mean().round(1))
+    1.0 1.0
+    >>> print(curvatures.shape_index.mean().round(1))
+    1.0
+    """
+    _, v, u = np.moveaxis(frames(laplacian.normals), 2, 0)
+    along, across, mixed = (
+        np.einsum("ia,iab,ib->i", left, laplacian.shape_operator, right) for left, right in ((u, u), (v, v), (u, v))
+    )
+    half = np.hypot(0.5 * (along - across), mixed)
+    angle = 0.5 * np.arctan2(2.0 * mixed, along - across)[:, None]
+    mean = mean_curvature(laplacian)
+    return PrincipalCurvatures(mean + half, mean - half, np.cos(angle) * u + np.sin(angle) * v)

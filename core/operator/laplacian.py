@@ -36,9 +36,11 @@ class LaplaceBeltrami:
         Unit normals, as given or estimated.
     areas : ndarray, (n,)
         Area elements [L^2], all positive: the lumped mass. Those of points left out are too small to count.
-    mean_curvature, gaussian_curvature : ndarray, (n,)
-        Mean [1 / L] and product [1 / L^2] of the two principal curvatures, from local quadrics; the product is zero
-        without the curvature correction.
+    shape_operator : ndarray, (n, 3, 3)
+        Second fundamental form of local quadrics [1 / L]: ``t . shape_operator t`` is the curvature along the unit
+        tangent t, positive where the surface bends away from the normal.
+    gaussian_curvature : ndarray, (n,)
+        Product of the two principal curvatures [1 / L^2], from local quadrics; zero without the curvature correction.
     boundary : ndarray, (n,) bool
         Points at a boundary of the surface.
     near_boundary : ndarray, (n,) bool
@@ -73,7 +75,7 @@ class LaplaceBeltrami:
     surface_points: np.ndarray
     normals: np.ndarray
     areas: np.ndarray
-    mean_curvature: np.ndarray
+    shape_operator: np.ndarray
     gaussian_curvature: np.ndarray
     boundary: np.ndarray
     near_boundary: np.ndarray
@@ -87,6 +89,11 @@ class LaplaceBeltrami:
     images: sparse.csr_array
     options: LaplacianOptions
     notices: list
+
+    @property
+    def mean_curvature(self):
+        """Mean of the two principal curvatures of local quadrics, (n,) [1 / L]."""
+        return 0.5 * np.trace(self.shape_operator, axis1=1, axis2=2)
 
     @property
     def dirichlet(self):
@@ -337,7 +344,7 @@ def build_laplacian(
         surface_points=points + scaled.scatter(cloud.moved * scaled.scale, 0.0),
         normals=scaled.scatter(cloud.normals, (0.0, 0.0, 1.0)),
         areas=scaled.scatter(solution.areas * scaled.scale**2 / scaled.copies, NO_AREA),
-        mean_curvature=scaled.scatter(cloud.mean_curvature / scaled.scale, 0.0),
+        shape_operator=scaled.scatter(cloud.shape_operator / scaled.scale, 0.0),
         gaussian_curvature=scaled.scatter(cloud.gaussian_curvature / scaled.scale**2, 0.0),
         boundary=scaled.scatter(cloud.boundary.at_boundary, False),
         near_boundary=scaled.scatter(cloud.boundary.reached(pairs.lengths), False),

@@ -15,6 +15,7 @@ from ..objects.result import analysis_names, check_writable, write_result
 from ..running.application import compute_all
 from ..running.stages import Stages
 from ..tools.analyze import WRITE_LIMIT, plan_analysis
+from ..tools.curvature import Curvatures, Roughness
 from ..tools.minimal import MinimalSurface
 from ..tools.segment import Segment, Signature
 from ..tools.smooth import ModeShape, Smooth
@@ -22,6 +23,8 @@ from . import objects as files
 
 # Tools that need nothing picked, beside the analysis, by the names of their operators.
 VERBS = {
+    "principal_curvatures": Curvatures,
+    "roughness": Roughness,
     "smooth": Smooth,
     "mode_shape": ModeShape,
     "segment": Segment,
@@ -120,7 +123,7 @@ def _kind(verb):
 
 def _choices(verb):
     """Properties of an operator that make sense on the command line; points are moved in place there."""
-    left_out = {"rna_type", "show", "target", "animate", "period"}
+    left_out = {"rna_type", "show", "display", "target", "animate", "period"}
     return [item for item in _kind(verb).properties if item.identifier not in left_out]
 
 

@@ -84,10 +84,17 @@ class Reading:
         """Turn local points or shifts into such as were read."""
         return vectors @ self.matrix.T
 
+    def local_directions(self, directions):
+        """Turn directions along the surface, as they were read, into local unit vectors."""
+        return _units(self.local(directions))
+
     def local_normals(self, normals):
         """Turn normals of the points into unit normals of the local positions: covectors, so by M^T, not M^-1."""
-        local = normals @ self.matrix
-        return local / np.sqrt(np.einsum("ij,ij->i", local, local))[:, None]
+        return _units(normals @ self.matrix)
+
+
+def _units(vectors):
+    return vectors / np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
 
 
 def read_points(context, obj) -> Reading:

@@ -11,6 +11,8 @@ from tests.blender.test_bad_input import CLOUDS
 from tests.blender.test_smooth import rough_sphere, shown_points
 
 SETTINGS = {
+    "principal_curvatures": {},
+    "roughness": {},
     "smooth": {},
     "mode_shape": {},
     "segment": {"parts": 3, "vertex_groups": True},

@@ -27,6 +27,8 @@ AGAIN = {
     "scale details": ("smooth", {"method": "DETAIL"}, {"method": "DETAIL", "strength": 0.5}),
     "keep modes": ("smooth", {"method": "MODES", "modes": 30}, {"method": "MODES", "modes": 20, "strength": 0.5}),
     "mode_shape": ({}, {"mode": 7, "amplitude": 0.2, "phase": 1.0, "animate": True}),
+    "principal_curvatures": ({}, {"display": "CURVEDNESS", "show": False}),
+    "roughness": ({}, {"show": False}),
     "segment": ({"parts": 3}, {"parts": 3, "vertex_groups": True, "show": False}),
     "signs": ("segment", {"method": "NODAL"}, {"method": "NODAL", "show": False}),
     "signature": ({"modes": 12}, {"modes": 12, "kind": "WAVE", "count": 3}),

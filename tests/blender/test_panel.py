@@ -35,6 +35,8 @@ OPERATORS = (
     "legend",
     "minimal_surface",
     "mode_shape",
+    "principal_curvatures",
+    "roughness",
     "segment",
     "select_by_range",
     "select_component",
@@ -55,11 +57,25 @@ DIALOGS = (  # operators that ask before they work, in a layout of ours
     "import_points",
     "minimal_surface",
     "mode_shape",
+    "principal_curvatures",
+    "roughness",
     "segment",
     "signature",
     "smooth",
 )
-PANELS = ("main", "settings", "spectrum", "display", "points", "shape", "segment", "fields", "deform", "minimal")
+PANELS = (
+    "main",
+    "settings",
+    "spectrum",
+    "display",
+    "points",
+    "curvature",
+    "shape",
+    "segment",
+    "fields",
+    "deform",
+    "minimal",
+)
 
 
 class Layout:

@@ -31,6 +31,8 @@ SHOWN = [
     "mean_curvature",
     "minimal_surface",
     "nodal_domains",
+    "principal_curvatures",
+    "roughness",
     "segment",
     "smooth_points",
     "solve_poisson",

@@ -355,3 +355,38 @@ def test_progress_can_cancel(ellipsoid):
     ):
         with pytest.raises(core.Cancelled):
             work()
+
+
+class TestRoughness:
+    @pytest.mark.parametrize("bumpy", [False, True])
+    def test_is_the_noise_and_not_the_shape(self, clouds, bumpy):
+        laplacian, noise = clouds[bumpy]
+        rough = core.roughness(laplacian, 0.5)
+        assert np.corrcoef(rough, noise)[0, 1] > 0.97
+        assert rms(rough) == pytest.approx(rms(noise), rel=0.1)
+
+    def test_wider_waves_count_the_less(self):
+        heights = {}
+        for waves in (4, 16):
+            grid = square_grid(60)
+            grid[:, 2] = 0.005 * np.sin(2.0 * np.pi * waves * grid[:, 0])
+            normals = np.tile([0.0, 0.0, 1.0], (len(grid), 1))
+            inner = np.abs(grid[:, :2] - 0.5).max(axis=1) < 0.3
+            rough = core.roughness(core.build_laplacian(grid, normals), 0.125)  # that of eight waves
+            heights[waves] = rms(rough[inner]) / rms(grid[inner, 2])
+        assert heights[4] < 0.05
+        assert heights[16] > 0.9
+
+    def test_scales_and_turns_its_sign_with_the_normals(self, clouds):
+        laplacian, _ = clouds[False]
+        rough = core.roughness(laplacian, 0.5)
+        larger = core.build_laplacian(4.0 * laplacian.points, -laplacian.normals)
+        np.testing.assert_allclose(core.roughness(larger, 2.0), -4.0 * rough, rtol=0.0, atol=1e-3)
+
+    def test_point_left_out_is_not_rough(self, components):
+        assert np.all(core.roughness(components)[-2:] == 0.0)
+
+    @pytest.mark.parametrize("wavelength", [0.0, -1.0, np.nan, np.inf])
+    def test_wavelength_that_makes_no_sense(self, ellipsoid, wavelength):
+        with pytest.raises(core.PointCloudError, match="above zero"):
+            core.roughness(ellipsoid, wavelength)

@@ -1,0 +1,132 @@
+"""How the surface bends and along which directions, what shape it has there, and how rough it is."""
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, FloatProperty
+
+from ...core import principal_curvatures, roughness
+from ..objects.attributes import (
+    CURVATURE_1,
+    CURVATURE_2,
+    CURVEDNESS,
+    DIRECTION_1,
+    ROUGHNESS,
+    SHAPE_INDEX,
+    tag_changed,
+    write_attribute,
+)
+from ..objects.result import length_text
+from ..running import cache
+from ..running.application import ShownOperator, Tool, operator_reader
+
+_SHOWN = {
+    "SHAPE_INDEX": SHAPE_INDEX,
+    "CURVEDNESS": CURVEDNESS,
+    "GREATEST": CURVATURE_1,
+    "LEAST": CURVATURE_2,
+    "DIRECTION": DIRECTION_1,
+}
+
+
+class Curvatures(Tool):
+    """The settings and the work of `meshfree.principal_curvatures`."""
+
+    writes = (CURVATURE_1, CURVATURE_2, DIRECTION_1, SHAPE_INDEX, CURVEDNESS)
+    asks = adjustable = ("display", "show")
+
+    display: EnumProperty(
+        name="Display",
+        description="Which of the results is shown as colors",
+        items=[
+            (
+                "SHAPE_INDEX",
+                "Shape Index",
+                "The kind of shape: 1 a cap, 0 a saddle, -1 a cup, others between",
+            ),
+            ("CURVEDNESS", "Curvedness", "How strongly the surface bends, whatever its shape"),
+            (
+                "GREATEST",
+                "Greatest Curvature",
+                "Curvature where the surface bends outwards most",
+            ),
+            ("LEAST", "Least Curvature", "Curvature across that direction"),
+            ("DIRECTION", "Direction", "Direction of the greatest curvature"),
+        ],
+        default="SHAPE_INDEX",
+    )
+
+    def plan(self, context, obj):
+        reading, operator = operator_reader(context, obj)
+
+        def compute(progress):
+            laplacian = operator(progress)
+            progress("Curvature", 0.9)
+            found = cache.result(laplacian, "principal", compute=lambda: principal_curvatures(laplacian))
+            return found, reading.local_directions(found.direction)
+
+        return compute
+
+    def write(self, context, obj, result):
+        found, direction = result
+        values = found.first, found.second, direction, found.shape_index, found.curvedness
+        for name, numbers in zip(self.writes, values, strict=True):
+            write_attribute(obj.data, name, numbers)
+        tag_changed(obj.data)
+        return [f"{obj.name}: curvatures from {found.second.min():.4g} to {found.first.max():.4g}"]
+
+
+class MESHFREE_OT_principal_curvatures(Curvatures, ShownOperator, bpy.types.Operator):
+    """Compute the greatest and the least curvature at each point, their direction, and the kind of shape"""
+
+    bl_idname = "meshfree.principal_curvatures"
+    bl_label = "Principal Curvatures"
+
+    @property
+    def shown(self):
+        return _SHOWN[self.display]
+
+
+class Roughness(Tool):
+    """The settings and the work of `meshfree.roughness`."""
+
+    writes = (ROUGHNESS,)
+    asks = ("wavelength", "show")
+
+    wavelength: FloatProperty(
+        name="Wavelength",
+        description="Size of the details that are half rough, half shape: finer ones are rough; 0 for what suits the"
+        " points",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+
+    def plan(self, context, obj):
+        _, operator = operator_reader(context, obj)
+        wavelength = self.wavelength or None
+
+        def compute(progress):
+            laplacian = operator(progress)
+            return cache.result(
+                laplacian,
+                "roughness",
+                wavelength,
+                compute=lambda: roughness(laplacian, wavelength, progress=progress),
+            )
+
+        return compute
+
+    def write(self, context, obj, result):
+        write_attribute(obj.data, ROUGHNESS, result)
+        tag_changed(obj.data)
+        return [f"{obj.name}: roughness {length_text(np.sqrt(np.mean(result**2)))} on average"]
+
+
+class MESHFREE_OT_roughness(Roughness, ShownOperator, bpy.types.Operator):
+    """Measure how far the points stick out of the smooth surface, or lie within it"""
+
+    bl_idname = "meshfree.roughness"
+    bl_label = "Roughness"
+
+
+CLASSES = (MESHFREE_OT_principal_curvatures, MESHFREE_OT_roughness)
