@@ -5,6 +5,7 @@ import numpy as np
 from bpy.props import IntProperty
 
 from ...core import PointCloudError
+from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISPLACEMENT, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.reading import find_object
 from ..running.job import Job, JobOperator, SteppedJob, all_steps
@@ -98,12 +99,13 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
     def finish(self, context, objects, results):
         """Write what was baked."""
         (obj,) = objects
-        mesh = bpy.data.meshes.new(f"{obj.name} Bake")
-        mesh.vertices.add(point_count(obj.data))
-        for number, displacement in enumerate(results):
-            write_attribute(mesh, str(number), displacement, "FLOAT_VECTOR")
-        cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
-        show_baked(find_deform(obj), cache, self.first, len(results))
+        with all_or_nothing(objects):
+            mesh = bpy.data.meshes.new(f"{obj.name} Bake")
+            mesh.vertices.add(point_count(obj.data))
+            for number, displacement in enumerate(results):
+                write_attribute(mesh, str(number), displacement, "FLOAT_VECTOR")
+            cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
+            show_baked(find_deform(obj), cache, self.first, len(results))
         size = np.prod([len(results), *results[0].shape]) * 4 / 2**20
         self.report({"INFO"}, f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file")
         return {"FINISHED"}

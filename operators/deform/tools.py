@@ -6,6 +6,7 @@ from bpy.props import BoolProperty
 from mathutils import Matrix, Vector
 
 from ...core import PointCloudError
+from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import REST, own_positions, point_count, read_attribute, write_own_positions
 from ..objects.groups import HANDLE, assign, check_assignable, handle_names, has_group
 from ..objects.modifiers import get_input
@@ -168,7 +169,10 @@ class BoundOperator(HandledOperator):
             check_fresh(obj)
             context.view_layer.update()
             live.update(obj)  # all steps, should only the first one have been taken
-        self.report({"INFO"}, self.change(context, obj))
+        empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
+        with all_or_nothing([obj, *empties]):
+            line = self.change(context, obj)
+        self.report({"INFO"}, line)
         return {"FINISHED"}
 
 

@@ -11,6 +11,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ...core import PointCloudError
 from ...core.files import READABLE, read_points
+from ..objects.all_or_nothing import all_or_nothing
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
@@ -102,8 +103,15 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             raise PointCloudError(reason)
         for other in context.selected_objects:
             other.select_set(False)
+        with all_or_nothing([]):
+            self._add(context, results)
+        if self._framed:
+            _frame_selected(context)
+        return {"FINISHED"}
+
+    def _add(self, context, tables):
         shared = known_offset(context.scene)
-        for path, table in zip(self._paths, results, strict=True):
+        for path, table in zip(self._paths, tables, strict=True):
             turned = _turned_up(table) if self.up == "Y" else table
             obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
             obj.select_set(True)
@@ -115,9 +123,6 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             meshes = [obj.data for obj in context.selected_objects]
             bpy.ops.object.convert(target="POINTCLOUD")
             bpy.data.batch_remove(meshes)
-        if self._framed:
-            _frame_selected(context)
-        return {"FINISHED"}
 
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""

@@ -4,40 +4,57 @@ from contextlib import contextmanager
 
 import bpy
 
+from .modifiers import inputs_of, is_own, put_inputs
+
 
 @contextmanager
 def all_or_nothing(objects):
     """Put objects, with their data, back to how they were if what is done with them fails, whatever it fails with.
 
-    Their data are copied before: cheap, for Blender copies the values of points only when one of both is written. After
-    a failure the copy takes the place of the data. What was added since, such as objects, materials and modifiers, is
-    removed; modifiers that were removed stay so.
+    Their data are copied before: cheap, for Blender copies the values of points only when one of both is written. So
+    are the actions of shape keys, and the materials that our own modifiers show. After a failure the copies take their
+    places. What was added since, such as objects, materials and modifiers, is removed; modifiers that were removed stay
+    so.
     """
+    render = bpy.context.scene.render
+    locked = render.use_lock_interface
     kept = {}  # of objects that share their data one copy
     try:
-        for obj in objects:
-            if obj.data not in kept:
-                kept[obj.data] = _copy(obj.data)
+        for block in dict.fromkeys(block for obj in objects for block in _written(obj)):
+            kept[block] = _copy(block)
         states, there = [_State(obj) for obj in objects], set(bpy.data.user_map())
         try:
             yield
         except BaseException:
+            render.use_lock_interface = locked
             for state in states:
                 state.put_back()
-            for data in list(kept):
-                _replace(data, kept.pop(data))
+            for block in list(kept):
+                _replace(block, kept.pop(block))
             _remove(set(bpy.data.user_map()) - there)
             raise
     finally:
         _remove(kept.values())
 
 
+def _written(obj):
+    """Data-blocks that are changed when results are written to an object, the object itself apart."""
+    blocks = [obj.data]
+    keys = getattr(obj.data, "shape_keys", None)
+    if keys is not None and keys.animation_data is not None:
+        blocks.append(keys.animation_data.action)
+    for item in filter(is_own, obj.modifiers):
+        blocks += [value for value in inputs_of(item).values() if isinstance(value, bpy.types.Material)]
+    return [block for block in blocks if block is not None]
+
+
 class _State:
-    """What an object holds beside its data: which data and modifiers, custom properties, settings and results."""
+    """What an object holds beside its data: where it is, which data and modifiers, custom properties, settings."""
 
     def __init__(self, obj):
         self._obj, self._data = obj, obj.data
-        self._modifiers = [item.name for item in obj.modifiers]
+        self._place = obj.matrix_basis.copy()
+        self._modifiers = {item.name: inputs_of(item) if is_own(item) else {} for item in obj.modifiers}
         self._own = {name: _plain(obj[name]) for name in _own_names(obj)}
         self._settings = _values(obj.meshfree)
         self._key = obj.active_shape_key_index
@@ -46,8 +63,14 @@ class _State:
         obj = self._obj
         if obj.data != self._data:
             obj.data = self._data
+        if obj.matrix_basis != self._place:
+            obj.matrix_basis = self._place
         for item in [item for item in obj.modifiers if item.name not in self._modifiers]:
             obj.modifiers.remove(item)
+        there = [name for name in self._modifiers if name in obj.modifiers]
+        for index, name in enumerate(there):
+            put_inputs(obj.modifiers[name], self._modifiers[name])
+            obj.modifiers.move(obj.modifiers.find(name), index)
         for name in _own_names(obj):
             if name not in self._own:
                 del obj[name]

@@ -75,13 +75,34 @@ def add_node(tree, kind, column, y, **properties):
 
 def get_input(modifier, name: str):
     """Value of an input of a modifier of ours."""
-    data, path = input_property(modifier, name)
-    return getattr(data, path) if path == "value" else modifier[path[2:-2]]
+    return _read(*input_property(modifier, name))
 
 
 def set_input(modifier, name: str, value):
     """Set an input of a modifier of ours."""
-    data, path = input_property(modifier, name)
+    _write(*input_property(modifier, name), value)
+
+
+def inputs_of(modifier) -> dict:
+    """Read the values of all inputs of a modifier of ours, by their identifiers."""
+    return {identifier: _read(*_input(modifier, identifier)) for identifier in _inputs(modifier.node_group)}
+
+
+def put_inputs(modifier, values):
+    """Set those inputs of a modifier of ours that have other values than these, by their identifiers."""
+    for identifier, value in values.items():
+        place = _input(modifier, identifier)
+        if _read(*place) != value:
+            _write(*place, value)
+
+
+def _read(data, path):
+    if path != "value":
+        return data.get(path[2:-2])
+    return getattr(data, path, None)  # geometry has none
+
+
+def _write(data, path, value):
     if path == "value":
         data.value = value
     else:
@@ -128,11 +149,7 @@ def modifier_settings(modifier) -> dict:
             settings[name] = _plain(getattr(modifier, name))
     if modifier.type == "NODES" and modifier.node_group is not None:
         for identifier in _inputs(modifier.node_group):
-            data, path = _input(modifier, identifier)
-            if path == "value":
-                settings[identifier] = _plain(getattr(data, path, None))
-            else:
-                settings[identifier] = _plain(modifier.get(identifier))
+            settings[identifier] = _plain(_read(*_input(modifier, identifier)))
     return settings
 
 

@@ -41,6 +41,11 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
         return f'"{obj.name}" is {article} {kind}, not a Mesh. {way} a mesh'
     if not obj.is_editable or not obj.data.is_editable:
         return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
+    if obj.data.override_library is not None:
+        return (
+            f'"{obj.name}" is a library override, whose results would not be saved. Use Object > Relations > Make Local'
+            " > Selected Objects and Data"
+        )
     edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
     if obj.mode not in modes or edited:
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'

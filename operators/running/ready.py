@@ -2,19 +2,29 @@
 
 from functools import wraps
 
+from numpy.linalg import LinAlgError
+
 from ...core import PointCloudError
 from ..objects.reading import obstacle
 
+_TROUBLES = {  # what may go wrong in any computation, in plain words
+    PointCloudError: "{}",
+    MemoryError: "The memory is used up. Close other programs, or lower the Point Budget",
+    LinAlgError: "The equations have no solution ({}). Raise Neighbors, or delete points that lie on each other",
+    OSError: "A file could not be read or written: {}",
+}
+
 
 def reporting(method):
-    """Let an operator report what a method of it, such as `execute`, refuses."""
+    """Let an operator report what a method of it, such as `execute`, refuses, and what may go wrong in any."""
 
     @wraps(method)
     def guarded(self, context, *more):
         try:
             return method(self, context, *more)
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
+        except tuple(_TROUBLES) as error:
+            text = next(text for kind, text in _TROUBLES.items() if isinstance(error, kind))
+            self.report({"ERROR"}, text.format(error))
             return {"CANCELLED"}
 
     return guarded

@@ -75,11 +75,20 @@ def everything(obj):
         "blocks": {name: len(getattr(bpy.data, name)) for name in ("objects", "meshes", "materials", "node_groups")},
         "object": (obj.name, obj.mode, data and data.name, [list(row) for row in obj.matrix_world]),
         "properties": {key: list(obj[key]) for key in list(obj.keys()) if key.startswith("lb_")},
-        "modifiers": [(item.name, item.show_viewport, item.show_render) for item in obj.modifiers],
+        "modifiers": [
+            (item.name, item.show_viewport, item.show_render, sorted(_inputs(item).items())) for item in obj.modifiers
+        ],
+        "materials": [slot.name for slot in obj.material_slots],
+        "animation": _animation(obj),
+        "scene": [
+            (scene.name, scene.frame_current, scene.frame_subframe, scene.render.use_lock_interface)
+            for scene in bpy.data.scenes
+        ],
         "groups": [group.name for group in obj.vertex_groups],
         "settings": _values(obj.meshfree),
     }
     if obj.type == "MESH":
+        record["animated keys"] = _animation(data.shape_keys)
         record["attributes"] = {layer.name: (layer.domain, layer.data_type, _bytes(layer)) for layer in data.attributes}
         record["members"] = [[(item.group, item.weight) for item in vertex.groups] for vertex in data.vertices]
         record["counts"] = (len(data.vertices), len(data.edges), len(data.polygons))
@@ -88,6 +97,29 @@ def everything(obj):
             for block in (data.shape_keys.key_blocks if data.shape_keys else ())
         ]
     return record
+
+
+def _inputs(modifier):
+    """Values of the inputs of a modifier by nodes, as text."""
+    if modifier.type != "NODES" or modifier.node_group is None:
+        return {}
+    items = [item for item in modifier.node_group.interface.items_tree if item.in_out == "INPUT"]
+    if hasattr(modifier, "properties"):  # Blender 5.2 on
+        found = {
+            item.name: getattr(getattr(modifier.properties.inputs, item.identifier), "value", None) for item in items
+        }
+    else:
+        found = {item.name: modifier.get(item.identifier) for item in items}
+    return {name: value.name if isinstance(value, bpy.types.ID) else str(value) for name, value in found.items()}
+
+
+def _animation(block):
+    """Keyframes of a data-block."""
+    action = block and block.animation_data and block.animation_data.action
+    if not action:
+        return None
+    curves = action.fcurves if hasattr(action, "fcurves") else action.layers[0].strips[0].channelbags[0].fcurves
+    return action.name, [(curve.data_path, [tuple(key.co) for key in curve.keyframe_points]) for curve in curves]
 
 
 def _bytes(layer):

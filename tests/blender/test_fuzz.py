@@ -1,9 +1,10 @@
 """Every operator with random settings on odd objects: done, or refused with a sentence and nothing changed.
 
-MESHFREE_CASES in the environment says how many calls are tried; each has a seed of its own, which a failure names.
+MESHFREE_CASES in the environment says how many calls are tried, from the seed MESHFREE_FIRST on; a failure names its.
 """
 
 import os
+import tempfile
 
 import bpy
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 
 from tests.blender.clouds import add_group, add_object, everything, sphere_points
 
-CASES = int(os.environ.get("MESHFREE_CASES", "120"))
+CASES = int(os.environ.get("MESHFREE_CASES", "150"))
+FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))  # seed
 LEFT_OUT = {"escape", "add_preset", "apply_preset"}  # that lives in windows; these are about the user's own presets
 
 
@@ -75,6 +77,55 @@ def of_type(make):
     return made
 
 
+def from_library(override):
+    """A sphere of another file: linked, or overridden with its data."""
+
+    def made():
+        sphere().name = "Kept"
+        folder = tempfile.mkdtemp()
+        path = os.path.join(folder, "library.blend")
+        bpy.data.libraries.write(path, {bpy.data.objects["Kept"]})
+        bpy.data.batch_remove([bpy.data.objects["Kept"], *bpy.data.meshes])
+        with bpy.data.libraries.load(path, link=True) as (_, wanted):
+            wanted.objects = ["Kept"]
+        (obj,) = wanted.objects
+        bpy.context.scene.collection.objects.link(obj)
+        if override:
+            obj = obj.override_create(remap_local_usages=True)
+            obj.data.override_create(remap_local_usages=True)
+        bpy.context.view_layer.objects.active = obj
+        obj.select_set(True)
+        return obj
+
+    return made
+
+
+def rigged(obj):
+    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(rig)
+    obj.modifiers.new("Armature", "ARMATURE").object = rig
+    obj.parent = rig
+
+
+def animated(obj):
+    for frame in (1, 5):
+        obj.location.x = 0.1 * frame
+        obj.keyframe_insert("location", frame=frame)
+    with_keys(obj)
+    obj.data.shape_keys.key_blocks["Other"].keyframe_insert("value", frame=3)
+
+
+def bound(obj):
+    bpy.ops.meshfree.deform_bind()
+    obj.meshfree.deform.handle_items[0].empty.location.z += 0.3
+    bpy.context.view_layer.update()
+
+
+def colored(obj):
+    bpy.ops.meshfree.analyze(modes=3)
+    bpy.ops.meshfree.colormap()
+
+
 def edited(obj):
     bpy.ops.object.mode_set(mode="EDIT")
 
@@ -101,6 +152,12 @@ OBJECTS = {
     "hidden": changed(lambda obj: obj.hide_set(True)),
     "in another scene": changed(in_another_scene),
     "shared": changed(shared),
+    "linked": from_library(False),
+    "overridden": from_library(True),
+    "rigged": changed(rigged),
+    "animated": changed(animated),
+    "bound": changed(bound),
+    "colored": changed(colored),
     "in Edit Mode": changed(edited),
     "no points": odd_points(lambda points: points[:0]),
     "one point": odd_points(lambda points: points[:1]),
@@ -160,7 +217,7 @@ def check_results(obj):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("seed", range(CASES))
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + CASES))
 def test_any_call_is_done_or_refused(seed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rng = np.random.default_rng(seed)
