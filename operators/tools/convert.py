@@ -80,7 +80,10 @@ def _convert(context, obj, target):
         other.select_set(False)
     obj.select_set(True)
     context.view_layer.objects.active = obj
+    left = obj.data
     bpy.ops.object.convert(target=target)
+    if left.users == 0:
+        bpy.data.batch_remove([left])
     data, same = obj.data, point_count(obj.data) == count
     if same and target == "POINTCLOUD":
         write_attribute(data, SELECTION, chosen, "BOOLEAN")

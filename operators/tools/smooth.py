@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy_extras import anim_utils
 
 from ...core import (
     PointBlend,
@@ -234,10 +235,21 @@ class ModeShape(Tool):
             for index in range(int((scene.frame_end - scene.frame_start) / quarter) + 2):
                 key.value = (1.0, 0.0, -1.0, 0.0)[index % 4]
                 key.keyframe_insert("value", frame=scene.frame_start + index * quarter)
+            key.value = _animated_value(key, scene.frame_current_final)  # which Blender sets at the next frame only
         largest = np.linalg.norm(points - reading.points, axis=1).max()
         again = f"Only {mode} modes are computed: this is the last. Start Deform by Mode again for more."
         line = f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"
         return [again, line] if mode < self.mode else [line]
+
+
+def _animated_value(key, frame):
+    """Return the value that its keyframes give a shape key at a frame."""
+    animation = key.id_data.animation_data
+    if hasattr(animation, "action_slot"):  # Blender 4.4 on
+        curves = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot).fcurves
+    else:
+        curves = animation.action.fcurves
+    return curves.find(key.path_from_id("value")).evaluate(frame)
 
 
 class MESHFREE_OT_mode_shape(ModeShape, ApplicationOperator, bpy.types.Operator):
