@@ -1,5 +1,7 @@
 """Point clouds for the tests of Blender, and a record of everything that an object holds."""
 
+from collections import Counter
+
 import bpy
 import numpy as np
 
@@ -72,31 +74,73 @@ def everything(obj):
     """All data of an object and its mesh, and how many data-blocks there are, to compare before and after."""
     data = obj.data
     record = {
-        "blocks": {name: len(getattr(bpy.data, name)) for name in ("objects", "meshes", "materials", "node_groups")},
+        "blocks": dict(Counter(type(block).__name__ for block in bpy.data.user_map())),
         "object": (obj.name, obj.mode, data and data.name, [list(row) for row in obj.matrix_world]),
-        "properties": {key: list(obj[key]) for key in list(obj.keys()) if key.startswith("lb_")},
+        "seen": (obj.select_get(), obj.hide_get(), obj.hide_viewport, obj.hide_render, obj.active_shape_key_index),
+        "properties": _own(obj),
         "modifiers": [
-            (item.name, item.show_viewport, item.show_render, sorted(_inputs(item).items())) for item in obj.modifiers
+            (item.name, item.type, item.show_viewport, item.show_render, sorted(_inputs(item).items()))
+            for item in obj.modifiers
         ],
+        "shown": [_material(block) for item in obj.modifiers for block in _materials(item)],
         "materials": [slot.name for slot in obj.material_slots],
         "animation": _animation(obj),
         "scene": [
             (scene.name, scene.frame_current, scene.frame_subframe, scene.render.use_lock_interface)
             for scene in bpy.data.scenes
         ],
-        "groups": [group.name for group in obj.vertex_groups],
+        "groups": [(group.name, group.lock_weight) for group in obj.vertex_groups],
         "settings": _values(obj.meshfree),
     }
+    if obj.type in ("MESH", "POINTCLOUD"):
+        record["data properties"] = _own(data)
+        record["attributes"] = {layer.name: (layer.domain, layer.data_type, _bytes(layer)) for layer in data.attributes}
     if obj.type == "MESH":
         record["animated keys"] = _animation(data.shape_keys)
-        record["attributes"] = {layer.name: (layer.domain, layer.data_type, _bytes(layer)) for layer in data.attributes}
         record["members"] = [[(item.group, item.weight) for item in vertex.groups] for vertex in data.vertices]
         record["counts"] = (len(data.vertices), len(data.edges), len(data.polygons))
         record["keys"] = [
-            (block.name, block.value, block.mute, [tuple(point.co) for point in block.data])
+            (block.name, block.value, block.mute, repr([tuple(point.co) for point in block.data]))
             for block in (data.shape_keys.key_blocks if data.shape_keys else ())
         ]
     return record
+
+
+def _own(block):
+    """Custom properties of a data-block, those of this extension's classes apart."""
+    return {key: _plain(block[key]) for key in list(block.keys()) if key not in block.bl_rna.properties}
+
+
+def _plain(value):
+    """A value, or as text what lives in Blender's memory."""
+    for way in ("to_list", "to_dict"):
+        if hasattr(value, way):
+            return repr(getattr(value, way)())
+    return repr(value)
+
+
+def _materials(modifier):
+    return [bpy.data.materials[name] for name in _inputs(modifier).values() if name in bpy.data.materials]
+
+
+def _material(material):
+    """What the nodes of a material show."""
+    nodes = material.node_tree.nodes
+    return material.name, [
+        (
+            node.name,
+            [repr(_listed(socket.default_value)) for socket in node.inputs if hasattr(socket, "default_value")],
+            getattr(node, "attribute_name", ""),
+            [(each.position, tuple(each.color)) for each in node.color_ramp.elements]
+            if hasattr(node, "color_ramp")
+            else [],
+        )
+        for node in nodes
+    ]
+
+
+def _listed(value):
+    return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
 
 
 def _inputs(modifier):
@@ -132,5 +176,18 @@ def _bytes(layer):
 
 
 def _values(group):
-    names = [item.identifier for item in group.bl_rna.properties if item.type in {"INT", "FLOAT", "ENUM", "STRING"}]
-    return {name: repr(getattr(group, name)) for name in names if name != "metric"} | {"metric": list(group.metric)}
+    """All settings, as text, but for those that differ from run to run: seconds, and names that occur once."""
+    values = {}
+    for item in group.bl_rna.properties:
+        value = getattr(group, item.identifier)
+        if item.identifier in ("rna_type", "seconds", "binding_id"):
+            continue
+        if item.type == "COLLECTION":
+            values[item.identifier] = [_values(member) for member in value]
+        elif isinstance(value, bpy.types.PropertyGroup):
+            values[item.identifier] = _values(value)
+        elif isinstance(value, bpy.types.ID):
+            values[item.identifier] = value.name
+        else:
+            values[item.identifier] = repr(_listed(value))
+    return values

@@ -1,8 +1,11 @@
 """Every operator with random settings on odd objects: done, or refused with a sentence and nothing changed.
 
 MESHFREE_CASES in the environment says how many calls are tried, from the seed MESHFREE_FIRST on; a failure names its.
+Seeds go through all pairs of an operator and an object in turn, with other settings each time: as many seeds as there
+are pairs try all.
 """
 
+import itertools
 import os
 import tempfile
 
@@ -10,7 +13,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_group, add_object, everything, sphere_points
+from tests.blender.clouds import add_group, add_object, everything, grid_points, sphere_points
 
 CASES = int(os.environ.get("MESHFREE_CASES", "150"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))  # seed
@@ -46,9 +49,65 @@ def changed(change):
     return made
 
 
+def film():
+    points, boundary = grid_points(14, 12)
+    obj = add_object(points)
+    add_group(obj, "Fixed", boundary)
+    add_group(obj, "Boundary", boundary)
+    obj.select_set(True)
+    return obj
+
+
+def faced():
+    """A grid with faces, as most meshes have."""
+    points = grid_points(14, 12)[0]
+    corners = (row * 14 + column for row in range(11) for column in range(13))
+    obj = add_object(points, faces=[(first, first + 1, first + 15, first + 14) for first in corners])
+    obj.select_set(True)
+    return obj
+
+
 def with_keys(obj):
     obj.shape_key_add(name="Basis")
     obj.shape_key_add(name="Other").value = 0.5
+
+
+def with_absolute_keys(obj):
+    with_keys(obj)
+    obj.data.shape_keys.use_relative = False
+
+
+def with_names_of_results(obj):
+    obj.data.attributes.new("lb_area", "FLOAT_COLOR", "POINT")
+    add_group(obj, "lb_segment", [0, 1])
+    obj["lb_eigenvalues"] = "taken"
+
+
+def with_locked_groups(obj):
+    for group in obj.vertex_groups:
+        group.lock_weight = True
+
+
+def with_material(obj):
+    obj.data.materials.append(bpy.data.materials.new("Own"))
+    obj.modifiers.new("Nodes", "NODES")  # of no group
+
+
+def in_excluded_collection(obj):
+    collection = bpy.data.collections.new("Excluded")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(obj)
+    bpy.context.scene.collection.objects.unlink(obj)
+    bpy.context.view_layer.layer_collection.children["Excluded"].exclude = True
+
+
+def only_selected(obj):
+    bpy.context.view_layer.objects.active = None
+
+
+def driven(obj):
+    driver = obj.driver_add("location", 0).driver
+    driver.type, driver.expression = "SCRIPTED", "frame / 10"
 
 
 def in_another_scene(obj):
@@ -77,27 +136,38 @@ def of_type(make):
     return made
 
 
-def from_library(override):
-    """A sphere of another file: linked, or overridden with its data."""
+def from_library(*overridden):
+    """A sphere of another file: linked, or with overrides of the object, its data, or both."""
 
     def made():
         sphere().name = "Kept"
-        folder = tempfile.mkdtemp()
-        path = os.path.join(folder, "library.blend")
-        bpy.data.libraries.write(path, {bpy.data.objects["Kept"]})
-        bpy.data.batch_remove([bpy.data.objects["Kept"], *bpy.data.meshes])
-        with bpy.data.libraries.load(path, link=True) as (_, wanted):
-            wanted.objects = ["Kept"]
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "library.blend")
+            bpy.data.libraries.write(path, {bpy.data.objects["Kept"]})
+            bpy.data.batch_remove([bpy.data.objects["Kept"], *bpy.data.meshes])
+            with bpy.data.libraries.load(path, link=True) as (_, wanted):
+                wanted.objects = ["Kept"]
         (obj,) = wanted.objects
         bpy.context.scene.collection.objects.link(obj)
-        if override:
+        if "object" in overridden:
             obj = obj.override_create(remap_local_usages=True)
+        if "local object" in overridden:
+            obj = obj.make_local(clear_asset_data=True)
+        if "data" in overridden:
             obj.data.override_create(remap_local_usages=True)
         bpy.context.view_layer.objects.active = obj
         obj.select_set(True)
         return obj
 
     return made
+
+
+def instance():
+    sphere()
+    collection = bpy.data.collections.new("Shown")
+    obj = of_type(lambda: None)()
+    obj.instance_type, obj.instance_collection = "COLLECTION", collection
+    return obj
 
 
 def rigged(obj):
@@ -130,6 +200,26 @@ def edited(obj):
     bpy.ops.object.mode_set(mode="EDIT")
 
 
+def edited_with_another(obj):
+    other = add_object(sphere_points(100), "Other")
+    other.select_set(True)
+    edited(obj)
+
+
+def bound_and_edited(obj):
+    bound(obj)
+    edited(obj)
+
+
+def baked(obj):
+    bound(obj)
+    bpy.ops.meshfree.deform_bake(first=1, last=2)
+
+
+def segmented(obj):
+    bpy.ops.meshfree.segment(parts=3)
+
+
 def analyzed(obj):
     bpy.ops.meshfree.analyze(modes=3)
 
@@ -141,33 +231,57 @@ def as_cloud(obj):
 
 OBJECTS = {
     "sphere": sphere,
+    "film": film,
+    "with faces": faced,
     "analyzed": changed(analyzed),
+    "segmented": changed(segmented),
     "point cloud": changed(as_cloud),
     "with keys": changed(with_keys),
+    "with absolute keys": changed(with_absolute_keys),
+    "with names of results": changed(with_names_of_results),
+    "with locked groups": changed(with_locked_groups),
+    "with material": changed(with_material),
     "subdivided": changed(lambda obj: obj.modifiers.new("Subdivision", "SUBSURF")),
     "repeated": changed(lambda obj: obj.modifiers.new("Array", "ARRAY")),
     "flat": changed(lambda obj: setattr(obj, "scale", (1.0, 1.0, 0.0))),
+    "scaled to nothing": changed(lambda obj: setattr(obj, "scale", (0.0, 0.0, 0.0))),
+    "scaled to hardly anything": changed(lambda obj: setattr(obj, "scale", (1e-20, 1e-20, 1e-20))),
     "mirrored": changed(lambda obj: setattr(obj, "scale", (-1.0, 2.0, 1.0))),
     "parented": changed(parented),
     "hidden": changed(lambda obj: obj.hide_set(True)),
+    "hidden in viewports": changed(lambda obj: setattr(obj, "hide_viewport", True)),
     "in another scene": changed(in_another_scene),
+    "in an excluded collection": changed(in_excluded_collection),
+    "not active": changed(only_selected),
     "shared": changed(shared),
-    "linked": from_library(False),
-    "overridden": from_library(True),
+    "linked": from_library(),
+    "linked data": from_library("local object"),
+    "overridden object": from_library("object"),
+    "overridden": from_library("object", "data"),
     "rigged": changed(rigged),
     "animated": changed(animated),
+    "driven": changed(driven),
     "bound": changed(bound),
+    "baked": changed(baked),
     "colored": changed(colored),
     "in Edit Mode": changed(edited),
+    "edited with another": changed(edited_with_another),
+    "bound in Edit Mode": changed(bound_and_edited),
+    "in Weight Paint": changed(lambda obj: bpy.ops.object.mode_set(mode="WEIGHT_PAINT")),
     "no points": odd_points(lambda points: points[:0]),
     "one point": odd_points(lambda points: points[:1]),
     "few points": odd_points(lambda points: points[:7]),
     "a line": odd_points(lambda points: points * (1.0, 0.0, 0.0)),
     "one place": odd_points(lambda points: 0.0 * points),
     "not a number": odd_points(lambda points: np.where(points > 0.95, np.nan, points)),
+    "infinite": odd_points(lambda points: np.where(points > 0.95, np.inf, points)),
     "huge": odd_points(lambda points: 1e30 * points),
+    "tiny": odd_points(lambda points: 1e-20 * points),
     "light": of_type(lambda: bpy.data.lights.new("Light", "POINT")),
+    "armature": of_type(lambda: bpy.data.armatures.new("Armature")),
+    "curve": of_type(lambda: bpy.data.curves.new("Curve", "CURVE")),
     "empty": of_type(lambda: None),
+    "instance": instance,
     "nothing": lambda: None,
 }
 
@@ -176,32 +290,61 @@ def operators():
     return sorted(set(dir(bpy.ops.meshfree)) - LEFT_OUT)
 
 
-def random_settings(name, rng, folder):
-    """Values of some settings of an operator, from within its bounds, at them, and near zero; files go to a folder."""
+def pairs():
+    """All pairs of an object and an operator, in an order of their own."""
+    found = list(itertools.product(OBJECTS, operators()))
+    return [found[index] for index in np.random.default_rng(0).permutation(len(found))]
+
+
+def random_settings(properties, rng, folder):
+    """Values of some properties, from within their bounds, at them, and near zero; files are those of a folder."""
     settings = {}
-    for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties:
+    for item in properties:
         if item.identifier == "rna_type" or item.is_readonly or rng.random() < 0.5:
             continue
-        if item.type == "BOOLEAN" and not item.is_array:
+        if item.type in ("INT", "FLOAT"):
+            count = item.array_length if item.is_array else 1
+            values = [_random_number(item, rng) for _ in range(count)]
+            settings[item.identifier] = values if item.is_array else values[0]
+        elif item.type == "BOOLEAN" and not item.is_array:
             settings[item.identifier] = bool(rng.random() < 0.5)
-        elif item.type == "INT" and not item.is_array:
-            ends = [item.hard_min, item.hard_max, item.soft_min, item.soft_max, item.default, 0, 1, 3, 7]
-            settings[item.identifier] = int(np.clip(rng.choice(ends), item.hard_min, item.hard_max))
-        elif item.type == "FLOAT" and not item.is_array:
-            ends = [item.hard_min, item.hard_max, item.soft_min, item.soft_max, item.default, 0.0, 1e-9, 0.5, 3.0]
-            settings[item.identifier] = float(np.clip(rng.choice(ends), item.hard_min, item.hard_max))
         elif item.type == "ENUM" and item.enum_items:
             keys = [str(key) for key in item.enum_items.keys()]
             settings[item.identifier] = {str(rng.choice(keys))} if item.is_enum_flag else str(rng.choice(keys))
         elif item.subtype in ("FILE_PATH", "DIR_PATH", "FILE_NAME"):
-            settings[item.identifier] = str(rng.choice(["", str(folder / "Written"), str(folder / "missing" / "file")]))
+            names = ("Written", "missing/file", "points.xyz", "few.xyz", "broken.ply")
+            settings[item.identifier] = str(rng.choice([*(str(folder / name) for name in names), ""]))
         elif item.type == "STRING":
-            settings[item.identifier] = str(rng.choice(["", "Handle", "Anchor", "Missing", "lb_area", "\u00e4" * 20]))
+            names = ["", "Handle", "Anchor", "Missing", "lb_area", "lb_eigenvector_001", "\u00e4" * 20]
+            settings[item.identifier] = str(rng.choice(names))
     return settings
 
 
+def _random_number(item, rng):
+    ends = [item.hard_min, item.hard_max, item.soft_min, item.soft_max, 0, 1, 3, 7]
+    if item.type == "INT":
+        return int(np.clip(rng.choice(ends), item.hard_min, item.hard_max))
+    return float(np.clip(rng.choice([*ends, 1e-9, 0.5, np.nan]), item.hard_min, item.hard_max))
+
+
+def files(folder):
+    """Files to import, good and bad."""
+    np.savetxt(folder / "points.xyz", sphere_points(50))
+    np.savetxt(folder / "few.xyz", sphere_points(2))
+    (folder / "broken.ply").write_text("ply\nformat ascii 1.0\nelement vertex 9\nend_header\n1 2")
+
+
 def scene():
-    return {obj.name: everything(obj) for obj in bpy.data.objects if obj.mode != "EDIT"}
+    """All that the objects hold; those in other modes are read in Object Mode, and put back into theirs."""
+    active = bpy.context.view_layer.objects.active
+    mode = active.mode if active else "OBJECT"
+    modes = {obj.name: obj.mode for obj in bpy.data.objects}
+    if mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    held = {obj.name: everything(obj) for obj in bpy.data.objects}
+    if mode != "OBJECT":
+        bpy.ops.object.mode_set(mode=mode)
+    return active and active.name, modes, held
 
 
 def check_results(obj):
@@ -218,23 +361,36 @@ def check_results(obj):
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + CASES))
-def test_any_call_is_done_or_refused(seed, tmp_path, monkeypatch):
+def test_any_call_is_done_or_refused(seed, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    rng = np.random.default_rng(seed)
-    kind, name = str(rng.choice(list(OBJECTS))), str(rng.choice(operators()))
-    OBJECTS[kind]()
-    settings = random_settings(name, rng, tmp_path)
+    rng, tried = np.random.default_rng(seed), pairs()
+    kind, name = tried[seed % len(tried)]
+    files(tmp_path)
+    obj = OBJECTS[kind]()
+    own = {}
+    if obj is not None and obj.is_editable and rng.random() < 0.3:
+        own = {key: value for key, value in random_settings(_choices(), rng, tmp_path).items() if rng.random() < 0.3}
+        for key, value in own.items():
+            setattr(obj.meshfree, key, value)
+    settings = random_settings(getattr(bpy.ops.meshfree, name).get_rna_type().properties, rng, tmp_path)
     bpy.context.view_layer.update()
     before = scene()
-    told = f"{name}({settings}) on {kind}"
+    told = f"{name}({settings}) on {kind} {own}"
     reason = ""
     try:
         result = getattr(bpy.ops.meshfree, name)(**settings)
     except RuntimeError as error:
         reason, result = str(error), {"CANCELLED"}
-    assert "Traceback" not in reason, told
+    assert "Traceback" not in reason + capfd.readouterr().err, told
     assert result in ({"FINISHED"}, {"CANCELLED"}), told
     if result == {"CANCELLED"}:
         assert scene() == before, told
     for obj in bpy.data.objects:
         check_results(obj)
+
+
+def _choices():
+    """The settings of an object that people see, all but those of its deformation."""
+    properties = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
+    names = [item.identifier for item in properties]
+    return [properties[name] for name in names[1 : names.index("spacing")] if properties[name].type != "COLLECTION"]
