@@ -6,13 +6,13 @@ from bpy.props import IntProperty
 
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import DISPLACEMENT, point_count, read_attribute, tag_changed, write_attribute
+from ..objects.attributes import DISPLACEMENT, point_count, read_attribute, write_attribute
 from ..objects.reading import find_object
 from ..running.job import Job, JobOperator, SteppedJob, all_steps
 from ..running.ready import reporting
 from ..running.stages import Stages
 from . import live
-from .binding import POSE, stale_reason
+from .binding import POSE, stale_reason, write_displacement
 from .nodes import find_deform, is_baked, show_baked
 from .tools import BoundOperator, check_fresh, delete_bake
 
@@ -78,6 +78,8 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         for number in range(self.first, self.last + 1):
             progress("Frames", len(frames) / (self.last + 1 - self.first))
             scene, obj = self._kept.find()
+            if scene is None:
+                raise PointCloudError("The scene was deleted meanwhile. Nothing was baked.")
             if frames and not self._kept.holds():
                 raise PointCloudError(
                     f'The handles of "{obj.name}" or the frame were changed meanwhile. Nothing was baked.'
@@ -167,9 +169,8 @@ class _Kept:
             for name, value in place.items():
                 if tuple(getattr(thing, name)) != value:  # it had been moved since its keyframe
                     setattr(thing, name, value)
-        write_attribute(obj.data, DISPLACEMENT, self._displacement)
-        obj.data[POSE] = self._pose
-        tag_changed(obj.data)
+        settled, *pose = self._pose
+        write_displacement(obj, self._displacement, np.array(pose), bool(settled))
 
 
 class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
