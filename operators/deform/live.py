@@ -18,12 +18,13 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import Cancelled, CoarseDeformer, Deformer, PointCloudError
+from ...core import Cancelled, CoarseDeformer, Deformer
 from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import laplacian_options
 from ..objects.reading import boundary_points
 from ..running import cache
 from ..running.job import STOPPED, Job, running
+from ..running.ready import TROUBLES, told
 from . import binding
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
@@ -282,8 +283,8 @@ def update_all(scene, depsgraph, quick, waits=True):
         for obj in _bound_objects(scene) if free else ():
             try:
                 update(obj, depsgraph, quick, waits)
-            except PointCloudError as error:
-                _troubles[obj.session_uid] = str(error), None
+            except TROUBLES as error:
+                _troubles[obj.session_uid] = told(error), None
 
 
 def _bound_objects(scene):
@@ -359,8 +360,8 @@ def _attend(obj, depsgraph) -> bool:
             _drop(uid)
         elif job.prepares:
             job.work.show(bpy.context)
-    except PointCloudError as error:
-        _troubles[uid] = str(error), None if job is None else job.pose
+    except TROUBLES as error:
+        _troubles[uid] = told(error), None if job is None else job.pose
         return job is not None  # else wait for another pose, not to go wrong again at once
     return True
 

@@ -7,12 +7,18 @@ from numpy.linalg import LinAlgError
 from ...core import PointCloudError
 from ..objects.reading import obstacle
 
-_TROUBLES = {  # what may go wrong in any computation, in plain words
+_TEXTS = {  # what may go wrong in any computation, in plain words
     PointCloudError: "{}",
     MemoryError: "The memory is used up. Close other programs, or lower the Point Budget",
     LinAlgError: "The equations have no solution ({}). Raise Neighbors, or delete points that lie on each other",
     OSError: "A file could not be read or written: {}",
 }
+TROUBLES = tuple(_TEXTS)
+
+
+def told(error) -> str:
+    """What is told of one of the `TROUBLES`."""
+    return next(text for kind, text in _TEXTS.items() if isinstance(error, kind)).format(error)
 
 
 def reporting(method):
@@ -22,9 +28,8 @@ def reporting(method):
     def guarded(self, context, *more):
         try:
             return method(self, context, *more)
-        except tuple(_TROUBLES) as error:
-            text = next(text for kind, text in _TROUBLES.items() if isinstance(error, kind))
-            self.report({"ERROR"}, text.format(error))
+        except TROUBLES as error:
+            self.report({"ERROR"}, told(error))
             return {"CANCELLED"}
 
     return guarded
