@@ -23,7 +23,7 @@ def fit_range(values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 
         whose ends would not meet otherwise, and PERCENTILE for all else.
     coverage : float
         Percentage of the values between the percentiles, so that a few outliers do not wash the rest out; all of them
-        for whole numbers and truth values.
+        for whole numbers and truth values, and where it is not a number.
     locked : tuple of float
         Range to keep.
 
@@ -41,7 +41,8 @@ def fit_range(values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 
     ends = (values.min(), values.max()) if len(values) else (0.0, 1.0)
     if name == "AUTO" and kind == "i" and len(values) and ends[0] >= -1 and ends[1] < CLASSES:
         name = "CATEGORICAL"
-    outside = 0.5 * (100.0 - coverage) if kind == "f" else 0.0  # whole numbers have no outliers
+    whole = kind != "f" or np.isnan(coverage)  # whole numbers have no outliers; Blender takes NaN for any number
+    outside = 0.0 if whole else 0.5 * (100.0 - coverage)
     share = np.percentile(values, (outside, 100.0 - outside)) if len(values) else ends
     if share[0] == share[1]:  # most values alike: the few others are what there is to see
         share = ends

@@ -90,6 +90,8 @@ def point_count(data) -> int:
 def own_positions(data):
     """Read the positions of the points of a mesh or a point cloud, (n, 3) float32."""
     positions = np.empty((point_count(data), 3), np.float32)
+    if not len(positions):  # new data have no attribute for them
+        return positions
     data.attributes["position"].data.foreach_get("vector", positions.reshape(-1))
     return positions
 
@@ -141,13 +143,31 @@ def write_attribute(data, name: str, values, data_type: str = ""):
 
 
 def check_size(name: str, values):
-    """Refuse numbers for an attribute that are too large for the single precision in which Blender keeps them."""
-    sizes = np.abs(values)
-    largest = np.max(sizes, initial=0.0, where=np.isfinite(sizes))
-    if largest > np.finfo(np.float32).max:
+    """Refuse numbers for an attribute that the single precision in which Blender keeps them cannot hold."""
+    sizes, kept = np.abs(values), np.finfo(np.float32)
+    lost = np.count_nonzero(~np.isfinite(sizes))
+    if lost:
         raise PointCloudError(
-            f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. Scale them down."
+            f"Attribute {name} has {lost} values that are infinite or no numbers. Scale the object to a size near 1."
         )
+    largest = np.max(sizes, initial=0.0)
+    if largest > kept.max:
+        way = "Use smaller values" if name == FIELD else f"Scale the object {'up' if _grows(name) else 'down'}"
+        raise PointCloudError(
+            f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. {way}."
+        )
+    least = np.min(sizes, initial=largest, where=sizes > 0.0)
+    if name == AREA and 0.0 < least < kept.tiny:
+        raise PointCloudError(
+            f"Attribute {name} has numbers down to {least:.1e}, below the 1e-38 that Blender keeps. Scale the object"
+            " up."
+        )
+
+
+def _grows(name):
+    """Whether values become larger where lengths become smaller."""
+    kinds = EIGENVECTOR, HEAT_SIGNATURE, WAVE_SIGNATURE
+    return name in (MEAN_CURVATURE, GAUSSIAN_CURVATURE, CURVATURE_1, CURVATURE_2, CURVEDNESS) or name.startswith(kinds)
 
 
 def read_attribute(data, name: str):

@@ -15,6 +15,7 @@ from .attributes import (
     RESULTS,
     TRUST,
     check_names,
+    check_size,
     eigenvector_name,
     point_count,
     remove_numbered,
@@ -75,6 +76,7 @@ def write_result(obj, analysis, write_limit: int):
             owner.pop(EIGENVALUES, None)
     measures = analysis.measures
     write_attribute(mesh, AREA, measures.areas)
+    check_size(f"{AREA}, summed up,", analysis.total_area)
     write_attribute(mesh, NORMAL, analysis.local_normals)
     write_attribute(mesh, MEAN_CURVATURE, measures.mean_curvature)
     write_attribute(mesh, GAUSSIAN_CURVATURE, measures.gaussian_curvature)

@@ -1,5 +1,7 @@
 """Objects that cannot be analyzed: a clear error that says what to do, and nothing changed."""
 
+import importlib
+
 import bpy
 import numpy as np
 import pytest
@@ -225,6 +227,49 @@ def test_results_beyond_single_precision_are_refused(extension):
     with pytest.raises(RuntimeError, match="position has numbers up to"):
         bpy.ops.meshfree.mode_shape(amplitude=3.4e38)
     assert everything(obj) == before
+
+
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [
+        (1e20, r"lb_area has numbers up to .*e\+3\d, beyond .* Scale the object down"),
+        (1e19, r"lb_area, summed up, has numbers up to .*e\+39, beyond .* Scale the object down"),
+        (1e-19, r"lb_area has numbers down to .*e-4\d, below .* Scale the object up"),
+    ],
+)
+def test_sizes_beyond_single_precision_are_refused_with_the_way_out(size, text):
+    obj = add_object(size * sphere_points(300))
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=text):
+        bpy.ops.meshfree.analyze()
+    assert everything(obj) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("lb_gaussian_curvature", 1e39, "Scale the object up"),
+        ("lb_eigenvector_002", -1e39, "Scale the object up"),
+        ("lb_distance", 1e39, "Scale the object down"),
+        ("lb_field", 1e39, "Use smaller values"),
+        ("lb_field", np.inf, "1 values that are infinite"),
+        ("lb_normal", np.nan, "1 values that are .*no numbers"),
+    ],
+)
+def test_no_attribute_gets_what_it_cannot_hold(core, extension, name, value, text):
+    module = importlib.import_module(f"{extension.__name__}.operators.objects.attributes")
+    with pytest.raises(core.PointCloudError, match=text):
+        module.check_size(name, np.array([0.0, 1.0, value]))
+    module.check_size(name, np.array([0.0, 1.0, 1e38]))
+
+
+def test_coverage_that_is_no_number():
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.colormap(range_mode="DATA")
+    ends = obj.meshfree.range_low, obj.meshfree.range_high
+    assert bpy.ops.meshfree.colormap(coverage=np.nan, range_mode="PERCENTILE") == {"FINISHED"}
+    assert (obj.meshfree.range_low, obj.meshfree.range_high) == ends
 
 
 def test_an_export_takes_the_name_of_a_file():

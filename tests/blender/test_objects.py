@@ -197,6 +197,15 @@ class TestGroupColors:
         assert not grouped.modifiers
         assert not bpy.data.materials
 
+    def test_without_points(self, module, capfd):
+        obj = add_object([])
+        obj.meshfree.show_groups = True
+        assert len(obj.modifiers) == 1
+        obj.meshfree.point_size = 2.0
+        obj.meshfree.show_groups = False
+        assert not obj.modifiers
+        assert "Traceback" not in capfd.readouterr().err  # Blender goes on when a setting's own function fails
+
     def test_over_what_is_on_show(self, grouped, module):
         bpy.ops.meshfree.analyze()
         grouped.meshfree.show_groups = True
