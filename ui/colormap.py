@@ -3,6 +3,7 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
+from ..operators.objects.all_or_nothing import all_or_nothing
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
 from ..operators.running.ready import ReadyOperator, reporting
 from .show import show_attribute, use_material_preview
@@ -40,12 +41,13 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
     @reporting
     def execute(self, context):
         obj = context.object
-        show_attribute(obj, self.attribute, self.radius)
-        for name in COLOR_CHOICES:  # the settings of the object keep what they are unless given
-            if not self.properties.is_property_set(name):
-                setattr(self, name, getattr(obj.meshfree, name))
-            elif getattr(self, name) != getattr(obj.meshfree, name):
-                setattr(obj.meshfree, name, getattr(self, name))  # which colors the points again
+        with all_or_nothing([obj]):
+            show_attribute(obj, self.attribute, self.radius)
+            for name in COLOR_CHOICES:  # the settings of the object keep what they are unless given
+                if not self.properties.is_property_set(name):
+                    setattr(self, name, getattr(obj.meshfree, name))
+                elif getattr(self, name) != getattr(obj.meshfree, name):
+                    setattr(obj.meshfree, name, getattr(self, name))  # which colors the points again
         if self.switch_shading:
             use_material_preview(context)
         return {"FINISHED"}

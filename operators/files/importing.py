@@ -101,15 +101,22 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         reason = self.obstacle(context)
         if reason:  # while the files were read
             raise PointCloudError(reason)
-        for other in context.selected_objects:
-            other.select_set(False)
-        with all_or_nothing([]):
-            self._add(context, results)
+        chosen, active = context.selected_objects, context.view_layer.objects.active
+        try:
+            with all_or_nothing([]):
+                self._add(context, results)
+        except BaseException:
+            for other in chosen:
+                other.select_set(True)
+            context.view_layer.objects.active = active
+            raise
         if self._framed:
             _frame_selected(context)
         return {"FINISHED"}
 
     def _add(self, context, tables):
+        for other in context.selected_objects:
+            other.select_set(False)
         shared = known_offset(context.scene)
         for path, table in zip(self._paths, tables, strict=True):
             turned = _turned_up(table) if self.up == "Y" else table

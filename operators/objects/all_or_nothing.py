@@ -139,7 +139,7 @@ def _copy(data):
 def _replace(data, copy):
     """Let a copy of data take their place and their names."""
     pairs = [(copy, data.name)]
-    if getattr(data, "shape_keys", None) is not None:
+    if getattr(copy, "shape_keys", None) is not None:  # data may have got their first ones since
         pairs.append((copy.shape_keys, data.shape_keys.name))
     data.user_remap(copy)
     bpy.data.batch_remove([data])

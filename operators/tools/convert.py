@@ -7,6 +7,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core import PointCloudError
+from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, write_attribute
 from ..objects.counting import renew_counts
 from ..objects.groups import ROLES, group_weights, handle_names, has_group, role_group
@@ -50,16 +51,38 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
             raise PointCloudError(f'"{context.object.name}" is a {kind} already.')
         for obj in objects:
             _check(obj)
-        active, chosen = context.view_layer.objects.active, context.selected_objects
-        for obj in objects:
-            if obj.meshfree.make_single_user and obj.data.users > 1:
-                obj.data = obj.data.copy()
-            _convert(context, obj, self.target)
-            self.report({"INFO"}, f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now")
-        for obj in chosen:
-            obj.select_set(True)
-        context.view_layer.objects.active = active
+        shown = context.view_layer.objects
+        active, chosen = shown.active.name, [obj.name for obj in context.selected_objects]
+        kept = {obj: obj.copy() for obj in objects}
+        try:
+            with all_or_nothing([]):
+                left = self._convert_all(context, kept)
+            bpy.data.batch_remove([*kept.values(), *left])
+        finally:
+            for name in chosen:
+                shown[name].select_set(True)
+            shown.active = shown[active]
         return {"FINISHED"}
+
+    def _convert_all(self, context, kept):
+        """Convert objects, and return data that nobody needs then; if it fails, let the copies take their places."""
+        names, left = [obj.name for obj in kept], []
+        try:
+            for obj in kept:
+                if obj.meshfree.make_single_user and obj.data.users > 2:  # one of them is the copy
+                    obj.data = obj.data.copy()
+                left.append(obj.data)
+                _convert(context, obj, self.target)
+                self.report({"INFO"}, f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now")
+            used = {obj.data for obj in bpy.data.objects if obj not in kept.values()}
+            return [data for data in left if data not in used and not data.use_fake_user]
+        except BaseException:
+            for obj, copy in kept.items():
+                obj.user_remap(copy)
+            bpy.data.batch_remove(kept)
+            for copy, name in zip(kept.values(), names, strict=True):
+                copy.name = name
+            raise
 
 
 def _check(obj):
@@ -80,10 +103,7 @@ def _convert(context, obj, target):
         other.select_set(False)
     obj.select_set(True)
     context.view_layer.objects.active = obj
-    left = obj.data
     bpy.ops.object.convert(target=target)
-    if left.users == 0:
-        bpy.data.batch_remove([left])
     data, same = obj.data, point_count(obj.data) == count
     if same and target == "POINTCLOUD":
         write_attribute(data, SELECTION, chosen, "BOOLEAN")

@@ -7,11 +7,12 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
 from ...core import PointCloudError, grow
+from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.counting import renew_counts
 from ..objects.groups import HANDLE, assign, check_assignable, chosen_members, role_group
 from ..objects.handlers import tell
-from ..objects.reading import obstacle
+from ..objects.reading import obstacle, sharing_objects
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
 from ..running.ready import reporting
@@ -65,7 +66,8 @@ class SelectionOperator(JobOperator):
             for obj in objects:
                 with naming(obj.name):
                     changes.append(self.prepare(context, obj))
-            messages = [change() for change in changes]
+            with all_or_nothing([other for obj in objects for other in (obj, *sharing_objects(obj))]):
+                messages = [change() for change in changes]
         for obj, message in zip(objects, messages, strict=True):
             self.report({"INFO"}, f"{obj.name}: {message}")
         return {"FINISHED"}

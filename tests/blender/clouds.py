@@ -106,6 +106,18 @@ def everything(obj):
     return record
 
 
+def differences(found, expected):
+    """What differs between two records of all objects by their names, each as `everything` gives it."""
+    if found.keys() != expected.keys():
+        return [(sorted(expected), sorted(found))]
+    return [
+        (name, key, expected[name].get(key), found[name].get(key))
+        for name in found
+        for key in {*found[name], *expected[name]}
+        if found[name].get(key) != expected[name].get(key)
+    ]
+
+
 def _own(block):
     """Custom properties of a data-block, those of this extension's classes apart."""
     return {key: _plain(block[key]) for key in list(block.keys()) if key not in block.bl_rna.properties}

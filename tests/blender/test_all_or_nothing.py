@@ -6,7 +6,7 @@ import sys
 import bpy
 import pytest
 
-from tests.blender.clouds import add_group, add_object, everything, grid_points, sphere_points
+from tests.blender.clouds import add_group, add_object, differences, everything, grid_points, sphere_points
 
 SKIPPED = inspect.CO_GENERATOR, "all_or_nothing.py"  # what Python ends by itself, and what puts things back
 
@@ -22,7 +22,7 @@ class Fault:
         code = frame.f_code
         if not code.co_filename.startswith(self._folder):
             return
-        self._writing |= code.co_name == "write_all"
+        self._writing |= code.co_name in ("write_all", "_convert", "_add", "change", "show_attribute")
         if not self._writing or code.co_flags & SKIPPED[0] or code.co_filename.endswith(SKIPPED[1]):
             return
         self._left -= 1
@@ -60,7 +60,9 @@ def fail_everywhere(extension, make, name, step=3, **settings):
                 failures += 1
         if spoiled and not fault.happened:
             return failures
-        assert spoiled or scene() == before, number  # spoiled: Blender goes on when a setting's own function fails
+        assert spoiled or not differences(scene(), before), (
+            number
+        )  # spoiled: Blender goes on when a setting's own function fails
     raise AssertionError("it never ends")
 
 
@@ -130,3 +132,54 @@ def parted():
 def test_parts_stay_one_object_if_separating_fails(extension):
     assert fail_everywhere(extension, parted, "separate_by_segment") > 2
     assert len(bpy.data.objects) == 3
+
+
+def with_modifiers():
+    obj = keyed()
+    bpy.ops.meshfree.colormap()
+    obj.modifiers.new("Array", "ARRAY").show_viewport = False
+    add_object(sphere_points(50), "Other").select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    return obj
+
+
+def as_cloud():
+    obj = handled()
+    bpy.ops.meshfree.colormap()
+    obj.select_set(True)
+    bpy.ops.meshfree.convert()
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="from Blender 4.5 on")
+@pytest.mark.parametrize(("make", "target"), [(with_modifiers, "POINTCLOUD"), (as_cloud, "MESH")])
+def test_objects_keep_their_type_if_converting_fails(extension, make, target):
+    assert fail_everywhere(extension, make, "convert", target=target) > 2
+
+
+@pytest.mark.parametrize("kind", ["MESH", "POINTCLOUD"][: 1 + (bpy.app.version >= (4, 5))])
+def test_nothing_is_left_of_an_import_that_fails(extension, tmp_path, kind):
+    path = tmp_path / "points.xyz"
+    path.write_text("".join(f"{x} {y} {z} 7\n" for x, y, z in sphere_points(50)))
+    assert fail_everywhere(extension, handled, "import_points", filepath=str(path), kind=kind) > 2
+
+
+def shown():
+    obj = handled()
+    bpy.ops.meshfree.colormap()
+    return obj
+
+
+@pytest.mark.parametrize("make", [handled, shown])
+def test_colors_stay_if_showing_others_fails(extension, make):
+    assert fail_everywhere(extension, make, "colormap", attribute="lb_area", color_map="MAGMA", step=7) > 2
+
+
+def partly_selected():
+    obj = handled()
+    obj.data.vertices.foreach_set("select", [index < 50 for index in range(400)])
+    return obj
+
+
+def test_groups_stay_if_assigning_fails(extension):
+    assert fail_everywhere(extension, partly_selected, "group_from_selection", step=1, role="BOUNDARY") > 2
