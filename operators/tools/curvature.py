@@ -18,6 +18,7 @@ from ..objects.attributes import (
 from ..objects.result import length_text
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
+from .smooth import check_wavelength
 
 _SHOWN = {
     "SHAPE_INDEX": SHAPE_INDEX,
@@ -102,11 +103,13 @@ class Roughness(Tool):
     )
 
     def plan(self, context, obj):
-        _, operator = operator_reader(context, obj)
+        reading, operator = operator_reader(context, obj)
         wavelength = self.wavelength or None
+        name = obj.name
 
         def compute(progress):
             laplacian = operator(progress)
+            check_wavelength(wavelength or 0.0, reading.points, name)
             return cache.result(
                 laplacian,
                 "roughness",

@@ -103,11 +103,7 @@ class Smooth(Tool):
                     f'"{name}" has a boundary, which stays and fixes the size already. Set Keep to Nothing, or turn'
                     " off Keep Boundary."
                 )
-            size = np.linalg.norm(np.ptp(reading.points, axis=0))
-            if wavelength > size:
-                raise PointCloudError(
-                    f'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.'
-                )
+            check_wavelength(wavelength, reading.points, name)
             blend = PointBlend(laplacian, dirichlet=dirichlet, **shared)
             settings = (
                 method,
@@ -167,6 +163,15 @@ def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
         return smooth_points(laplacian, exponential(np.log(2.0) * squared), **settings)
     low = (2.0 * np.pi / (wavelength or _DETAIL * length)) ** 2
     return smooth_points(laplacian, boost(gain, low, _FINEST**2 * low), **settings)
+
+
+def check_wavelength(wavelength, points, name):
+    """Refuse a wavelength beyond the size of the object of some name with these points, (n, 3)."""
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    if wavelength > size:
+        raise PointCloudError(
+            f'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.'
+        )
 
 
 class ModeShape(Tool):

@@ -48,6 +48,12 @@ def test_shows_what_is_chosen(ellipsoid, extension, display, name):
     assert extension.ui.display.shown_attribute(ellipsoid) == name
 
 
+def test_roughness_of_details_beyond_the_size():
+    add_object(1e-15 * sphere_points(300))
+    with pytest.raises(RuntimeError, match='is longer than "Cloud" is large'):
+        bpy.ops.meshfree.roughness(wavelength=3e38)
+
+
 def test_roughness_of_dents_in_a_scaled_sphere():
     points = sphere_points(1500)
     depth = 0.02 * (np.random.default_rng(0).random(1500) < 0.05)
