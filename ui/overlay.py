@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import PointCloudError
 from ..operators.objects.attributes import mode_number
-from ..operators.objects.result import EIGENVALUES
+from ..operators.objects.result import read_eigenvalues
 from . import canvas, plots
 from .display import range_node, shown_attribute, shown_values, without_unreached
 from .scale import shown_scale
@@ -43,9 +43,8 @@ def pictures(obj, scene) -> list:
         counted = _histogram(obj, scale)
         if counted is not None:
             found.append(plots.histogram_picture(scale, *counted))
-    eigenvalues = obj.get(EIGENVALUES)
-    if settings.plot_eigenvalues and eigenvalues is not None:
-        numbers = np.array(eigenvalues)
+    numbers = read_eigenvalues(obj)
+    if settings.plot_eigenvalues and len(numbers):
         symbol, factor = unit(EIGENVALUE_POWER, numbers[-1], scene.unit_settings)
         area = settings.total_area if settings.compare_weyl else 0.0
         found.append(plots.spectrum_picture(numbers, mode_number(shown_attribute(obj)), symbol, factor, area))

@@ -6,7 +6,7 @@ from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.objects.modifiers import is_own
 from ..operators.objects.reading import obstacle, sharing_objects
-from ..operators.objects.result import EIGENVALUES, area_text, is_analyzed, is_stale
+from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
 from ..operators.running.job import running
 from .dialogs import draw_setting
 from .display import find_display, label, range_node, shown_attribute, step_colors
@@ -160,8 +160,8 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
         layout = self.layout
         obj = context.object
         layout.operator("meshfree.spectrum").count = obj.meshfree.modes
-        eigenvalues = obj.get(EIGENVALUES)
-        if eigenvalues is None:
+        eigenvalues = read_eigenvalues(obj)
+        if not len(eigenvalues):
             return
         layout.label(text="Eigenvalues")
         row = layout.row(align=True)

@@ -11,7 +11,7 @@ from ...core import PointCloudError
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
 from ..objects.reading import read_points
-from ..objects.result import EIGENVALUES
+from ..objects.result import read_eigenvalues
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
@@ -110,7 +110,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
 
     def plan(self, context, obj):
         reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
-        name, place, count = obj.name, place_of(obj), len(obj.get(EIGENVALUES, ()))
+        name, place, count = obj.name, place_of(obj), len(read_eigenvalues(obj))
 
         def write(path, progress):
             built = cache.build(reading.points, options, reading.boundary, progress)
@@ -134,12 +134,12 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
     @classmethod
     def obstacle(cls, context):
         reason = super().obstacle(context)
-        if reason or EIGENVALUES in context.object:
+        if reason or len(read_eigenvalues(context.object)):
             return reason
         return f'"{context.object.name}" has no eigenvalues. Press Compute Modes first'
 
     def plan(self, context, obj):
-        name, values = obj.name, np.array(obj[EIGENVALUES])
+        name, values = obj.name, read_eigenvalues(obj)
 
         def write(path, progress):
             rows = np.stack([np.arange(1, len(values) + 1), values], axis=1)

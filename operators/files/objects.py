@@ -124,7 +124,8 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
         With normals of the world. `single` tells that single precision does for the coordinates.
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
-    table = PointTable(seen_positions(context, obj).astype(np.float64) @ matrix.T + place_of(obj))
+    with np.errstate(invalid="ignore"):  # infinite points have no place when they are turned
+        table = PointTable(seen_positions(context, obj).astype(np.float64) @ matrix.T + place_of(obj))
     table.single = not (OFFSET in obj or is_coarse(table.points))
     data = obj.data
     names = [layer.name for layer in data.attributes if _is_column(layer)] if attributes != "NONE" else []

@@ -112,6 +112,12 @@ def _note_analysis(obj, analysis, settings):
     kept.settings_used = settings
 
 
+def read_eigenvalues(obj):
+    """Return the eigenvalues that an object holds, (k,) float64; none where somebody keeps something else in place."""
+    kept = obj.get(EIGENVALUES)
+    return np.array(kept if hasattr(kept, "to_list") else (), dtype=np.float64)
+
+
 def is_analyzed(obj) -> bool:
     """Whether the object holds results, stale or not."""
     return obj.meshfree.fingerprint != ""

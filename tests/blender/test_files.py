@@ -322,6 +322,13 @@ class TestExport:
         assert_allclose(vectors.T @ (arrays["areas"][:, None] * vectors), np.eye(5), atol=1e-9)
         assert_allclose(quotients[1:], arrays["eigenvalues"][1:], rtol=0.2)
 
+    def test_points_of_no_place(self, tmp_path):
+        points = sphere_points(20)
+        points[3, 0], points[5] = np.inf, np.nan
+        add_object(points)
+        assert bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.xyz")) == {"FINISHED"}
+        assert np.isfinite(np.loadtxt(tmp_path / "a.xyz")).all(axis=1).sum() == 18
+
     def test_operator_without_modes(self, tmp_path):
         add_object(sphere_points())
         bpy.ops.meshfree.export_operator(filepath=str(tmp_path / "a.npz"))
@@ -331,6 +338,9 @@ class TestExport:
 
     def test_eigenvalues(self, tmp_path):
         obj = add_object(sphere_points())
+        with pytest.raises(RuntimeError, match="Press Compute Modes first"):
+            bpy.ops.meshfree.export_eigenvalues(filepath=str(tmp_path / "a.csv"))
+        obj["lb_eigenvalues"] = "mine"
         with pytest.raises(RuntimeError, match="Press Compute Modes first"):
             bpy.ops.meshfree.export_eigenvalues(filepath=str(tmp_path / "a.csv"))
         bpy.ops.meshfree.spectrum(count=4, show=False)
