@@ -156,11 +156,10 @@ def check_size(name: str, values):
         raise PointCloudError(
             f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. {way}."
         )
-    least = np.min(sizes, initial=largest, where=sizes > 0.0)
-    if name == AREA and 0.0 < least < kept.tiny:
+    if name == AREA and 0.0 < largest < kept.tiny:
         raise PointCloudError(
-            f"Attribute {name} has numbers down to {least:.1e}, below the 1e-38 that Blender keeps. Scale the object"
-            " up."
+            f"Attribute {name} has numbers up to {largest:.1e} only, below the 1e-38 that Blender keeps. Scale the"
+            " object up."
         )
 
 

@@ -42,8 +42,9 @@ class Snapshot:
         self._state, self._metric = _state(context, obj), metric(obj)
 
     def find(self):
-        """Return the object, or None if it is gone."""
-        return find_object(self.uid)
+        """Return the object, or None if it is gone, be it with its scene."""
+        obj = find_object(self.uid)
+        return obj if obj is not None and obj.users_scene else None
 
     def find_same(self, context, modes):
         """Return the object.

@@ -188,11 +188,11 @@ def _bytes(layer):
 
 
 def _values(group):
-    """All settings, as text, but for those that differ from run to run: seconds, and names that occur once."""
+    """All settings, as text, but for those that differ from run to run: stages, and names that occur once."""
     values = {}
     for item in group.bl_rna.properties:
         value = getattr(group, item.identifier)
-        if item.identifier in ("rna_type", "seconds", "binding_id"):
+        if item.identifier in ("rna_type", "stages", "binding_id"):
             continue
         if item.type == "COLLECTION":
             values[item.identifier] = [_values(member) for member in value]
