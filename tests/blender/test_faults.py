@@ -1,6 +1,7 @@
 """What ends or fails in the middle of a computation: nothing has changed, no thread is left, and the next run is right.
 
-MESHFREE_FAULTS in the environment says how many of each kind are tried, from the seed MESHFREE_FIRST on; a failure names its own.
+MESHFREE_FAULTS in the environment says how many of each kind are tried, from the seed MESHFREE_FIRST on; a failure
+names its own.
 """
 
 import importlib
