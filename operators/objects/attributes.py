@@ -148,7 +148,8 @@ def check_size(name: str, values):
     lost = np.count_nonzero(~np.isfinite(sizes))
     if lost:
         raise PointCloudError(
-            f"Attribute {name} has {lost} values that are infinite or no numbers. Scale the object to a size near 1."
+            f"Attribute {name} has values that are infinite or no numbers, {lost} of {sizes.size}. Scale the object to"
+            " a size near 1."
         )
     largest = np.max(sizes, initial=0.0)
     if largest > kept.max:

@@ -52,7 +52,7 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
         for obj in objects:
             _check(obj)
         shown = context.view_layer.objects
-        active, chosen = shown.active.name, [obj.name for obj in context.selected_objects]
+        active, chosen = shown.active and shown.active.name, [obj.name for obj in context.selected_objects]
         kept = {obj: obj.copy() for obj in objects}
         try:
             with all_or_nothing([]):
@@ -61,17 +61,17 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
         finally:
             for name in chosen:
                 shown[name].select_set(True)
-            shown.active = shown[active]
+            shown.active = shown[active] if active else None
         return {"FINISHED"}
 
     def _convert_all(self, context, kept):
         """Convert objects, and return data that nobody needs then; if it fails, let the copies take their places."""
-        names, left = [obj.name for obj in kept], []
+        names, left = [obj.name for obj in kept], {obj.data for obj in kept}
         try:
             for obj in kept:
                 if obj.meshfree.make_single_user and obj.data.users > 2:  # one of them is the copy
                     obj.data = obj.data.copy()
-                left.append(obj.data)
+                left.add(obj.data)
                 _convert(context, obj, self.target)
                 self.report({"INFO"}, f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now")
             used = {obj.data for obj in bpy.data.objects if obj not in kept.values()}

@@ -32,17 +32,16 @@ class SelectionOperator(JobOperator):
     needs_selection = True
 
     def invoke(self, context, event):
-        if bpy.app.background or not self.surface:
-            return self.execute(context)
+        return self.execute(context) if bpy.app.background or not self.surface else self.begin(context)
+
+    @reporting
+    def begin(self, context):
+        """Compute the operators beside the window."""
         objects = edited_objects(context)
-        try:
-            with object_mode(context, context.object):
-                objects = self.with_points(objects)
-                plans = [(obj.name, operator_reader(context, obj)[1]) for obj in objects]
-                return self.start(context, objects, lambda progress: compute_all(plans, progress))
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        with object_mode(context, context.object):
+            objects = self.with_points(objects)
+            plans = [(obj.name, operator_reader(context, obj)[1]) for obj in objects]
+            return self.start(context, objects, lambda progress: compute_all(plans, progress))
 
     def complete(self, context, job):
         obj = job.snapshots[0].find()
