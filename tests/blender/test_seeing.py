@@ -454,7 +454,7 @@ def test_legend_says_what_is_missing(obj):
     add_camera()
     with pytest.raises(RuntimeError, match="no legend"):
         bpy.ops.meshfree.legend(show=False)
-    bpy.data.objects.remove(bpy.context.scene.camera)
+    bpy.data.cameras.remove(bpy.context.scene.camera.data)  # with the object
     assert everything(obj) == before
     add_camera()
     add_object(sphere_points(), "Plain")
