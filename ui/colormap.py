@@ -48,8 +48,8 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
                     setattr(self, name, getattr(obj.meshfree, name))
                 elif getattr(self, name) != getattr(obj.meshfree, name):
                     setattr(obj.meshfree, name, getattr(self, name))  # which colors the points again
-        if self.switch_shading:
-            use_material_preview(context)
+            if self.switch_shading:
+                use_material_preview(context)
         return {"FINISHED"}
 
 
