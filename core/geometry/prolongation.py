@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..arguments import as_array
 from ..blocks import blocks, on_all_cores
 from ..errors import InvalidPointsError
 from .nearest import SMOOTH
@@ -153,7 +154,7 @@ class Prolongation:
 
 def _rows(subset, count):
     """Return the rows of a subset, indices in their order or a mask."""
-    given = np.asarray(subset)
+    given = as_array(subset, "Subsets")
     if given.dtype == bool and given.shape == (count,):
         given = np.flatnonzero(given)
     if given.ndim != 1 or given.dtype.kind not in "iu" or not len(given) or given.min() < 0 or given.max() >= count:
