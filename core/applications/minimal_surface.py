@@ -359,5 +359,5 @@ def _solve(matrix, load):
     """Solve for a step, no more closely than it needs, or find that the matrix is not definite."""
     diagonal = matrix.diagonal()
     if not np.all(diagonal > 0.0):
-        return Iterate(np.zeros_like(load), 0, converged=False, definite=False)
+        return Iterate(np.zeros_like(load), 0, converged=False, residual=1.0, definite=False)
     return conjugate_gradients(matrix, load, scaling=1.0 / diagonal, rtol=_RTOL, products=_PRODUCTS)

@@ -319,8 +319,11 @@ def build_laplacian(
     report("Areas", 0.5)
     distance = arc_length(cloud) if options.curvature_correction else pairs.distance
     solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
-    if not solution.converged:
-        notices.append(f"The areas stopped after {solution.products} steps, close to their best values.")
+    if solution.residual:
+        notices.append(
+            f"The areas were not found in {solution.products} steps: a share of {solution.residual:.1g} of their"
+            " equations is left, and they may be far off. Choose the areas option 'fast', or raise the regularization."
+        )
 
     report("Operator", 0.8)
     if not options.curvature_correction:
