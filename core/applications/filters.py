@@ -5,11 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy.fft import dct
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from scipy.special import expit
 
 from ..arguments import as_array, check_switches, real, whole
-from ..errors import InvalidPointsError, PointCloudError
+from ..errors import InvalidPointsError, PointCloudError, SolverError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
 from ..operator import Rows, symmetric_form
@@ -311,9 +311,21 @@ def corrected_operator(laplacian, dirichlet, raw, pool, report):
 
 def highest_eigenvalue(multiply, size):
     """Return a close bound of the eigenvalues of a symmetric product, by a few Lanczos steps."""
-    operator = LinearOperator((size, size), matvec=lambda y: multiply(y.reshape(-1, 1)).ravel(), dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(size)
-    return 1.05 * eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0]
+
+    def product(y):
+        return multiply(y.reshape(-1, 1)).ravel()
+
+    # By a power of two near one: the solver takes eigenvalues below some number for zero, in any unit.
+    unit = np.ldexp(1.0, np.frexp(np.abs(product(start)).max())[1])
+    operator = LinearOperator((size, size), matvec=lambda y: product(y) / unit, dtype=np.float64)
+    try:
+        highest = eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0]
+    except ArpackNoConvergence as error:
+        raise SolverError(
+            f"The highest eigenvalue of {size} points was not found. Compute a spectrum first."
+        ) from error
+    return 1.05 * unit * highest
 
 
 def _polynomial(response, top, tolerance):

@@ -83,6 +83,8 @@ class Prolongation:
                 f"Normals have the shape {normals.shape}, components {component.shape}, and there are {len(chosen)}"
                 " points in the subset. Give one row per point of it."
             )
+        unit = np.ldexp(1.0, np.frexp(np.ptp(points, axis=0).max())[1])  # squares in huge units are no numbers
+        points, chosen = points / unit, chosen / unit
         tree, width = cKDTree(chosen), min(_NEIGHBORS, len(chosen))
         low, extent = points.min(axis=0), np.ptp(points, axis=0).max()
         self._order = np.argsort(voxel_numbers(points, low, extent / _CELLS + 1e-300), kind="stable").astype(np.int32)

@@ -130,6 +130,9 @@ def solve_symmetric(matrix, load, start=None, progress=None):
     scaling, products = 1.0 / matrix.diagonal(), _STEPS if len(load) < _FEW else _PLAIN
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for number, column in enumerate(columns):
+            # Squares of loads in tiny or huge units are no numbers; a power of two rounds nothing.
+            unit = np.ldexp(1.0, np.frexp(np.abs(column).max(initial=0.0))[1])
+            column, values[number] = column / unit, values[number] / unit
             found = conjugate_gradients(matrix, column, values[number], scaling, products=products, report=report)
             if products == _PLAIN and found.definite and not found.converged:
                 scaling = approximate_inverse(matrix, pool, lambda: tell(part)) or scaling
@@ -140,7 +143,7 @@ def solve_symmetric(matrix, load, start=None, progress=None):
                     f"The equations of {len(load)} points were not solved in {found.products} steps: a share of"
                     f" {found.residual:.1g} is left. Fix more points, or raise the number of neighbors."
                 )
-            values[number] = found.values
+            values[number] = found.values * unit
     return values.T.reshape(load.shape)
 
 

@@ -60,15 +60,18 @@ def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=No
 
     report()
     order, root, matrix = symmetric_form(laplacian, stiffness, report)
+    # In eigenvalues near one, by a power of two: solvers take those below some number for zero, in any unit.
+    unit = np.ldexp(1.0, np.frexp(matrix.diagonal().max())[1])
+    matrix.data /= unit
     pairs = coarse_to_fine(matrix, 1.0 / root, count, tolerance, report) if count <= _FEW * len(order) else None
     try:
-        values, vectors = pairs or lift_lowest(matrix, count, _cut(laplacian, count), report)
+        values, vectors = pairs or lift_lowest(matrix, count, _cut(laplacian, count) / unit, report)
     except ArpackNoConvergence as error:
         raise SolverError(
             f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
         ) from error
     report()
-    scale = max(values[-1], 4.0 * np.pi * count / laplacian.areas.sum())
+    scale = max(values[-1], 4.0 * np.pi * count / laplacian.areas.sum() / unit)
     residuals = np.linalg.norm(matrix @ vectors - vectors * values, axis=0) / scale
     if not residuals.max() <= tolerance:
         raise SolverError(
@@ -79,7 +82,7 @@ def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=No
     largest = np.argmax(np.abs(vectors), axis=0)
     result = np.zeros((n, count))
     result[order] = vectors * np.sign(vectors[largest, np.arange(count)])
-    return Spectrum(np.maximum(values, 0.0), result, residuals)
+    return Spectrum(unit * np.maximum(values, 0.0), result, residuals)
 
 
 def _cut(laplacian, count):

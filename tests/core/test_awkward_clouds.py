@@ -4,7 +4,9 @@ MESHFREE_CASES in the environment multiplies how many are tried.
 """
 
 import contextlib
+import functools
 import inspect
+import itertools
 import os
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.testing import assert_allclose
 
 import core
 from benchmarks.samplings import fibonacci_sphere, square_grid
+from core.applications.sizes import match_size
 
 TIMES = int(os.environ.get("MESHFREE_CASES", "1"))
 pytestmark = pytest.mark.filterwarnings("error")
@@ -86,6 +89,7 @@ LAYOUTS = {
     "backwards": lambda points: points[::-1][::-1],
     "single": lambda points: points.astype(np.float32),
     "masked": np.ma.masked_invalid,
+    "extended": lambda points: points.astype(np.longdouble),
 }
 OPTIONS = {
     "bandwidth": ["adaptive", "local", "global"],
@@ -220,6 +224,96 @@ def test_order_and_layout_of_the_points_decide_nothing(points, options, seed):
     assert abs(after.stiffness - before.stiffness[order][:, order]).max() <= 1e-15 * abs(before.stiffness).max()
 
 
+def ends(laplacian):
+    height = laplacian.points[:, 2]
+    return height >= np.quantile(height, 0.9), height < np.quantile(height, 0.1)
+
+
+def lifted(laplacian, deformer):
+    top, bottom = ends(laplacian)
+    return deformer(laplacian, top, bottom).solve(laplacian.points[top] + extent(laplacian) * np.array([0.3, 0.1, 0.2]))
+
+
+def extent(laplacian):
+    return np.ptp(laplacian.points, axis=0).max()
+
+
+def carried(laplacian):
+    subset = core.blue_noise_subset(laplacian.points, len(laplacian.points) // 3)
+    return core.Prolongation(laplacian.points, subset, laplacian.normals[subset]).interpolate(laplacian.normals[subset])
+
+
+def distances(laplacian):
+    found = core.geodesic_distance(laplacian, [0, 1])
+    return np.where(np.isinf(found), 0.0, found)  # on other components
+
+
+def spectrum(laplacian):
+    return laplacian.eigenpairs(9, raw=True)
+
+
+# What a function gives for an operator, with the power of the unit of length that it grows by.
+USES = {
+    "eigenvalues": (-2, lambda on: on.eigenpairs(9).eigenvalues),
+    "modes": (-1, lambda on: spectrum(on).eigenvectors),
+    "Dirichlet modes": (-1, lambda on: on.eigenpairs(5, raw=True, dirichlet=True).eigenvectors),
+    "operator": (-1, lambda on: on.apply(on.points)),
+    "mean curvature": (-1, core.mean_curvature),
+    "curvature": (-1, lambda on: core.principal_curvatures(on).curvedness),
+    "roughness": (1, core.roughness),
+    "fair": (1, core.fair_points),
+    "fair inside": (1, lambda on: core.fair_points(on, dirichlet=True)),
+    "fair, area": (1, lambda on: core.fair_points(on, keep="area")),
+    "fair, volume": (1, lambda on: core.fair_points(on, keep="volume")),
+    "smooth": (1, lambda on: core.smooth_points(on, 8)),
+    "boost": (1, lambda on: core.smooth_points(on, core.boost(2.0, *(np.array([10.0, 300.0]) / extent(on) ** 2)))),
+    "parts": (0, lambda on: core.segment(on, on.component.max() + 3)),
+    "domains": (0, lambda on: core.nodal_domains(on.points[:, 0] - on.points[:, 0].mean(), on)),
+    "heat": (-2, lambda on: core.heat_kernel_signature(spectrum(on))),
+    "waves": (-2, lambda on: core.wave_kernel_signature(spectrum(on))),
+    "harmonic": (0, lambda on: core.harmonic_field(on, [0, 1, 2], [0.0, 1.0, 3.0])),
+    "harmonic height": (1, lambda on: core.harmonic_field(on, ends(on)[0], on.points[ends(on)[0], 2])),
+    "potential": (3, lambda on: core.solve_poisson(on, on.points[:, 2], [0], [0.0])),
+    "distance": (1, distances),
+    "grown": (0, lambda on: core.grow(on, [0], 0.2 * extent(on))),
+    "displaced": (1, lambda on: core.displace_by_mode(on, on.points[:, 0] - on.points[:, 0].mean())),
+    "deformed": (1, lambda on: lifted(on, core.Deformer)),
+    "deformed coarsely": (1, lambda on: lifted(on, functools.partial(core.CoarseDeformer, count=60, neighbors=12))),
+    "subset": (0, lambda on: core.blue_noise_subset(on.points, 30)),
+    "carried": (0, carried),
+    "minimal": (1, lambda on: core.minimal_surface(on.points, on.boundary | ends(on)[0], max_steps=1).points),
+}
+
+
+def use(laplacian, name):
+    """Return what a function gives, or the kind of error that refuses it."""
+    try:
+        return USES[name][1](laplacian)
+    except core.PointCloudError as error:
+        return type(error)
+
+
+@tried(200)
+@given(
+    points=clouds(),
+    options=choices(),
+    power=st.sampled_from([-180, -60, -9, 9, 60, 180]),
+    name=st.sampled_from(list(USES)),
+)
+def test_any_use_of_any_operator_follows_the_law_of_scale(points, options, power, name):
+    points = np.asarray(points, dtype=np.float64)
+    before, after = build(points, options), build(2.0**power * points, options)
+    if isinstance(before, type) or isinstance(after, type):
+        return
+    ours, theirs = use(before, name), use(after, name)
+    if isinstance(ours, type) or isinstance(theirs, type):
+        assert ours is theirs
+        return
+    assert np.isfinite(ours).all()
+    expected = 2.0 ** (power * USES[name][0]) * ours
+    assert_allclose(theirs, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("kind", ["sphere", "globe", "outliers", "strip"])
 def test_order_of_the_points_decides_no_mode(kind):
     rng = np.random.default_rng(3)
@@ -321,11 +415,58 @@ def test_all_public_functions_are_tried(public):
 
 
 @pytest.mark.parametrize("number", range(len(list(calls()))))
-@pytest.mark.parametrize("junk", range(len(JUNK)))
-def test_wrong_arguments_are_refused_in_words(public, number, junk):
+def test_wrong_arguments_are_refused_in_words(public, number):
     function, fixed, arguments = public[number]
     function(**fixed, **arguments)  # is right
-    for name in arguments:
-        if not (name == "response" and callable(JUNK[junk])):  # whose own errors are the caller's
+    for name, junk in itertools.product(arguments, JUNK):
+        if not (name == "response" and callable(junk)):  # whose own errors are the caller's
             with contextlib.suppress(core.PointCloudError):
-                function(**fixed, **{**arguments, name: JUNK[junk]})
+                function(**fixed, **{**arguments, name: junk})
+
+
+@pytest.mark.parametrize("power", [-180, -100, 100, 180])
+@pytest.mark.parametrize("name", USES)
+def test_uses_follow_the_law_of_scale_in_tiny_and_huge_units(name, power):
+    points = square_grid(12) + [0.0, 0.0, 1.0]
+    points[:, 2] += 0.1 * np.sin(5.0 * points[:, 0])
+    options = core.LaplacianOptions(neighbors=20)
+    ours, theirs = (use(core.build_laplacian(unit * points, options=options), name) for unit in (1.0, 2.0**power))
+    if isinstance(ours, type):
+        assert theirs is ours
+        return
+    expected = 2.0 ** (power * USES[name][0]) * ours
+    assert_allclose(theirs, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_masked_values_are_refused():
+    points = fibonacci_sphere(300)
+    hidden = np.ma.array(points, mask=points > 0.9)
+    with pytest.raises(core.InvalidPointsError, match="masked values"):
+        core.build_laplacian(hidden)
+    with pytest.raises(core.InvalidPointsError, match="masked values"):
+        core.build_laplacian(points, hidden)
+    with pytest.raises(core.InvalidPointsError, match="masked values"):
+        core.build_laplacian(points).apply(hidden)
+    core.build_laplacian(np.ma.array(points))
+
+
+def test_modes_and_filters_of_a_grid_are_the_same_in_huge_units():
+    points, options = np.argwhere(np.ones((13, 13, 1))), core.LaplacianOptions(neighbors=20)
+    before, after = (core.build_laplacian(unit * points, options=options) for unit in (1.0, 2.0**100))
+    np.testing.assert_array_equal(2.0**-100 * core.fair_points(after), core.fair_points(before))
+    ours, theirs = before.eigenpairs(9, raw=True), after.eigenpairs(9, raw=True)
+    assert_allclose(2.0**100 * theirs.eigenvectors, ours.eigenvectors, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [2.0**-180, 2.0**180])
+def test_functions_are_carried_in_any_unit(unit):
+    rng = np.random.default_rng(0)
+    points, values = KINDS["islands"](rng, 90), rng.random(30)
+    normals = sphere(rng, 30)
+    ours, theirs = (core.Prolongation(by * points, np.arange(30), normals).interpolate(values) for by in (1.0, unit))
+    np.testing.assert_array_equal(theirs, ours)
+
+
+def test_a_volume_turned_inside_out_is_brought_back():
+    scale = match_size(lambda scale: 2.0 * scale**3 - 3.0, np.ones(1), np.array([True]))
+    assert_allclose(scale, 2.0 ** (1.0 / 3.0))
