@@ -224,7 +224,7 @@ class _State:
     step : ndarray, (n, 3)
         To the next surface; zero at fixed points.
     savings : float
-        Area that Newton's step would save if the area were quadratic.
+        Area that Newton's step would save if the area were quadratic; infinite where that step was not found.
     definite : bool
         Whether the Jacobi operator is.
     bent : float
@@ -291,7 +291,7 @@ class _Film:
             laplacian=laplacian,
             area=float(laplacian.areas.sum()),
             step=step,
-            savings=0.5 * float(along @ force),
+            savings=0.5 * float(along @ force) if newton.converged else np.inf,
             definite=definite,
             bent=float(np.partition(curvature * laplacian.smoothing_lengths[free], -few)[-few]),
         )
