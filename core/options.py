@@ -1,10 +1,9 @@
 """Every setting of the operator, with defaults that serve scans."""
 
 from dataclasses import dataclass
-from numbers import Integral, Real
+from numbers import Integral
 
-import numpy as np
-
+from .arguments import check_switches, real
 from .errors import PointCloudError
 
 _CHOICES = {
@@ -14,6 +13,7 @@ _CHOICES = {
     "boundary": ("auto", "off"),
     "projection": ("auto", "off", "quadric", "plane"),
 }
+_HUGE = 1e60  # whose squares are still numbers
 _SWITCHES = "orient", "sheets", "curvature_correction", "symbol_correction"
 
 
@@ -103,16 +103,16 @@ class LaplacianOptions:
             value = getattr(self, name)
             if not isinstance(value, str) or value not in choices:
                 raise PointCloudError(f"Option {name} is {value!r}. Choose one of {', '.join(choices)}.")
-        for name in _SWITCHES:
-            value = getattr(self, name)
-            if not isinstance(value, bool | np.bool_):
-                raise PointCloudError(f"Option {name} is {value!r}. Use True or False.")
+        check_switches(**{name: getattr(self, name) for name in _SWITCHES})
         if not isinstance(self.neighbors, Integral) or self.neighbors < 6:
             raise PointCloudError(f"Option neighbors is {self.neighbors!r}. Use a whole number of at least 6.")
         for name in ("bandwidth_factor", "regularization"):
-            value = getattr(self, name)
-            if not isinstance(value, Real) or not 0.0 < value < np.inf:
-                raise PointCloudError(f"Option {name} is {value!r}. Use a number above zero.")
+            value = real(getattr(self, name))
+            if not 0.0 < value < _HUGE:
+                raise PointCloudError(
+                    f"Option {name} is {getattr(self, name)!r}. Use a number above zero, below {_HUGE:g}."
+                )
+            object.__setattr__(self, name, value)
         # About 9 factor^2 neighbors points share a support of 3 h on an even sample; ten keep a plane well determined.
         narrow = 0.3 if self.bandwidth == "adaptive" else 1.0
         if 9.0 * (narrow * self.bandwidth_factor) ** 2 * self.neighbors < 10.0:

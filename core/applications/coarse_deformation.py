@@ -4,6 +4,8 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..arguments import check_switches, real
+from ..errors import PointCloudError
 from ..geometry import move_apart, nearest_in_blocks, thin
 from ..operator import narrow_laplacian
 from .deformation import (
@@ -91,6 +93,10 @@ class CoarseDeformer:
     ):
         report = progress or (lambda stage, fraction: None)
         n = len(laplacian.points)
+        check_switches(rotation_aware=rotation_aware)
+        if not real(count) >= 1.0:
+            raise PointCloudError(f"{count!r} points to solve on were asked for. Ask for a number of at least 1.")
+        count = real(count)
         if n <= _ALL * count:
             self.exact = Deformer(
                 laplacian,

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import sparse
 
+from ..arguments import as_array, as_doubles, check_switches, real, whole
 from ..blocks import blocks
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_indices
@@ -113,6 +114,7 @@ class Deformer:
         n = len(laplacian.points)
         self.points = laplacian.points
         self.handles, self.anchors, weights = check_constraints(handles, anchors, weights, n)
+        check_switches(rotation_aware=rotation_aware)
         self.rotation_aware = bool(rotation_aware)
         self.steps, self.converged, self.notices = 0, True, []
         held = np.concatenate([self.handles, self.anchors])
@@ -198,8 +200,11 @@ class Deformer:
         ------
         InvalidPointsError
             Positions of the wrong shape or type, or not finite.
+        PointCloudError
+            Steps or a tolerance below zero.
         """
         report = progress or (lambda stage, fraction: None)
+        most, share = check_steps(steps, rtol)
         target = check_positions(handle_positions, len(self.handles), "handle positions", "handle")
         target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
         result = self.points.copy()
@@ -222,19 +227,19 @@ class Deformer:
             return placed
 
         report("Deform", 0.0)
-        if start is None or not self.rotation_aware or steps < 1:
+        if start is None or not self.rotation_aware or most < 1:
             now = place(0.0)
         else:
             now = check_positions(start, len(self.points), "starting points", "point")[self._moving]
         step, converged = 0, True
-        if self.rotation_aware and steps > 0:
+        if self.rotation_aware and most > 0:
             at_rest = self._turned(turn, self._differential)
             converged, mixing, begin = False, _Mixing(), now
-            for step in range(1, int(steps) + 1):
-                report("Deform", step / (steps + 1.0))
+            for step in range(1, most + 1):
+                report("Deform", step / (most + 1.0))
                 turned = np.einsum("abn,nb->na", self._rotations(begin), self._differential)
                 now = place(self._divergence @ (turned - at_rest))
-                if np.abs(now - begin).max() <= rtol * self._size:
+                if np.abs(now - begin).max() <= share * self._size:
                     converged = True
                     break
                 begin = mixing.mix(begin, now)
@@ -352,7 +357,7 @@ def _check_weights(weights, count):
     """Return the weight of each constraint, (count,), infinite where it is hard."""
     if weights is None:
         return np.full(count, np.inf)
-    given = np.asarray(weights)
+    given = as_array(weights, "Weights")
     if given.dtype.kind not in "iuf" or given.shape not in ((), (count,)):
         raise PointCloudError(
             f"Weights have the shape {given.shape} and type {given.dtype}. Give one number, or {count}: one per"
@@ -363,15 +368,23 @@ def _check_weights(weights, count):
         raise PointCloudError(f"{bad} weights are negative or NaN. Use numbers from zero to infinity.")
     if not given.any():
         raise PointCloudError("All weights are zero, so nothing holds the surface. Use some above zero.")
-    return np.broadcast_to(given.astype(np.float64), (count,))
+    return np.broadcast_to(as_doubles(given), (count,))
+
+
+def check_steps(steps, rtol):
+    """Return the most steps of a solve, and its tolerance."""
+    most, share = whole(steps), real(rtol)
+    if not (most >= 0 and share >= 0.0):
+        raise PointCloudError(
+            f"{steps!r} steps to a tolerance of {rtol!r} were asked for. Give a whole number of steps and a tolerance"
+            " of at least 0."
+        )
+    return most, share
 
 
 def check_positions(positions, count, name, singular):
     """Return positions, (count, 3), in double precision."""
-    try:
-        given = np.asarray(positions)
-    except ValueError as error:
-        raise InvalidPointsError(f"The {name} must be an array of shape ({count}, 3): {error}.") from error
+    given = as_array(positions, name.capitalize())
     if given.shape != (count, 3) or given.dtype.kind not in "iuf":
         raise InvalidPointsError(
             f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers."

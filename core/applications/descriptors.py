@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from ..arguments import as_array, as_doubles, check_switches, whole
 from ..errors import PointCloudError
 
+_MANY = 1_000_000  # times or energies at most
 _ZERO = 1e-8  # eigenvalues below this share of 4 pi / area belong to constants
 _RANGE = 4.0 * np.log(10.0)  # of eigenvalue times time: what is left at its end is 1e-4
 _WIDTH = 0.07  # of a wave signature's window, as a share of the range of log eigenvalues
@@ -107,6 +109,7 @@ def heat_kernel_signature(spectrum, times=None, *, count=100, normalized=False):
     >>> print(heat.shape, heat.min().round(3), heat.max().round(3))
     (800, 1) 0.113 0.113
     """
+    check_switches(normalized=normalized)
     times = signature_times(spectrum, count) if times is None else _numbers(times, "Times")
     if np.any(times < 0.0):
         raise PointCloudError(
@@ -200,15 +203,17 @@ def _window(spectrum):
 
 
 def _numbers(given, name):
-    values = np.asarray(given)
+    values = as_array(given, name)
     if values.ndim != 1 or values.size == 0 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
         raise PointCloudError(
             f"{name} have the shape {values.shape} and type {values.dtype}. Give a row of finite numbers, at least one."
         )
-    return values.astype(np.float64)
+    return as_doubles(values)
 
 
 def _at_least_one(count):
-    if int(count) != count or count < 1:
-        raise PointCloudError(f"{count!r} values per point were asked for. Use a whole number of at least 1.")
+    if not 1 <= whole(count) <= _MANY:
+        raise PointCloudError(
+            f"{count!r} values per point were asked for. Use a whole number of at least 1, and at most {_MANY:,}."
+        )
     return int(count)

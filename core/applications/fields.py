@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from ..kernel import SECOND_MOMENT
@@ -187,17 +188,17 @@ def read_values(fixed, values, count):
     if fixed is None:
         fixed = np.zeros(0, dtype=int)
     mask = as_mask(fixed, count)
-    index = np.asarray(fixed)
+    index = as_array(fixed, "Fixed points")
     if index.dtype == bool and index.shape == (count,):
         index = np.flatnonzero(mask)
     index = index.astype(np.intp).ravel() % count
-    given = np.zeros(0) if values is None else np.asarray(values)
+    given = np.zeros(0) if values is None else as_array(values, "Fixed values")
     if given.dtype.kind not in "biuf" or (given.shape not in ((), (len(index),))):
         raise InvalidPointsError(
             f"Values have the shape {given.shape} and type {given.dtype} for {len(index)} fixed points. Give one"
             " number for each of them."
         )
-    given = np.broadcast_to(given.astype(np.float64).ravel(), len(index))
+    given = np.broadcast_to(as_doubles(given).ravel(), len(index))
     bad = np.count_nonzero(~np.isfinite(given))
     if bad:
         raise InvalidPointsError(f"{bad} of {len(given)} fixed values are not finite (NaN or infinity). Replace them.")
@@ -209,7 +210,7 @@ def read_values(fixed, values, count):
 
 
 def _read_source(source, count):
-    given = np.asarray(source)
+    given = as_array(source, "Sources")
     if given.dtype.kind not in "biuf" or given.shape not in ((), (count,)):
         raise InvalidPointsError(
             f"The source has the shape {given.shape} and type {given.dtype}. Give one number for each of the"
@@ -218,7 +219,7 @@ def _read_source(source, count):
     bad = np.count_nonzero(~np.isfinite(given))
     if bad:
         raise InvalidPointsError(f"{bad} of {count} values of the source are not finite. Replace them.")
-    return np.broadcast_to(given.astype(np.float64), count)
+    return np.broadcast_to(as_doubles(given), count)
 
 
 def _means(areas, values, component, rows):

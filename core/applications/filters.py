@@ -5,10 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy.fft import dct
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from scipy.special import expit
 
-from ..errors import InvalidPointsError, PointCloudError
+from ..arguments import as_array, check_switches, real, whole
+from ..errors import InvalidPointsError, PointCloudError, SolverError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
 from ..operator import Rows, symmetric_form
@@ -37,9 +38,10 @@ def exponential(time):
     PointCloudError
         A time that is negative or not finite.
     """
-    if not 0.0 <= time < np.inf:
+    number = real(time)
+    if not 0.0 <= number < np.inf:
         raise PointCloudError(f"The time of an exponential response is {time!r}. Use a number that is not negative.")
-    return lambda eigenvalues: np.exp(-time * np.asarray(eigenvalues))
+    return lambda eigenvalues: np.exp(-number * np.asarray(eigenvalues))
 
 
 def fairing(time, order=3):
@@ -62,11 +64,12 @@ def fairing(time, order=3):
     PointCloudError
         A time that is negative or not finite, or another order.
     """
-    if not 0.0 <= time < np.inf:
+    number, power = real(time), whole(order)
+    if not 0.0 <= number < np.inf:
         raise PointCloudError(f"The time of the fairing is {time!r}. Use a number that is not negative.")
-    if order not in (1, 2, 3):
+    if power not in (1, 2, 3):
         raise PointCloudError(f"The order of the fairing is {order!r}. Use 1, 2 or 3.")
-    return lambda eigenvalues: 1.0 / (1.0 + (time * np.asarray(eigenvalues)) ** order)
+    return lambda eigenvalues: 1.0 / (1.0 + (number * np.asarray(eigenvalues)) ** power)
 
 
 def band(low, high=np.inf, *, softness=0.1):
@@ -91,7 +94,8 @@ def band(low, high=np.inf, *, softness=0.1):
     PointCloudError
         Edges out of order or negative, or a softness that is not above zero.
     """
-    if not (0.0 <= low < high and softness > 0.0):
+    lowest, highest, fade = real(low), real(high), real(softness)
+    if not (0.0 <= lowest < highest and fade > 0.0):
         raise PointCloudError(
             f"A band from {low!r} to {high!r} with softness {softness!r} is empty. Use 0 <= low < high and a"
             " softness above zero."
@@ -100,9 +104,9 @@ def band(low, high=np.inf, *, softness=0.1):
     def respond(eigenvalues):
         frequency = np.sqrt(np.maximum(eigenvalues, 0.0))
         result = np.ones_like(frequency)
-        for edge, side in ((low, 1.0), (high, -1.0)):
+        for edge, side in ((lowest, 1.0), (highest, -1.0)):
             if 0.0 < edge < np.inf:
-                result *= expit(side * (frequency / np.sqrt(edge) - 1.0) * 4.0 / softness)
+                result *= expit(side * (frequency / np.sqrt(edge) - 1.0) * 4.0 / fade)
         return result
 
     return respond
@@ -128,10 +132,11 @@ def boost(gain, low, high=np.inf, *, softness=0.25):
     PointCloudError
         A gain that is not finite, or an empty band.
     """
-    if not np.isfinite(gain):
+    factor = real(gain)
+    if not np.isfinite(factor):
         raise PointCloudError(f"The gain of the details is {gain!r}. Use a finite number.")
     part = band(low, high, softness=softness)
-    return lambda eigenvalues: 1.0 + (gain - 1.0) * part(eigenvalues)
+    return lambda eigenvalues: 1.0 + (factor - 1.0) * part(eigenvalues)
 
 
 def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
@@ -161,8 +166,8 @@ def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
     InvalidPointsError
         Values or areas that do not fit the spectrum, or are not finite.
     PointCloudError
-        More modes than the spectrum holds, fewer than there are constant ones, or a response that is not a number for
-        each eigenvalue.
+        More modes than the spectrum holds, fewer than there are constant ones, a response that is not a number for
+        each eigenvalue, or a rest that is not finite.
 
     See Also
     --------
@@ -195,17 +200,20 @@ def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
     areas = check_values(areas, n)
     if areas.ndim != 1:
         raise InvalidPointsError(f"Areas have the shape {areas.shape}. Give one area for each of the {n} points.")
+    kept = real(rest)
+    if not np.isfinite(kept):
+        raise PointCloudError(f"The factor of the rest is {rest!r}. Use a finite number.")
     if callable(response):
         factors = respond(response, spectrum.eigenvalues)
     else:
         factors = (np.arange(count) < check_modes(response, spectrum, areas)).astype(np.float64)
-    used = count if rest != 0.0 else int(np.max(np.flatnonzero(factors), initial=-1)) + 1
+    used = count if kept != 0.0 else int(np.max(np.flatnonzero(factors), initial=-1)) + 1
     modes = spectrum.eigenvectors[:, :used]
     columns = values.reshape(n, -1)
     coefficients = modes.T @ (areas[:, None] * columns)
-    result = modes @ ((factors[:used] - rest)[:, None] * coefficients)
-    if rest != 0.0:
-        result += rest * columns
+    result = modes @ ((factors[:used] - kept)[:, None] * coefficients)
+    if kept != 0.0:
+        result += kept * columns
     return result.reshape(values.shape)
 
 
@@ -244,10 +252,14 @@ def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False,
     InvalidPointsError
         Values that do not fit the points, or are not finite.
     PointCloudError
-        A response that is not a number for each eigenvalue, or too abrupt for a polynomial.
+        A response that is not a number for each eigenvalue, or too abrupt for a polynomial; a tolerance below zero.
     """
     report = progress or (lambda stage, fraction: None)
     values = check_values(values, len(laplacian.areas))
+    check_switches(dirichlet=dirichlet, raw=raw)
+    largest = real(tolerance)
+    if not largest >= 0.0:
+        raise PointCloudError(f"The tolerance of a filter is {tolerance!r}. Use a number that is not negative.")
     done = 0.0
 
     def tell():
@@ -259,7 +271,7 @@ def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False,
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         order, root, multiply = corrected_operator(laplacian, dirichlet, raw, pool, tell)
         top = highest_eigenvalue(multiply, len(order))
-        coefficients = _polynomial(response, top, tolerance)
+        coefficients = _polynomial(response, top, largest)
         before = columns[order] / root[:, None]
         result = coefficients[0] * before
         if len(coefficients) > 1:
@@ -299,9 +311,21 @@ def corrected_operator(laplacian, dirichlet, raw, pool, report):
 
 def highest_eigenvalue(multiply, size):
     """Return a close bound of the eigenvalues of a symmetric product, by a few Lanczos steps."""
-    operator = LinearOperator((size, size), matvec=lambda y: multiply(y.reshape(-1, 1)).ravel(), dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(size)
-    return 1.05 * eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0]
+
+    def product(y):
+        return multiply(y.reshape(-1, 1)).ravel()
+
+    # By a power of two near one: the solver takes eigenvalues below some number for zero, in any unit.
+    unit = np.ldexp(1.0, np.frexp(np.abs(product(start)).max())[1])
+    operator = LinearOperator((size, size), matvec=lambda y: product(y) / unit, dtype=np.float64)
+    try:
+        highest = eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0]
+    except ArpackNoConvergence as error:
+        raise SolverError(
+            f"The highest eigenvalue of {size} points was not found. Compute a spectrum first."
+        ) from error
+    return 1.05 * unit * highest
 
 
 def _polynomial(response, top, tolerance):
@@ -327,7 +351,7 @@ def _polynomial(response, top, tolerance):
 
 def respond(response, eigenvalues):
     """Return a response's factors for eigenvalues, (m,), after a check."""
-    factors = np.asarray(response(eigenvalues))
+    factors = as_array(response(eigenvalues), "Responses")
     if factors.shape not in ((), eigenvalues.shape) or factors.dtype.kind not in "iufb":
         raise PointCloudError(
             f"The response gives an array of shape {factors.shape} and type {factors.dtype} for"

@@ -6,10 +6,11 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..arguments import real, whole
 from ..errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloudError
 from ..geometry import FEWEST, as_mask, check_points, find_nearest
 from ..operator import Iterate, LaplaceBeltrami, build_laplacian, conjugate_gradients
-from ..options import LaplacianOptions
+from ..options import LaplacianOptions, check_options
 from .boundary_curve import BoundaryCurve
 
 _REACH = 8.0  # smoothing lengths from the boundary at which no kernel sees it, also after a step
@@ -150,11 +151,13 @@ def minimal_surface(
     """
     points = check_points(points)
     fixed = as_mask(fixed, len(points))
-    if not epsilon >= 0.0 or int(max_steps) != max_steps or max_steps < 0:
+    if not (real(epsilon) >= 0.0 and whole(max_steps) >= 0):
         raise InvalidPointsError(
             f"A tolerance of {epsilon!r} and {max_steps!r} steps were asked for. Give a tolerance of at least 0"
             " and a whole number of steps."
         )
+    epsilon, max_steps = real(epsilon), whole(max_steps)
+    check_options(options)
     options = replace(options, projection="off")
     first = build_laplacian(points, options=options, progress=progress)
     film = _Film(first, fixed, options, progress)
@@ -221,7 +224,7 @@ class _State:
     step : ndarray, (n, 3)
         To the next surface; zero at fixed points.
     savings : float
-        Area that Newton's step would save if the area were quadratic.
+        Area that Newton's step would save if the area were quadratic; infinite where that step was not found.
     definite : bool
         Whether the Jacobi operator is.
     bent : float
@@ -288,7 +291,7 @@ class _Film:
             laplacian=laplacian,
             area=float(laplacian.areas.sum()),
             step=step,
-            savings=0.5 * float(along @ force),
+            savings=0.5 * float(along @ force) if newton.converged else np.inf,
             definite=definite,
             bent=float(np.partition(curvature * laplacian.smoothing_lengths[free], -few)[-few]),
         )
@@ -356,5 +359,5 @@ def _solve(matrix, load):
     """Solve for a step, no more closely than it needs, or find that the matrix is not definite."""
     diagonal = matrix.diagonal()
     if not np.all(diagonal > 0.0):
-        return Iterate(np.zeros_like(load), 0, converged=False, definite=False)
+        return Iterate(np.zeros_like(load), 0, converged=False, residual=1.0, definite=False)
     return conjugate_gradients(matrix, load, scaling=1.0 / diagonal, rtol=_RTOL, products=_PRODUCTS)

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from ..arguments import real, whole
 from ..errors import ComponentError, InvalidPointsError, PointCloudError, TooFewPointsError, UnresolvedModesError
 from ..geometry import check_values
 from ..kernel import RESOLVED
@@ -82,9 +83,9 @@ def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
     n = len(laplacian.points)
     values = check_values(values, n, columns=False)
     for name, share in (("threshold", threshold), ("bridge", bridge)):
-        if not 0.0 <= share < 1.0:
+        if not 0.0 <= real(share) < 1.0:
             raise PointCloudError(f"The {name} of nodal domains is {share!r}. Use a number from 0 to below 1.")
-    if not smallest >= 1:
+    if not real(smallest) >= 1.0:
         raise PointCloudError(f"The smallest nodal domain is {smallest!r} points. Use a number of at least 1.")
     graph = near_graph(laplacian, _NEIGHBORS)
     value, part = values[graph.first], laplacian.component[graph.first]
@@ -161,8 +162,7 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
     2 0 0
     """
     n = len(laplacian.points)
-    if isinstance(parts, bool) or not isinstance(parts, (int, np.integer)) or parts < 1:
-        raise TooFewPointsError(f"{parts!r} parts were asked for. Ask for a whole number of at least 1.")
+    parts = _check_parts(parts)
     components = int(laplacian.component.max()) + 1
     if parts < components:
         raise ComponentError(
@@ -210,8 +210,19 @@ def modes_needed(laplacian, parts):
     Returns
     -------
     int
+
+    Raises
+    ------
+    TooFewPointsError
+        Parts that are no whole number of at least 1.
     """
-    return _constant_modes(laplacian) + _MODES * int(parts) + 1
+    return _constant_modes(laplacian) + _MODES * _check_parts(parts) + 1
+
+
+def _check_parts(parts):
+    if not whole(parts) >= 1:
+        raise TooFewPointsError(f"{parts!r} parts were asked for. Ask for a whole number of at least 1.")
+    return whole(parts)
 
 
 def _constant_modes(laplacian):

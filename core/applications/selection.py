@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
+from ..arguments import real
 from ..errors import PointCloudError
 from ..geometry import as_mask
 from .graph import near_graph
@@ -56,10 +57,7 @@ def grow(laplacian, chosen, distance):
     0.25
     """
     mask = as_mask(chosen, len(laplacian.points))
-    try:
-        reach = float(distance)
-    except (TypeError, ValueError):
-        reach = np.nan
+    reach = real(distance)
     if not reach >= 0.0:
         raise PointCloudError(f"The distance to grow by is {distance!r}. Use a number that is not negative.")
     graph = near_graph(laplacian, _NEIGHBORS)

@@ -85,7 +85,7 @@ def match_size(size, wanted, touched):
     """
     last, scale = np.ones(len(wanted)), np.ones(len(wanted))
     error = np.where(touched, size(scale) / wanted - 1.0, 0.0)
-    scale = np.where(error != 0.0, np.clip((1.0 + error) ** -0.5, 0.5, 2.0), 1.0)
+    scale = np.where(error != 0.0, np.clip(1.0 + error, 0.25, 4.0) ** -0.5, 1.0)
     for _ in range(_ROUNDS):
         before, error = error, np.where(touched, size(scale) / wanted - 1.0, 0.0)
         if np.abs(error).max() < 1e-9:

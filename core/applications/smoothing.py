@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..arguments import check_switches, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
 from ..operator import solve_symmetric
@@ -259,9 +260,10 @@ def roughness(laplacian, wavelength=None, *, progress=None):
     """
     if wavelength is None:
         wavelength = _DETAIL * np.median(laplacian.smoothing_lengths)
-    if not 0.0 < wavelength < np.inf:
+    length = real(wavelength)
+    if not 0.0 < length < np.inf:
         raise PointCloudError(f"The wavelength of the roughness is {wavelength!r}. Use a number above zero.")
-    smooth = fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2, progress=progress)
+    smooth = fair_points(laplacian, (length / (2.0 * np.pi)) ** 2, progress=progress)
     return np.einsum("ij,ij->i", laplacian.points - smooth, laplacian.normals)
 
 
@@ -314,12 +316,13 @@ def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
     mode = check_values(mode, len(points), columns=False)
     if amplitude is None:
         amplitude = 0.1 * np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))
-    if not (np.isfinite(amplitude) and np.isfinite(phase)):
+    most, angle = real(amplitude), real(phase)
+    if not (np.isfinite(most) and np.isfinite(angle)):
         raise PointCloudError(f"Amplitude {amplitude!r} and phase {phase!r} must be finite numbers.")
     largest = np.abs(mode).max()
     if largest == 0.0:
         raise PointCloudError(f"The mode is zero at all {len(points)} points, which moves none. Choose another one.")
-    return points + (amplitude * np.cos(phase) / largest) * mode[:, None] * laplacian.normals
+    return points + (most * np.cos(angle)) * (mode / largest)[:, None] * laplacian.normals
 
 
 def smoothing_base(laplacian, *, dirichlet=False, progress=None):
@@ -432,7 +435,8 @@ class PointBlend:
     def __init__(self, laplacian, *, strength=1.0, mask=None, keep=None, dirichlet=False):
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
-        if not np.isfinite(strength):
+        check_switches(dirichlet=dirichlet)
+        if not np.isfinite(real(strength)):
             raise PointCloudError(f"The strength is {strength!r}. Use a finite number, 1 for the full effect.")
         weights = np.ones(n) if mask is None else check_values(mask, n)
         if weights.ndim != 1 or weights.min() < -1e-6 or weights.max() > 1.0 + 1e-6:
@@ -446,8 +450,8 @@ class PointBlend:
             weights[laplacian.boundary] = 0.0  # also in corners, where the images are not exact
         if not weights.any():
             raise PointCloudError(f"The mask is zero at all {n} points, so that none would move. Choose some points.")
-        self.mask, self.weights = weights, strength * weights
-        if keep not in _KEPT:
+        self.mask, self.weights = weights, real(strength) * weights
+        if not (keep is None or isinstance(keep, str)) or keep not in _KEPT:
             raise PointCloudError(f"What to keep is {keep!r}. Choose one of None, 'area', 'volume'.")
         if keep is not None and dirichlet:
             raise PointCloudError("A boundary that stays fixes the size already: keep neither area nor volume with it.")

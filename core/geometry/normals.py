@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
+from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError, NotASurfaceError
 from ..kernel import kernel
 
@@ -18,17 +19,19 @@ def unit_normals(normals, count):
     InvalidPointsError
         Not (count, 3) finite numbers, or some of them zero.
     """
-    normals = np.asarray(normals)
+    normals = as_array(normals, "Normals")
     if normals.shape != (count, 3) or normals.dtype.kind not in "iuf":
         raise InvalidPointsError(
             f"Normals of shape {normals.shape} and type {normals.dtype} do not fit {count} points. Give three"
             " real numbers for each point."
         )
-    length = np.linalg.norm(normals.astype(np.float64), axis=1)
-    bad = int(np.count_nonzero(~(np.isfinite(length) & (length > 0.0))))
+    normals = as_doubles(normals)
+    largest = np.abs(normals).max(axis=1, keepdims=True)
+    bad = int(np.count_nonzero(~(np.isfinite(largest) & (largest > 0.0))))
     if bad:
         raise InvalidPointsError(f"{bad} of {count} normals are zero or not finite. Leave the normals to be estimated.")
-    return normals / length[:, None]
+    normals = normals / largest  # squares of what is tiny or huge are no numbers
+    return normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 def covariance_normals(pairs, weighted=True):

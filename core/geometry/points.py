@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
 
 FEWEST = 5  # points of a boundary that is given
@@ -34,17 +35,14 @@ def check_points(points):
     TooFewPointsError
         No points at all.
     """
-    try:
-        given = np.asarray(points)
-    except ValueError as error:
-        raise InvalidPointsError(f"Points must be an array of shape (n, 3): {error}.") from error
+    given = as_array(points, "Points")
     if given.ndim != 2 or given.shape[1] != 3:
         raise InvalidPointsError(f"Points must have the shape (n, 3), not {given.shape}. Give x, y, z for each point.")
     if given.dtype.kind not in "iuf":
         raise InvalidPointsError(f"Points must be real numbers, not {given.dtype}. Convert them to float64.")
     if len(given) == 0:
         raise TooFewPointsError("There are no points. Add points, or choose another object.")
-    result = given.astype(np.float64, copy=False)
+    result = as_doubles(given, copy=False)
     finite = np.isfinite(result)
     if not finite.all():
         bad = np.count_nonzero(~finite.all(axis=1))
@@ -132,8 +130,10 @@ def scale_points(points, needed):
     TooFewPointsError, NotASurfaceError
         Fewer distinct points than needed, or all of them on one line.
     """
-    centered = points - points.mean(axis=0)
-    scale = float(np.sqrt(np.mean(np.sum(centered**2, axis=1))))
+    # Sums over sorted numbers, so that rounding, and all that hangs on it, is the same in any order of the points.
+    columns = np.sort(np.ascontiguousarray(points.T))
+    centered = np.subtract(points, columns.mean(axis=1), order="C")
+    scale = float(np.sqrt(np.mean(np.sort(np.sum(centered**2, axis=1)))))
     if scale > 0.0:
         centered /= scale
     distinct, first, inverse = _merge(centered)
@@ -144,7 +144,7 @@ def scale_points(points, needed):
             f"The neighborhoods need {needed} different points, and there are {len(distinct)}{among}. Add points, or"
             " lower the number of neighbors."
         )
-    spread = np.linalg.eigvalsh(centered.T @ centered / len(centered))
+    spread = np.linalg.eigvalsh(distinct.T @ distinct / len(distinct))
     if spread[1] < 1e-10 * spread[2]:
         raise NotASurfaceError(
             f"All {len(points)} points lie on a straight line, so they have no area. Use points of a surface."
@@ -192,7 +192,7 @@ def as_mask(chosen, count):
     InvalidPointsError
         Neither whole numbers below n nor n truth values.
     """
-    given = np.asarray(chosen)
+    given = as_array(chosen, "Sets of points")
     if given.dtype == bool and given.shape == (count,):
         return given
     mask = np.zeros(count, dtype=bool)
@@ -251,13 +251,13 @@ def check_distances(distances, count):
     InvalidPointsError
         Another shape, negative, or NaN.
     """
-    given = np.asarray(distances)
+    given = as_array(distances, "Distances to the boundary")
     if given.shape != (count,) or given.dtype.kind not in "iuf" or not np.all(given >= 0.0):
         raise InvalidPointsError(
             f"Distances to the boundary have the shape {given.shape} and type {given.dtype}. Give {count} numbers"
             " that are not negative, infinity where there is no boundary near."
         )
-    return given.astype(np.float64)
+    return as_doubles(given)
 
 
 def check_values(values, count, columns=True):
@@ -268,7 +268,7 @@ def check_values(values, count, columns=True):
     InvalidPointsError
         Another shape, no real numbers, or not finite.
     """
-    given = np.asarray(values)
+    given = as_array(values, "Values")
     shapes = (1, 2) if columns else (1,)
     if given.ndim not in shapes or len(given) != count or given.dtype.kind not in "iufb":
         row = "row of real numbers" if columns else "real number"
@@ -276,7 +276,7 @@ def check_values(values, count, columns=True):
             f"Values have the shape {given.shape} and type {given.dtype}, and there are {count} points. Give one {row}"
             " per point."
         )
-    given = given.astype(np.float64)
+    given = as_doubles(given)
     bad = int(np.count_nonzero(~np.isfinite(given.reshape(count, -1)).all(axis=1)))
     if bad:
         raise InvalidPointsError(

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..arguments import as_array
 from ..blocks import blocks, on_all_cores
 from ..errors import InvalidPointsError
 from .nearest import SMOOTH
@@ -82,6 +83,8 @@ class Prolongation:
                 f"Normals have the shape {normals.shape}, components {component.shape}, and there are {len(chosen)}"
                 " points in the subset. Give one row per point of it."
             )
+        unit = np.ldexp(1.0, np.frexp(np.ptp(points, axis=0).max())[1])  # squares in huge units are no numbers
+        points, chosen = points / unit, chosen / unit
         tree, width = cKDTree(chosen), min(_NEIGHBORS, len(chosen))
         low, extent = points.min(axis=0), np.ptp(points, axis=0).max()
         self._order = np.argsort(voxel_numbers(points, low, extent / _CELLS + 1e-300), kind="stable").astype(np.int32)
@@ -153,7 +156,7 @@ class Prolongation:
 
 def _rows(subset, count):
     """Return the rows of a subset, indices in their order or a mask."""
-    given = np.asarray(subset)
+    given = as_array(subset, "Subsets")
     if given.dtype == bool and given.shape == (count,):
         given = np.flatnonzero(given)
     if given.ndim != 1 or given.dtype.kind not in "iu" or not len(given) or given.min() < 0 or given.max() >= count:

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..arguments import whole
 from ..errors import InvalidPointsError
 from .points import check_points
 
@@ -59,7 +60,7 @@ def blue_noise_subset(points, count, *, progress=None):
     """
     report = progress or (lambda: None)
     points = check_points(points)
-    if int(count) != count or count < 1:
+    if not whole(count) >= 1:
         raise InvalidPointsError(f"A subset of {count!r} points was asked for. Ask for a whole number of at least 1.")
     low = points.min(axis=0)
     extent = float(np.max(points.max(axis=0) - low))

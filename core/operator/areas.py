@@ -8,6 +8,7 @@ from numpy.polynomial import chebyshev
 from scipy.special import expit
 
 from ..blocks import on_all_cores
+from ..errors import SolverError
 from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
@@ -32,13 +33,14 @@ class AreaSolution:
         Area elements, all positive.
     products : int
         Products with the kernel matrix.
-    converged : bool
-        Whether the solver reached its tolerance; the fast areas are a fixed number of steps.
+    residual : float
+        What is left of the equations, as a share, where the solver did not reach its tolerance, and zero where it did;
+        the fast areas are a fixed number of steps.
     """
 
     areas: np.ndarray
     products: int
-    converged: bool
+    residual: float = 0.0
 
 
 def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary=None, boundary_distance=None):
@@ -60,6 +62,9 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
     ------
     PointCloudError
         The points have no sound areas; see `build_laplacian`.
+    SolverError
+        The equations of 'regularized', 'constrained' or 'uniform' areas were not solved; the operator comes with a
+        notice then.
 
     See Also
     --------
@@ -81,6 +86,11 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
     cloud = read_cloud(points, options, normals, boundary, boundary_distance)
     distance = arc_length(cloud) if options.curvature_correction else cloud.pairs.distance
     scaled, solution = cloud.scaled, solve_areas(cloud, distance, options)
+    if solution.residual:
+        raise SolverError(
+            f"The areas of {len(solution.areas)} points were not found in {solution.products} steps: a share of"
+            f" {solution.residual:.1g} is left. Choose the areas option 'fast', or raise the regularization."
+        )
     return scaled.scatter(solution.areas * scaled.scale**2 / scaled.copies, NO_AREA)
 
 
@@ -218,7 +228,7 @@ def fast_areas(matrix, target, cells, rho=None):
         residual[held] = 0.0
         y = np.maximum(y + _polynomial(matrix, root, residual, held, _inverse(degree)), floor)
         held = y <= floor
-    return AreaSolution(root * y, sum(_DEGREES) + 1 + len(_DEGREES), True)
+    return AreaSolution(root * y, sum(_DEGREES) + 1 + len(_DEGREES))
 
 
 def _polynomial(matrix, root, residual, held, coefficients):

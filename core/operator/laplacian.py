@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from ..errors import InvalidPointsError
-from ..geometry import arc_length, check_points, move_apart, projected_distance, read_cloud
+from ..arguments import check_switches
+from ..geometry import arc_length, check_points, check_values, move_apart, projected_distance, read_cloud
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
@@ -131,7 +131,7 @@ class LaplaceBeltrami:
         Raises
         ------
         InvalidPointsError
-            Values of another length than the points.
+            Values that do not fit the points, or are not finite.
 
         See Also
         --------
@@ -152,11 +152,8 @@ class LaplaceBeltrami:
         >>> print(np.abs(laplacian.apply(z) + 2 * z).max().round(1))
         0.0
         """
-        values = np.asarray(values, dtype=np.float64)
-        if values.ndim not in (1, 2) or len(values) != len(self.areas):
-            raise InvalidPointsError(
-                f"Values have the shape {values.shape}, the operator {len(self.areas)} points. Give one row per point."
-            )
+        check_switches(raw=raw)
+        values = check_values(values, len(self.areas))
         areas, widths = self.areas, self.kernel_widths
         if values.ndim == 2:
             areas, widths = areas[:, None], widths[:, None]
@@ -217,6 +214,7 @@ class LaplaceBeltrami:
         >>> print(laplacian.eigenpairs(9).eigenvalues.round(1))
         [0. 2. 2. 2. 6. 6. 6. 6. 6.]
         """
+        check_switches(raw=raw, dirichlet=dirichlet)
         stiffness = self.dirichlet[0] if dirichlet else self.stiffness
         spectrum = solve_spectrum(self, stiffness, count, tolerance, progress)
         return spectrum if raw else self.corrected(spectrum)
@@ -321,8 +319,11 @@ def build_laplacian(
     report("Areas", 0.5)
     distance = arc_length(cloud) if options.curvature_correction else pairs.distance
     solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
-    if not solution.converged:
-        notices.append(f"The areas stopped after {solution.products} steps, close to their best values.")
+    if solution.residual:
+        notices.append(
+            f"The areas were not found in {solution.products} steps: a share of {solution.residual:.1g} of their"
+            " equations is left, and they may be far off. Choose the areas option 'fast', or raise the regularization."
+        )
 
     report("Operator", 0.8)
     if not options.curvature_correction:

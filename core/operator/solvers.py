@@ -25,6 +25,8 @@ class Iterate:
         Products with the matrix.
     converged : bool
         The residual fell to the tolerance.
+    residual : float
+        Its size over that of the load, or of the residual of the first guess where that is larger.
     definite : bool
         No direction was found along which the matrix is not positive; with one the values are those before it.
     """
@@ -32,6 +34,7 @@ class Iterate:
     values: np.ndarray
     products: int
     converged: bool
+    residual: float
     definite: bool = True
 
 
@@ -62,11 +65,12 @@ def conjugate_gradients(matrix, load, start=None, scaling=1.0, rtol=1e-9, produc
     """
     values = np.zeros_like(load) if start is None else start.copy()
     residual = load.copy() if start is None else load - matrix @ values
-    goal = rtol * max(np.linalg.norm(load), np.linalg.norm(residual))
+    unit = max(np.linalg.norm(load), np.linalg.norm(residual)) or 1.0
     direction = moment = None
     for step in range(products):
-        if np.linalg.norm(residual) <= goal:
-            return Iterate(values, step, True)
+        left = float(np.linalg.norm(residual) / unit)
+        if left <= rtol:
+            return Iterate(values, step, True, left)
         report(step)
         scaled = scaling * residual
         moment, previous = residual @ scaled, moment
@@ -74,11 +78,12 @@ def conjugate_gradients(matrix, load, start=None, scaling=1.0, rtol=1e-9, produc
         image = matrix @ direction
         curvature = direction @ image
         if np.isrealobj(curvature) and curvature <= 0.0:
-            return Iterate(values, step + 1, False, definite=False)
+            return Iterate(values, step + 1, False, left, definite=False)
         length = moment / curvature
         values += length * direction
         residual -= length * image
-    return Iterate(values, products, bool(np.linalg.norm(residual) <= goal))
+    left = float(np.linalg.norm(residual) / unit)
+    return Iterate(values, products, left <= rtol, left)
 
 
 def solve_symmetric(matrix, load, start=None, progress=None):
@@ -125,6 +130,9 @@ def solve_symmetric(matrix, load, start=None, progress=None):
     scaling, products = 1.0 / matrix.diagonal(), _STEPS if len(load) < _FEW else _PLAIN
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for number, column in enumerate(columns):
+            # Squares of loads in tiny or huge units are no numbers; a power of two rounds nothing.
+            unit = np.ldexp(1.0, np.frexp(np.abs(column).max(initial=0.0))[1])
+            column, values[number] = column / unit, values[number] / unit
             found = conjugate_gradients(matrix, column, values[number], scaling, products=products, report=report)
             if products == _PLAIN and found.definite and not found.converged:
                 scaling = approximate_inverse(matrix, pool, lambda: tell(part)) or scaling
@@ -132,10 +140,10 @@ def solve_symmetric(matrix, load, start=None, progress=None):
                 found = conjugate_gradients(matrix, column, found.values, scaling, products=products, report=report)
             if not found.converged:
                 raise SolverError(
-                    f"The equations of {len(load)} points were not solved in {found.products} steps. Fix more points,"
-                    " or raise the number of neighbors."
+                    f"The equations of {len(load)} points were not solved in {found.products} steps: a share of"
+                    f" {found.residual:.1g} is left. Fix more points, or raise the number of neighbors."
                 )
-            values[number] = found.values
+            values[number] = found.values * unit
     return values.T.reshape(load.shape)
 
 
@@ -163,13 +171,14 @@ def bounded_quadratic(product, right, lower, start, norm, products, rtol):
     x : ndarray, (n,)
     used : int
         Products spent.
-    converged : bool
+    residual : float
+        The projected gradient over the right-hand side.
     """
     step = 1.9 / norm
     x = start.copy()
     gradient = product(x) - right
-    used = 1
-    tolerance = rtol * np.linalg.norm(right)
+    used, exact = 1, True
+    unit = np.linalg.norm(right)
 
     def split(gradient, x):
         held = x <= lower
@@ -178,8 +187,15 @@ def bounded_quadratic(product, right, lower, start, norm, products, rtol):
     free, chopped = split(gradient, x)
     direction = free
     while used < products:
-        if free @ free + chopped @ chopped <= tolerance**2:
-            return x, used, True
+        if np.sqrt(free @ free + chopped @ chopped) <= rtol * unit:
+            if exact:
+                break
+            gradient, exact = product(x) - right, True  # what the steps made of it has lost digits
+            used += 1
+            free, chopped = split(gradient, x)
+            direction = free
+            continue
+        exact = False
         reduced = np.minimum(free, (x - lower) / step)
         if chopped @ chopped <= reduced @ free:
             image = product(direction)
@@ -207,4 +223,4 @@ def bounded_quadratic(product, right, lower, start, norm, products, rtol):
             gradient = gradient - length * image
         free, chopped = split(gradient, x)
         direction = free
-    return x, used, False
+    return x, used, float(np.sqrt(free @ free + chopped @ chopped) / unit)

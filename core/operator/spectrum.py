@@ -6,7 +6,8 @@ import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
-from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
+from ..arguments import real, whole
+from ..errors import PointCloudError, SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_symbol, symbol
 from ..memory import check_mode_memory
 from .davidson import coarse_to_fine
@@ -42,10 +43,12 @@ def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=No
     """Compute raw eigenpairs; see `LaplaceBeltrami.eigenpairs`."""
     areas = laplacian.areas
     n = len(areas)
-    if int(count) != count or count < 1:
+    if not whole(count) >= 1:
         raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
     if count > n // 3:
         raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
+    if not 0.0 < real(tolerance) < np.inf:
+        raise PointCloudError(f"The tolerance of the modes is {tolerance!r}. Use a number above zero.")
     check_mode_memory(n, int(count))
     count, done = int(count), 0.0
 
@@ -57,26 +60,29 @@ def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=No
 
     report()
     order, root, matrix = symmetric_form(laplacian, stiffness, report)
+    # In eigenvalues near one, by a power of two: solvers take those below some number for zero, in any unit.
+    unit = np.ldexp(1.0, np.frexp(matrix.diagonal().max())[1])
+    matrix.data /= unit
     pairs = coarse_to_fine(matrix, 1.0 / root, count, tolerance, report) if count <= _FEW * len(order) else None
     try:
-        values, vectors = pairs or lift_lowest(matrix, count, _cut(laplacian, count), report)
+        values, vectors = pairs or lift_lowest(matrix, count, _cut(laplacian, count) / unit, report)
     except ArpackNoConvergence as error:
         raise SolverError(
             f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
         ) from error
     report()
-    scale = max(values[-1], 4.0 * np.pi * count / laplacian.areas.sum())
+    scale = max(values[-1], 4.0 * np.pi * count / laplacian.areas.sum() / unit)
     residuals = np.linalg.norm(matrix @ vectors - vectors * values, axis=0) / scale
     if not residuals.max() <= tolerance:
         raise SolverError(
             f"The eigenvalue solver found {np.sum(residuals <= tolerance)} of {count} modes on {n} points to a residual"
             f" of {tolerance:g}. Ask for fewer modes, or raise the tolerance."
         )
+    vectors = root[:, None] * vectors
+    largest = np.argmax(np.abs(vectors), axis=0)
     result = np.zeros((n, count))
-    result[order] = root[:, None] * vectors
-    largest = np.argmax(np.abs(result), axis=0)
-    result *= np.sign(result[largest, np.arange(count)])
-    return Spectrum(np.maximum(values, 0.0), result, residuals)
+    result[order] = vectors * np.sign(vectors[largest, np.arange(count)])
+    return Spectrum(unit * np.maximum(values, 0.0), result, residuals)
 
 
 def _cut(laplacian, count):
@@ -100,19 +106,22 @@ def symmetric_form(laplacian, stiffness, report=lambda: None):
     Returns
     -------
     order : ndarray, (m,) int
-        The points that are not left out, neighbours near in memory, which makes the products faster.
+        The points that are not left out, neighbours near in memory, which makes the products faster; the same points
+        in whatever order they were given.
     root : ndarray, (m,)
         ``root * y`` is the function on these points that the vector y stands for.
     matrix : csr_array, (m, m)
         Symmetric positive semi-definite [1 / L^2].
     """
     known = np.flatnonzero(laplacian.component >= 0)
+    known = known[np.lexsort(laplacian.points[known].T)]
     order = known[cKDTree(laplacian.points[known]).indices]
     root = 1.0 / np.sqrt(laplacian.areas[order])
     report()
     matrix = stiffness[order]
     report()
     matrix = matrix[:, order]
+    matrix.sort_indices()  # and so the sums of products
     report()
     matrix.data *= np.repeat(root, np.diff(matrix.indptr)) * root[matrix.indices]
     return order, root, matrix

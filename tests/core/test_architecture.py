@@ -65,7 +65,7 @@ def test_operators_draw_nothing_and_call_no_operator(call):
     assert [file.name for file in files if re.search(call, file.read_text(encoding="utf-8"))] == []
 
 
-GROUND = {"blocks", "dense", "kernel", "memory", "options", "errors"}
+GROUND = {"arguments", "blocks", "dense", "kernel", "memory", "options", "errors"}
 BELOW = {  # what each wing of core may use
     "geometry": GROUND,
     "operator": GROUND | {"geometry"},

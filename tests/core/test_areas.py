@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from benchmarks.samplings import (
     noisy_sphere,
     random_sphere,
     rough_sphere,
+    square_random,
     torus_points,
     uneven_sphere,
 )
@@ -143,6 +145,27 @@ def test_scale_shift_rotation_and_order(method):
         np.testing.assert_allclose(moved, scale**2 * areas[order], rtol=1e-6)
 
 
+@pytest.mark.parametrize("method", ["constrained", "uniform"])
+@pytest.mark.parametrize("points", [random_sphere(300), square_random(400)], ids=["sphere", "square"])
+def test_areas_by_least_squares_do_not_depend_on_the_unit(points, method):
+    options = replace(LaplacianOptions.paper(), neighbors=30, areas=method)
+    areas = core.estimate_areas(points, options=options)
+    inches = core.estimate_areas(points / 0.0254, options=options)
+    np.testing.assert_allclose(0.0254**2 * inches, areas, rtol=0.0, atol=1e-6 * areas.mean())
+
+
+@pytest.mark.parametrize("method", ["constrained", "uniform"])
+def test_areas_that_are_not_found_are_told_with_what_is_left(method):
+    points = np.cumsum(np.random.default_rng(0).standard_normal((1000, 3)), axis=0)  # hardly a surface
+    options = LaplacianOptions(areas=method, neighbors=20, regularization=1e-9)
+    notices = core.build_laplacian(points, options=options).notices
+    assert any(
+        re.match(r"The areas were not found in [\d,]+ steps: a share of \S+ of their eq", text) for text in notices
+    )
+    with pytest.raises(core.SolverError, match="were not found.*'fast'"):
+        core.estimate_areas(points, options=options)
+
+
 def test_the_plain_linear_system_goes_negative_and_says_so():
     options = LaplacianOptions(bandwidth="global", bandwidth_factor=0.5, areas="regularized")
     with pytest.raises(core.AreaError, match="not positive.*'fast'"):
@@ -159,7 +182,7 @@ def test_regularized_areas_solve_the_normal_equations():
 def test_constrained_areas_keep_the_bound_and_are_optimal(uneven):
     matrix, target = uneven
     solution = constrained_areas(matrix, target, 1e-3, products=40_000)
-    assert solution.converged
+    assert solution.residual == 0.0
     areas = solution.areas
     assert areas.min() >= TAU
     gradient = 2.0 * (matrix @ (matrix @ areas - target) + 1e-3 * areas)
@@ -193,8 +216,8 @@ def test_bounded_quadratic_meets_the_optimality_conditions(seed):
     matrix = root @ root.T + 0.1 * np.eye(40)
     right, lower = rng.standard_normal(40), -0.1 * rng.random(40)
     norm = np.linalg.norm(matrix, 2)
-    x, used, converged = bounded_quadratic(lambda v: matrix @ v, right, lower, np.zeros(40), norm, 5000, 1e-10)
-    assert converged
+    x, used, left = bounded_quadratic(lambda v: matrix @ v, right, lower, np.zeros(40), norm, 5000, 1e-10)
+    assert left <= 1e-10
     assert used < 5000
     gradient = matrix @ x - right
     assert np.all(x >= lower)

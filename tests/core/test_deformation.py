@@ -339,7 +339,7 @@ def test_bad_sets_and_weights_are_refused(arguments, text):
         ([[0.0, np.nan, 0.0], [0.0, 0.0, 0.0]], "1 of 2 handle positions are not finite"),
         ([[0.0, np.inf, 0.0], [0.0, 1e200, 0.0]], "2 of 2 handle positions are not finite"),
         ([["a", "b", "c"], ["d", "e", "f"]], "real numbers"),
-        ([[0.0, 0.0, 0.0], [0.0, 0.0]], "handle positions must be an array"),
+        ([[0.0, 0.0, 0.0], [0.0, 0.0]], "Handle positions must be an array"),
     ],
 )
 def test_bad_positions_are_refused(positions, text):

@@ -1,5 +1,7 @@
 """Minimal surfaces: known ones, boundaries that none spans, and the ways to end."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -326,3 +328,12 @@ def test_given_distances_hold_beside_corners_only():
     # Otherwise the distances that were given are taken: a boundary a little further out leaves more area inside.
     wider = core.build_laplacian(points, boundary=boundary, boundary_distance=inset[:, 0] + 0.2 / 29)
     assert wider.areas.sum() > both.areas.sum() + 1e-2
+
+
+def test_a_step_that_was_not_found_settles_nothing(monkeypatch):
+    monkeypatch.setattr(sys.modules["core.applications.minimal_surface"], "_PRODUCTS", 1)
+    grid = square_grid(12)
+    edge = np.isin(grid[:, :2], [grid.min(), grid[:, :2].max()]).any(axis=1)
+    bump = grid + 0.01 * np.where(edge, 0.0, np.sin(3.0 * grid[:, 0]))[:, None] * [0.0, 0.0, 1.0]
+    film = core.minimal_surface(bump, edge, epsilon=1.0, max_steps=2)
+    assert (film.converged, film.reason) == (False, "step limit")

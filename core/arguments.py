@@ -1,0 +1,63 @@
+"""What callers give as numbers, switches and arrays, read so that nothing else than a check can fail on it."""
+
+from numbers import Integral, Real
+
+import numpy as np
+
+from .errors import InvalidPointsError, PointCloudError
+
+
+def real(given):
+    """Return a real number as a float; NaN, which no comparison lets pass, for what is none."""
+    number = given[()] if isinstance(given, np.ndarray) and given.ndim == 0 else given
+    if isinstance(number, bool) or not isinstance(number, Real):
+        return np.nan
+    try:
+        return float(number)
+    except OverflowError:  # a whole number of more than 308 digits
+        return np.inf if number > 0 else -np.inf
+
+
+def whole(given):
+    """Return a whole number as an int; NaN, which no comparison lets pass, for what is none."""
+    if isinstance(given, Integral) and not isinstance(given, bool):
+        return int(given)
+    number = real(given)
+    return int(number) if np.isfinite(number) and number == np.floor(number) else np.nan
+
+
+def check_switches(**switches):
+    """Check that arguments are truth values.
+
+    Raises
+    ------
+    PointCloudError
+        One of them is something else.
+    """
+    for name, value in switches.items():
+        if not isinstance(value, bool | np.bool_):
+            raise PointCloudError(f"Option {name} is {value!r}. Use True or False.")
+
+
+def as_array(given, name):
+    """Return an argument as an array of any shape and type.
+
+    Raises
+    ------
+    InvalidPointsError
+        Rows of different lengths, or masked values, of which nothing is known.
+    """
+    try:
+        array = np.asarray(given)
+    except (TypeError, ValueError) as error:
+        raise InvalidPointsError(f"{name} must be an array with rows of one length: {error}.") from error
+    masked = np.count_nonzero(np.ma.getmask(given))
+    if masked:
+        raise InvalidPointsError(f"{name} have {masked} masked values. Leave their points out, or fill them.")
+    return array
+
+
+def as_doubles(array, copy=True):
+    """Return an array of real numbers in double precision; those beyond its range become infinite."""
+    with np.errstate(over="ignore"):
+        return array.astype(np.float64, copy=copy)

@@ -1,0 +1,472 @@
+"""Clouds of every awkward kind, and arguments of every wrong kind: a sound result, or an error that says what to do.
+
+MESHFREE_CASES in the environment multiplies how many are tried.
+"""
+
+import contextlib
+import functools
+import inspect
+import itertools
+import os
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import core
+from benchmarks.samplings import fibonacci_sphere, square_grid
+from core.applications.sizes import match_size
+
+TIMES = int(os.environ.get("MESHFREE_CASES", "1"))
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+def tried(count):
+    return settings(
+        derandomize=True,
+        deadline=None,
+        database=None,
+        max_examples=count * TIMES,
+        suppress_health_check=list(HealthCheck),
+    )
+
+
+def sphere(rng, count):
+    points = rng.standard_normal((count, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None]
+
+
+def globe(rng, count):
+    """Latitudes and longitudes, with all the points of both poles."""
+    rows = max(2, int(np.sqrt(count / 2)))
+    around, up = np.meshgrid(np.arange(2 * rows) * np.pi / rows, np.linspace(0.0, np.pi, rows))
+    return np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], axis=2).reshape(-1, 3)
+
+
+def spikes(rng, count):
+    points = sphere(rng, count)
+    points[rng.integers(0, count, 5)] *= rng.uniform(1.5, 9.0, (5, 1))
+    return points
+
+
+KINDS = {
+    "sphere": sphere,
+    "duplicates": lambda rng, count: np.repeat(sphere(rng, count // 3 + 1), 3, axis=0),
+    "near duplicates": lambda rng, count: (
+        np.repeat(sphere(rng, count // 2 + 1), 2, axis=0) + 1e-10 * rng.standard_normal((2 * (count // 2 + 1), 3))
+    ),
+    "one place": lambda rng, count: np.ones((count, 3)),
+    "line": lambda rng, count: rng.random((count, 1)) * [1.0, 2.0, 3.0],
+    "curve": lambda rng, count: np.stack([np.cos(t := rng.random(count) * 6.0), np.sin(t), 0.1 * t], axis=1),
+    "plane": lambda rng, count: rng.random((count, 2)) @ [[1.0, 0.0, 1.0], [0.0, 1.0, 0.5]],
+    "nested shells": lambda rng, count: sphere(rng, count) * rng.choice([1.0, 1.02, 1.3], (count, 1)),
+    "spikes": spikes,
+    "outliers": lambda rng, count: np.concatenate([sphere(rng, count), rng.uniform(-5.0, 5.0, (count // 8 + 1, 3))]),
+    "volume": lambda rng, count: rng.standard_normal((count, 3)),
+    "Brownian path": lambda rng, count: np.cumsum(rng.standard_normal((count, 3)), axis=0),
+    "integer grid": lambda rng, count: np.argwhere(np.ones((int(np.sqrt(count)) + 1,) * 2 + (1,))),
+    "block of integers": lambda rng, count: np.argwhere(np.ones((int(np.cbrt(count)) + 1,) * 3)),
+    "globe": globe,
+    "islands": lambda rng, count: (
+        np.repeat(10.0 * rng.standard_normal((count // 3 + 1, 3)), 3, axis=0) + rng.random((3 * (count // 3 + 1), 3))
+    ),
+    "far away": lambda rng, count: sphere(rng, count) + 1e5,
+    "far away, coarse": lambda rng, count: (sphere(rng, count) + 300.0).astype(np.float32),
+    "not a number": lambda rng, count: np.where(rng.random((count, 3)) < 0.01, np.nan, sphere(rng, count)),
+    "infinite": lambda rng, count: np.where(rng.random((count, 3)) < 0.01, np.inf, sphere(rng, count)),
+    "flattened": lambda rng, count: sphere(rng, count) * [1.0, 1.0, 1e-6],
+    "strip": lambda rng, count: rng.random((count, 3)) * [1.0, 0.01, 0.0],
+}
+LAYOUTS = {
+    "plain": np.asarray,
+    "list": lambda points: points.tolist(),
+    "read-only": lambda points: np.frombuffer(points.tobytes(), points.dtype).reshape(points.shape),
+    "big-endian": lambda points: points.astype(points.dtype.newbyteorder(">")),
+    "by columns": np.asfortranarray,
+    "every other": lambda points: np.repeat(points, 2, axis=0)[::2],
+    "backwards": lambda points: points[::-1][::-1],
+    "single": lambda points: points.astype(np.float32),
+    "masked": np.ma.masked_invalid,
+    "extended": lambda points: points.astype(np.longdouble),
+}
+OPTIONS = {
+    "bandwidth": ["adaptive", "local", "global"],
+    "neighbors": [6, 10, 20, 40, 100],
+    "bandwidth_factor": [0.4, 0.6, 1.0, 2.0],
+    "normals": ["quadric", "wpca", "pca"],
+    "orient": [True, False],
+    "areas": ["fast", "regularized", "constrained", "uniform"],
+    "regularization": [1e-9, 1e-3, 10.0],
+    "boundary": ["auto", "off"],
+    "sheets": [True, False],
+    "projection": ["auto", "off", "quadric", "plane"],
+    "curvature_correction": [True, False],
+    "symbol_correction": [True, False],
+}
+JUNK = [
+    None,
+    "x",
+    b"x",
+    True,
+    -1,
+    2**70,
+    1.5,
+    np.nan,
+    np.inf,
+    -np.inf,
+    1j,
+    [],
+    [[1.0], [1.0, 2.0]],
+    {},
+    {"a": 1},
+    object(),
+    np.zeros(3),
+    np.zeros((3, 3, 3)),
+    np.array(["a", "b"]),
+    np.array([None, 1.0]),
+    np.full(7, np.nan),
+    np.array(np.datetime64("2020-01-01")),
+    slice(3),
+    int,
+]
+
+
+@st.composite
+def clouds(draw):
+    """A cloud of some kind, in some unit."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count = draw(st.integers(0, 10) | st.integers(60, 260) | st.integers(60, 260) | st.integers(60, 260))
+    return KINDS[draw(st.sampled_from(list(KINDS)))](rng, max(count, 1))[: None if count else 0]
+
+
+@st.composite
+def choices(draw):
+    """Options within their bounds, of which most are the defaults."""
+    names = draw(st.sets(st.sampled_from(list(OPTIONS)), max_size=4))
+    chosen = {name: draw(st.sampled_from(OPTIONS[name])) for name in sorted(names)}
+    try:
+        return core.LaplacianOptions(**{"neighbors": 20, **chosen})
+    except core.PointCloudError:
+        return core.LaplacianOptions()
+
+
+def build(points, options):
+    """Return the operator, or the kind of error that refuses these points."""
+    try:
+        return core.build_laplacian(points, options=options)
+    except core.PointCloudError as error:
+        return type(error)
+
+
+def check_structure(laplacian):
+    """Assert what an operator is for any points."""
+    taken = laplacian.component >= 0
+    stiffness, areas = laplacian.stiffness, laplacian.areas
+    assert taken.any()
+    assert np.isfinite(areas).all()
+    assert areas.min() > 0.0
+    assert np.isfinite(stiffness.data).all()
+    assert abs(stiffness - stiffness.T).max() <= 1e-15 * abs(stiffness).max()
+    assert np.all(np.abs(stiffness.sum(axis=1)) <= 1e-9 * stiffness.diagonal().max())
+    pairs = stiffness.tocoo()
+    assert np.all(pairs.data[pairs.row != pairs.col] <= 0.0)
+    assert np.linalg.eigvalsh(stiffness.toarray())[0] >= -1e-12 * abs(stiffness).max()
+    for name in ("normals", "mean_curvature", "gaussian_curvature", "trust", "smoothing_lengths", "kernel_widths"):
+        assert np.isfinite(getattr(laplacian, name)).all(), name
+    assert_allclose(np.linalg.norm(laplacian.normals, axis=1), 1.0, rtol=1e-9)
+    assert 0.0 <= laplacian.trust.min() <= laplacian.trust.max() <= 1.0
+    assert np.isfinite(core.mean_curvature(laplacian)).all()
+    curvatures = core.principal_curvatures(laplacian)
+    assert np.isfinite(curvatures.direction).all()
+    assert np.abs(curvatures.shape_index).max() <= 1.0
+
+
+@tried(120)
+@given(points=clouds(), options=choices(), layout=st.sampled_from(list(LAYOUTS)))
+def test_any_cloud_with_any_options(points, options, layout):
+    laplacian = build(LAYOUTS[layout](points), options)
+    if not isinstance(laplacian, type):
+        check_structure(laplacian)
+
+
+@tried(60)
+@given(points=clouds(), options=choices(), power=st.sampled_from([-180, -40, -3, 5, 60, 180]))
+def test_the_law_of_scale_holds_to_the_last_bit_for_powers_of_two(points, options, power):
+    points = np.asarray(points, dtype=np.float64)
+    before, after = build(points, options), build(2.0**power * points, options)
+    if isinstance(before, type) or isinstance(after, type):
+        extent = np.ptp(points, axis=0).max() if len(points) else 0.0
+        assert before is after or not 1e-60 < 2.0**power * extent < 1e60
+        return
+    scale, taken = 2.0**power, before.component >= 0
+    np.testing.assert_array_equal(after.component, before.component)
+    np.testing.assert_array_equal(after.boundary, before.boundary)
+    np.testing.assert_array_equal(after.areas[taken], scale**2 * before.areas[taken])
+    np.testing.assert_array_equal(after.smoothing_lengths, scale * before.smoothing_lengths)
+    np.testing.assert_array_equal(after.stiffness.data, before.stiffness.data)
+
+
+@tried(60)
+@given(points=clouds(), options=choices(), seed=st.integers(0, 2**32 - 1))
+def test_order_and_layout_of_the_points_decide_nothing(points, options, seed):
+    points = np.asarray(points, dtype=np.float64)
+    order = np.random.default_rng(seed).permutation(len(points))
+    before, after = build(points, options), build(np.asfortranarray(points[order]), options)
+    if isinstance(before, type) or isinstance(after, type):
+        assert before is after
+        return
+    np.testing.assert_array_equal(after.component, before.component[order])
+    np.testing.assert_array_equal(after.boundary, before.boundary[order])
+    np.testing.assert_array_equal(after.areas, before.areas[order])
+    np.testing.assert_array_equal(after.normals, before.normals[order])
+    assert abs(after.stiffness - before.stiffness[order][:, order]).max() <= 1e-15 * abs(before.stiffness).max()
+
+
+def ends(laplacian):
+    height = laplacian.points[:, 2]
+    return height >= np.quantile(height, 0.9), height < np.quantile(height, 0.1)
+
+
+def lifted(laplacian, deformer):
+    top, bottom = ends(laplacian)
+    return deformer(laplacian, top, bottom).solve(laplacian.points[top] + extent(laplacian) * np.array([0.3, 0.1, 0.2]))
+
+
+def extent(laplacian):
+    return np.ptp(laplacian.points, axis=0).max()
+
+
+def carried(laplacian):
+    subset = core.blue_noise_subset(laplacian.points, len(laplacian.points) // 3)
+    return core.Prolongation(laplacian.points, subset, laplacian.normals[subset]).interpolate(laplacian.normals[subset])
+
+
+def distances(laplacian):
+    found = core.geodesic_distance(laplacian, [0, 1])
+    return np.where(np.isinf(found), 0.0, found)  # on other components
+
+
+def spectrum(laplacian):
+    return laplacian.eigenpairs(9, raw=True)
+
+
+# What a function gives for an operator, with the power of the unit of length that it grows by.
+USES = {
+    "eigenvalues": (-2, lambda on: on.eigenpairs(9).eigenvalues),
+    "modes": (-1, lambda on: spectrum(on).eigenvectors),
+    "Dirichlet modes": (-1, lambda on: on.eigenpairs(5, raw=True, dirichlet=True).eigenvectors),
+    "operator": (-1, lambda on: on.apply(on.points)),
+    "mean curvature": (-1, core.mean_curvature),
+    "curvature": (-1, lambda on: core.principal_curvatures(on).curvedness),
+    "roughness": (1, core.roughness),
+    "fair": (1, core.fair_points),
+    "fair inside": (1, lambda on: core.fair_points(on, dirichlet=True)),
+    "fair, area": (1, lambda on: core.fair_points(on, keep="area")),
+    "fair, volume": (1, lambda on: core.fair_points(on, keep="volume")),
+    "smooth": (1, lambda on: core.smooth_points(on, 8)),
+    "boost": (1, lambda on: core.smooth_points(on, core.boost(2.0, *(np.array([10.0, 300.0]) / extent(on) ** 2)))),
+    "parts": (0, lambda on: core.segment(on, on.component.max() + 3)),
+    "domains": (0, lambda on: core.nodal_domains(on.points[:, 0] - on.points[:, 0].mean(), on)),
+    "heat": (-2, lambda on: core.heat_kernel_signature(spectrum(on))),
+    "waves": (-2, lambda on: core.wave_kernel_signature(spectrum(on))),
+    "harmonic": (0, lambda on: core.harmonic_field(on, [0, 1, 2], [0.0, 1.0, 3.0])),
+    "harmonic height": (1, lambda on: core.harmonic_field(on, ends(on)[0], on.points[ends(on)[0], 2])),
+    "potential": (3, lambda on: core.solve_poisson(on, on.points[:, 2], [0], [0.0])),
+    "distance": (1, distances),
+    "grown": (0, lambda on: core.grow(on, [0], 0.2 * extent(on))),
+    "displaced": (1, lambda on: core.displace_by_mode(on, on.points[:, 0] - on.points[:, 0].mean())),
+    "deformed": (1, lambda on: lifted(on, core.Deformer)),
+    "deformed coarsely": (1, lambda on: lifted(on, functools.partial(core.CoarseDeformer, count=60, neighbors=12))),
+    "subset": (0, lambda on: core.blue_noise_subset(on.points, 30)),
+    "carried": (0, carried),
+    "minimal": (1, lambda on: core.minimal_surface(on.points, on.boundary | ends(on)[0], max_steps=1).points),
+}
+
+
+def use(laplacian, name):
+    """Return what a function gives, or the kind of error that refuses it."""
+    try:
+        return USES[name][1](laplacian)
+    except core.PointCloudError as error:
+        return type(error)
+
+
+@tried(200)
+@given(
+    points=clouds(),
+    options=choices(),
+    power=st.sampled_from([-180, -60, -9, 9, 60, 180]),
+    name=st.sampled_from(list(USES)),
+)
+def test_any_use_of_any_operator_follows_the_law_of_scale(points, options, power, name):
+    points = np.asarray(points, dtype=np.float64)
+    before, after = build(points, options), build(2.0**power * points, options)
+    if isinstance(before, type) or isinstance(after, type):
+        return
+    ours, theirs = use(before, name), use(after, name)
+    if isinstance(ours, type) or isinstance(theirs, type):
+        assert ours is theirs
+        return
+    assert np.isfinite(ours).all()
+    expected = 2.0 ** (power * USES[name][0]) * ours
+    assert_allclose(theirs, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("kind", ["sphere", "globe", "outliers", "strip"])
+def test_order_of_the_points_decides_no_mode(kind):
+    rng = np.random.default_rng(3)
+    points = KINDS[kind](rng, 300)
+    order = rng.permutation(len(points))
+    before, after = core.build_laplacian(points), core.build_laplacian(points[order])
+    for count in (3, 25):
+        ours, theirs = before.eigenpairs(count, raw=True), after.eigenpairs(count, raw=True)
+        assert_allclose(theirs.eigenvalues, ours.eigenvalues, rtol=1e-9, atol=1e-9 * ours.eigenvalues[-1])
+        largest = np.abs(ours.eigenvectors).max()
+        assert_allclose(theirs.eigenvectors, ours.eigenvectors[order], rtol=0.0, atol=1e-6 * largest)
+
+
+@tried(80)
+@given(name=st.sampled_from(list(OPTIONS)), value=st.sampled_from(JUNK) | st.integers() | st.floats() | st.text())
+def test_options_outside_their_bounds(name, value):
+    try:
+        options = core.LaplacianOptions(**{name: value})
+    except core.PointCloudError:
+        return
+    assert getattr(options, name) == value
+    build(fibonacci_sphere(300), options)
+
+
+def calls():
+    """Public functions with arguments that are right, by name; those named first are not replaced by wrong ones."""
+    laplacian = core.build_laplacian(fibonacci_sphere(300), options=core.LaplacianOptions(neighbors=30))
+    spectrum = laplacian.eigenpairs(6)
+    points, n = laplacian.points, 300
+    top, bottom = points[:, 2] > 0.8, points[:, 2] < -0.8
+    on, of = {"laplacian": laplacian}, {"spectrum": spectrum}
+    low = spectrum.eigenvectors[:, 1]
+    grid = square_grid(12)
+    edge = (grid[:, :2].min(axis=1) == grid.min()) | (grid[:, :2].max(axis=1) == grid[:, :2].max())
+    yield core.build_laplacian, {}, {"points": points, "normals": points, "options": core.LaplacianOptions()}
+    yield core.build_laplacian, {"points": points}, {"boundary": top, "boundary_distance": np.full(n, np.inf)}
+    yield core.estimate_areas, {}, {"points": points, "normals": points, "options": core.LaplacianOptions()}
+    yield core.estimate_normals, {}, {"points": points, "options": core.LaplacianOptions()}
+    yield core.check_points, {}, {"points": points}
+    yield core.blue_noise_subset, {}, {"points": points, "count": 100}
+    yield core.Prolongation, {}, {"points": points, "subset": np.arange(150), "normals": points[:150]}
+    yield laplacian.apply, {}, {"values": low, "raw": False}
+    yield laplacian.eigenpairs, {}, {"count": 4, "raw": False, "dirichlet": False, "tolerance": 1e-6}
+    yield core.spectral_filter, of, {"values": low, "areas": laplacian.areas, "response": 3, "rest": 0.0}
+    yield (
+        core.chebyshev_filter,
+        {**on, "response": core.exponential(0.1)},
+        {"values": low, "dirichlet": False, "raw": False, "tolerance": 1e-3},
+    )
+    yield core.exponential, {}, {"time": 1.0}
+    yield core.fairing, {}, {"time": 1.0, "order": 2}
+    yield core.band, {}, {"low": 1.0, "high": 2.0, "softness": 0.1}
+    yield core.boost, {}, {"gain": 2.0, "low": 1.0, "high": 2.0, "softness": 0.1}
+    yield (
+        core.smooth_points,
+        {**on, "spectrum": spectrum},
+        {"response": 5, "strength": 1.0, "mask": top, "keep": "area"},
+    )
+    yield core.fair_points, on, {"time": 0.01, "order": 3, "dirichlet": False, "keep": None}
+    yield core.roughness, on, {"wavelength": 0.5}
+    yield core.displace_by_mode, on, {"mode": low, "amplitude": 0.1, "phase": 0.0}
+    yield core.segment, {**on, **of}, {"parts": 2}
+    yield core.nodal_domains, on, {"values": low, "threshold": 0.02, "bridge": 0.1, "smallest": 5}
+    yield core.modes_needed, on, {"parts": 2}
+    yield core.heat_kernel_signature, of, {"times": [0.1, 1.0], "count": 3, "normalized": False}
+    yield core.wave_kernel_signature, of, {"energies": [0.1, 1.0], "count": 3}
+    yield core.signature_times, of, {"count": 3}
+    yield core.signature_energies, of, {"count": 3}
+    yield core.harmonic_field, on, {"fixed": [0, 299], "fixed_values": [0.0, 1.0]}
+    yield core.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
+    yield core.geodesic_distance, on, {"sources": [0]}
+    yield core.Geodesics(laplacian).distance, {}, {"sources": [0]}
+    yield core.grow, on, {"chosen": [0], "distance": 0.3}
+    yield (
+        core.Deformer,
+        on,
+        {"handles": top, "anchors": bottom, "weights": None, "rotation_aware": True, "neighbors": 40},
+    )
+    solve = core.Deformer(laplacian, top, bottom).solve
+    yield solve, {}, {"handle_positions": points[top], "steps": 3, "rtol": 1e-3, "start": None}
+    yield core.CoarseDeformer, on, {"handles": top, "anchors": bottom, "count": 100}
+    yield core.CoarseDeformer(laplacian, top, bottom).solve, {}, {"handle_positions": points[top]}
+    yield core.minimal_surface, {"max_steps": 2}, {"points": grid, "fixed": edge, "options": core.LaplacianOptions()}
+    yield core.minimal_surface, {"points": grid, "fixed": edge}, {"max_steps": 2, "epsilon": 1e-3}
+
+
+@pytest.fixture(scope="module")
+def public():
+    return list(calls())
+
+
+TYPED = {"points_that_fit", "mean_curvature", "principal_curvatures", "smoothing_base", "check_stability"}
+
+
+def test_all_public_functions_are_tried(public):
+    tested = {function.__name__ for function, _, _ in public}
+    functions = {name for name in core.__all__ if inspect.isfunction(getattr(core, name))}
+    assert functions - tested <= TYPED
+
+
+@pytest.mark.parametrize("number", range(len(list(calls()))))
+def test_wrong_arguments_are_refused_in_words(public, number):
+    function, fixed, arguments = public[number]
+    function(**fixed, **arguments)  # is right
+    for name, junk in itertools.product(arguments, JUNK):
+        if not (name == "response" and callable(junk)):  # whose own errors are the caller's
+            with contextlib.suppress(core.PointCloudError):
+                function(**fixed, **{**arguments, name: junk})
+
+
+@pytest.mark.parametrize("power", [-180, -100, 100, 180])
+@pytest.mark.parametrize("name", USES)
+def test_uses_follow_the_law_of_scale_in_tiny_and_huge_units(name, power):
+    points = square_grid(12) + [0.0, 0.0, 1.0]
+    points[:, 2] += 0.1 * np.sin(5.0 * points[:, 0])
+    options = core.LaplacianOptions(neighbors=20)
+    ours, theirs = (use(core.build_laplacian(unit * points, options=options), name) for unit in (1.0, 2.0**power))
+    if isinstance(ours, type):
+        assert theirs is ours
+        return
+    expected = 2.0 ** (power * USES[name][0]) * ours
+    assert_allclose(theirs, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_masked_values_are_refused():
+    points = fibonacci_sphere(300)
+    hidden = np.ma.array(points, mask=points > 0.9)
+    with pytest.raises(core.InvalidPointsError, match="masked values"):
+        core.build_laplacian(hidden)
+    with pytest.raises(core.InvalidPointsError, match="masked values"):
+        core.build_laplacian(points, hidden)
+    with pytest.raises(core.InvalidPointsError, match="masked values"):
+        core.build_laplacian(points).apply(hidden)
+    core.build_laplacian(np.ma.array(points))
+
+
+def test_modes_and_filters_of_a_grid_are_the_same_in_huge_units():
+    points, options = np.argwhere(np.ones((13, 13, 1))), core.LaplacianOptions(neighbors=20)
+    before, after = (core.build_laplacian(unit * points, options=options) for unit in (1.0, 2.0**100))
+    np.testing.assert_array_equal(2.0**-100 * core.fair_points(after), core.fair_points(before))
+    ours, theirs = before.eigenpairs(9, raw=True), after.eigenpairs(9, raw=True)
+    assert_allclose(2.0**100 * theirs.eigenvectors, ours.eigenvectors, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [2.0**-180, 2.0**180])
+def test_functions_are_carried_in_any_unit(unit):
+    rng = np.random.default_rng(0)
+    points, values = KINDS["islands"](rng, 90), rng.random(30)
+    normals = sphere(rng, 30)
+    ours, theirs = (core.Prolongation(by * points, np.arange(30), normals).interpolate(values) for by in (1.0, unit))
+    np.testing.assert_array_equal(theirs, ours)
+
+
+def test_a_volume_turned_inside_out_is_brought_back():
+    scale = match_size(lambda scale: 2.0 * scale**3 - 3.0, np.ones(1), np.array([True]))
+    assert_allclose(scale, 2.0 ** (1.0 / 3.0))
