@@ -34,7 +34,7 @@ DOCUMENT = Path(__file__).parents[1] / "docs" / "scaling.md"
 PICTURE = "pictures/results/scaling.png"
 COUNTS = 10_000, 100_000, 1_000_000
 MODES = 50
-LARGEST = 100_000  # beyond, the applications and the peer are left out
+LARGEST = 100_000  # beyond, the peers are left out
 STAGES = {  # the rest of the build is its surface: outliers, components, quadrics, sheets, noise, cells
     "pairs": [(cloud, "find_pairs"), (cloud, "separate_sheets"), (laplacian, "arc_length")],
     "normals": [(cloud, "orient_normals")],
@@ -107,6 +107,7 @@ def run_applications(count):
     geodesics = watch.run("geodesics, set-up", core.Geodesics, built)
     watch.run("geodesics, a source", geodesics.distance, [0])
     watch.run("segmentation", core.segment, built, 6)
+    watch.run("binding by a coarse cloud", core.CoarseDeformer, built, high, low)
     watch.run("binding", core.Deformer, built, high, low)
     belt = np.abs(points[:, 2]) < 0.5
     ends = np.abs(points[belt, 2]) > 0.47
@@ -142,6 +143,7 @@ def run_heat(count):
     return watch, {}
 
 
+OWN = "operator", "applications"
 RUNS = {"operator": run_operator, "applications": run_applications, "peer": run_peer, "heat": run_heat}
 
 
@@ -169,10 +171,10 @@ def growth(values, counts):
 def main(counts):
     """Measure, and write tables and the plot."""
     few = [count for count in counts if count <= LARGEST]
-    results = {run: [measure(run, count) for count in (counts if run == "operator" else few)] for run in RUNS}
-    tables = [_stages("Operator", results["operator"], counts), _stages("Applications", results["applications"], few)]
+    results = {run: [measure(run, count) for count in (counts if run in OWN else few)] for run in RUNS}
+    tables = [_stages(run.capitalize(), results[run], counts) for run in OWN]
     tables += [_whole(results["operator"], counts), _against_peer(results, few), _geodesics(results, few)]
-    _plot(results, counts, few)
+    _plot(results, counts)
     tables[0].plots.append(PICTURE)
     text = "\n".join(table.markdown() for table in tables)
     DOCUMENT.write_text(f"# Time and memory\n\n{__doc__.splitlines()[0]}\n\n{text}", encoding="utf-8")
@@ -215,18 +217,18 @@ def _geodesics(results, counts):
     names = "geodesics, set-up", "geodesics, a source"
     rows = [
         [f"{count:,}", *(f"{run['seconds'][name]:.2f}" for name in names for run in runs)]
-        for count, *runs in zip(counts, results["applications"], results["heat"], strict=True)
+        for count, *runs in zip(counts, results["applications"], results["heat"], strict=False)
     ]
     header = ["points", "set-up, s", "heat method", "each source, s", "heat method"]
     note = "Distances from one point, after those from another, against the heat method of potpourri3d on points."
     return Table("Geodesics", header, rows, note)
 
 
-def _plot(results, counts, few):
+def _plot(results, counts):
     figure, panels = pyplot.subplots(1, 2, figsize=(12, 4), dpi=80, layout="constrained")
-    for axes, run, own in zip(panels, ("operator", "applications"), (counts, few), strict=True):
+    for axes, run in zip(panels, OWN, strict=True):
         for name in results[run][-1]["seconds"]:
-            axes.loglog(own, [result["seconds"][name] for result in results[run]], "o-", label=name, markersize=4)
+            axes.loglog(counts, [result["seconds"][name] for result in results[run]], "o-", label=name, markersize=4)
         axes.set(title=run.capitalize(), xlabel="points", ylabel="seconds")
         axes.grid(which="both", alpha=0.2)
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)  # beside the lines
