@@ -70,11 +70,16 @@ def result_names(obj):
     return sorted(layer.name for layer in obj.data.attributes if layer.name.startswith("lb_"))
 
 
+_OF_WINDOWS = {"SCREEN", "WINDOWMANAGER", "WORKSPACE"}  # which a second window adds
+
+
 def everything(obj):
     """All data of an object and its mesh, and how many data-blocks there are, to compare before and after."""
     data = obj.data
     record = {
-        "blocks": dict(Counter(type(block).__name__ for block in bpy.data.user_map())),
+        "blocks": dict(
+            Counter(type(block).__name__ for block in bpy.data.user_map() if block.id_type not in _OF_WINDOWS)
+        ),
         "object": (obj.name, obj.mode, data and data.name, [list(row) for row in obj.matrix_world]),
         "seen": (obj.select_get(), obj.hide_get(), obj.hide_viewport, obj.hide_render, obj.active_shape_key_index),
         "properties": _own(obj),
