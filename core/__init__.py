@@ -55,7 +55,7 @@ from .errors import (
     TooFewPointsError,
     UnresolvedModesError,
 )
-from .geometry import Prolongation, blue_noise_subset, check_points, estimate_normals
+from .geometry import Discs, Prolongation, blue_noise_subset, check_points, estimate_normals, surface_discs
 from .memory import points_that_fit
 from .operator import (
     LaplaceBeltrami,
@@ -75,6 +75,7 @@ __all__ = [
     "CoarseDeformer",
     "ComponentError",
     "Deformer",
+    "Discs",
     "Geodesics",
     "InvalidPointsError",
     "LaplaceBeltrami",
@@ -122,5 +123,6 @@ __all__ = [
     "smoothing_base",
     "solve_poisson",
     "spectral_filter",
+    "surface_discs",
     "wave_kernel_signature",
 ]

@@ -41,6 +41,17 @@ def result(attribute):
     return take
 
 
+def surface(path):
+    """The same points as dots and as discs, lit."""
+    dots, discs = coral(), coral()
+    for obj in (dots, discs):
+        bpy.context.view_layer.objects.active = obj
+        bpy.ops.meshfree.show_surface()
+    dots.meshfree.point_shape = "DOTS"
+    dots.meshfree.point_size = 0.5
+    row((dots, discs), path, legend=None)
+
+
 def shape_index(path):
     """The shape index: caps, ridges, saddles, valleys and cups."""
     obj = coral()
@@ -163,6 +174,7 @@ PICTURES = {
     "smooth": smooth,
     "mode_shape": mode_shape,
     "segment": segment,
+    "surface": surface,
     "shape_index": shape_index,
     "roughness": roughness,
     "signature": signature,

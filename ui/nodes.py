@@ -1,14 +1,19 @@
-"""The node trees that make values visible: round points for vertices, and colours for values."""
+"""The node trees that make values visible: round points or discs for vertices, and colours for values."""
+
+import math
 
 import bpy
 
+from ..operators.objects.attributes import DISC
 from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, has_input, is_intact, new_group
 from . import colormaps
 from .value_range import CLASSES, STEPPED
 
 MOST = "Viewport Points"  # input of the display: how many it draws there
+DISCS = "Discs"  # another: whether it draws discs
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
+_SIDES = 8  # of a disc
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
@@ -19,7 +24,7 @@ _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 def display_group():
     """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
-        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, MOST):
+        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, DISCS):
             return group
     group = new_group("Mesh-Free Display", DISPLAY_TAG)
     radius = add_input(group, "Radius", "Float", "Size of the points")
@@ -29,6 +34,7 @@ def display_group():
     add_input(group, "Material", "Material", "Colors of the points")
     most = add_input(group, MOST, "Int", "How many points the viewport draws at most, larger ones then; 0 for all")
     most.min_value = 0
+    add_input(group, DISCS, "Bool", f"Draw discs that lie in the surface, as the attribute {DISC} says")
 
     given = add_node(group, "NodeGroupInput", 0, 0)
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
@@ -41,9 +47,10 @@ def display_group():
     given_points = add_node(group, "GeometryNodeSetPointRadius", 3, -300)
     given_drawn = add_node(group, "GeometryNodeSeparateGeometry", 4, -300)
     faces = add_node(group, "GeometryNodeDeleteGeometry", 3, 100)  # loose vertices would be drawn over the points
-    joined = add_node(group, "GeometryNodeJoinGeometry", 5, 0)
-    colored = add_node(group, "GeometryNodeSetMaterial", 6, 0)
-    result = add_node(group, "NodeGroupOutput", 7, 0)
+    every = add_node(group, "GeometryNodeJoinGeometry", 5, -200)
+    joined = add_node(group, "GeometryNodeJoinGeometry", 10, 0)
+    colored = add_node(group, "GeometryNodeSetMaterial", 11, 0)
+    result = add_node(group, "NodeGroupOutput", 12, 0)
     compared = next(socket for socket in loose.inputs if socket.name == "A" and socket.type == "INT")
     for source, target in (
         (neighbors.outputs["Face Count"], compared),
@@ -58,9 +65,10 @@ def display_group():
         (size.outputs[0], given_points.inputs["Radius"]),
         (given_points.outputs["Points"], given_drawn.inputs["Geometry"]),
         (drawn, given_drawn.inputs["Selection"]),
-        (given_drawn.outputs["Selection"], joined.inputs["Geometry"]),
+        (given_drawn.outputs["Selection"], every.inputs["Geometry"]),
         (size.outputs[0], points.inputs["Radius"]),
-        (points.outputs["Points"], joined.inputs["Geometry"]),
+        (points.outputs["Points"], every.inputs["Geometry"]),
+        (_shaped(group, given, every.outputs["Geometry"], size.outputs[0]), joined.inputs["Geometry"]),
         (loose.outputs["Result"], faces.inputs["Selection"]),
         (parts.outputs["Mesh"], faces.inputs["Geometry"]),
         (faces.outputs["Geometry"], joined.inputs["Geometry"]),
@@ -92,6 +100,36 @@ def _thinned(group, given, parts):
     random = add_node(group, "FunctionNodeRandomValue", 5, -1000, data_type="FLOAT")
     drawn = _math(group, 6, -1000, "LESS_THAN", random.outputs["Value"], _math(group, 6, -800, "ADD", share, 1e-6))
     return drawn, _math(group, 6, -600, "POWER", share, -0.5)
+
+
+def _shaped(group, given, points, size):
+    """Add the nodes that make points into discs where that is asked for; return what is drawn."""
+    circle = add_node(group, "GeometryNodeMeshCircle", 6, -700, fill_type="NGON")
+    circle.inputs["Vertices"].default_value = _SIDES
+    circle.inputs["Radius"].default_value = 1.0 / math.cos(math.pi / _SIDES)  # no less than a disc
+    disc = add_node(group, "GeometryNodeInputNamedAttribute", 5, -500, data_type="FLOAT_VECTOR")
+    disc.inputs["Name"].default_value = DISC
+    turned = add_node(group, "FunctionNodeAlignRotationToVector", 6, -500, axis="Z")
+    length = add_node(group, "ShaderNodeVectorMath", 6, -900, operation="LENGTH")
+    placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -300)
+    realized = add_node(group, "GeometryNodeRealizeInstances", 8, -300)
+    chosen = add_node(group, "GeometryNodeSwitch", 9, -200, input_type="GEOMETRY")
+    unknown = _math(group, 7, -1300, "LESS_THAN", length.outputs["Value"], 1e-6)  # of points added since: like a dot
+    scale = _math(group, 7, -900, "MULTIPLY", _math(group, 7, -1100, "ADD", length.outputs["Value"], unknown), size)
+    for source, target in (
+        (disc.outputs["Attribute"], turned.inputs["Vector"]),
+        (disc.outputs["Attribute"], length.inputs[0]),
+        (points, placed.inputs["Points"]),
+        (circle.outputs["Mesh"], placed.inputs["Instance"]),
+        (turned.outputs["Rotation"], placed.inputs["Rotation"]),
+        (scale, placed.inputs["Scale"]),
+        (placed.outputs["Instances"], realized.inputs["Geometry"]),
+        (given.outputs[DISCS], chosen.inputs["Switch"]),
+        (points, chosen.inputs["False"]),
+        (realized.outputs["Geometry"], chosen.inputs["True"]),
+    ):
+        group.links.new(source, target)
+    return chosen.outputs["Output"]
 
 
 def color_plain(material, groups):

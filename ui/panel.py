@@ -3,7 +3,7 @@
 import bpy
 
 from ..operators.deform.binding import handled_object
-from ..operators.objects.attributes import APPLICATIONS, RESULTS, eigenvector_name, mode_number, point_count
+from ..operators.objects.attributes import APPLICATIONS, DISC, RESULTS, eigenvector_name, mode_number, point_count
 from ..operators.objects.modifiers import is_own
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
@@ -64,6 +64,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
         _draw_summary(layout, obj)
+        layout.operator("meshfree.show_surface")
         row = layout.row(align=True)
         row.operator("meshfree.analyze").modes = obj.meshfree.modes
         row.prop(obj.meshfree, "modes")
@@ -213,6 +214,8 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             layout.prop(obj.meshfree, "component")
         if range_node(obj) is not None:
             _draw_colors(layout, obj)
+        if DISC in attributes:
+            layout.prop(obj.meshfree, "point_shape")
         layout.prop(obj.meshfree, "point_size")
         column = layout.column(align=True, heading="Show")
         column.prop(obj.meshfree, "legend")

@@ -6,14 +6,14 @@ import bpy
 import gpu
 
 from ..operators.deform.binding import positions_now
-from ..operators.objects.attributes import MEAN_CURVATURE, read_attribute
+from ..operators.objects.attributes import DISC, MEAN_CURVATURE, read_attribute
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
-from ..operators.objects.modifiers import DISPLAY_TAG, get_input, set_input
+from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
 from . import colormaps, legend
 from .display import NAME, component, find_display, find_material, numbers, shown_attribute, without_unreached
-from .nodes import MOST, color_by_direction, color_by_number, color_plain, display_group, is_plain
+from .nodes import DISCS, MOST, color_by_direction, color_by_number, color_plain, display_group, is_plain
 from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
@@ -107,6 +107,17 @@ def show_result(obj, name):
     use_material_preview(bpy.context)
 
 
+def show_surface(obj):
+    """Show the points of an object as discs, in the colors that they have."""
+    modifier, _ = _add_display(obj)
+    if not has_input(modifier.node_group, DISCS):
+        radius, material = (get_input(modifier, name) for name in ("Radius", "Material"))
+        modifier.node_group = display_group()
+        set_input(modifier, "Radius", radius)
+        set_input(modifier, "Material", material)
+    resize(obj)
+
+
 def use_material_preview(context):
     """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
     space = context.space_data
@@ -127,6 +138,8 @@ def resize(obj):
     elif not kept.spacing:
         kept.spacing = typical_distance(positions_now(obj))
     set_input(modifier, "Radius", _radius(kept))
+    if has_input(modifier.node_group, DISCS):  # those of an earlier version have none
+        set_input(modifier, DISCS, kept.point_shape == "DISCS" and DISC in obj.data.attributes)
     obj.update_tag()
 
 
@@ -207,6 +220,7 @@ _HANDLERS = {
     "colors_changed": recolor,
     "size_changed": resize,
     "groups_changed": show_groups,
+    "surface_found": show_surface,
     "result_written": show_result,
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,

@@ -1,6 +1,6 @@
 """What the points tell: neighbourhoods, components, normals, boundary, bandwidth and pairs; `cloud` runs the stages."""
 
-from .cloud import estimate_normals, read_cloud
+from .cloud import Discs, estimate_normals, read_cloud, surface_discs
 from .components import SMALLEST, move_apart
 from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights, projected_distance
 from .nearest import ROUNDS, SMOOTH, find_nearest

@@ -20,6 +20,7 @@ from .points import ScaledPoints, check_boundary, check_distances, check_points,
 from .quadrics import Quadrics, check_surface
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
+_DRAWN = 20  # points that a surface needs at least, to be drawn
 _NARROW = 0.6  # h over the depth of the surface that is too wide
 _MANY = 0.1  # share of the points that tells of depth, or of noise: that is the scanner's, not of a few places
 
@@ -132,19 +133,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     report("Normals", 0.0)
     check_options(options)
     points = check_points(points)
-    needed = options.neighbors + 1
-    scaled = scale_points(points, needed)
-    report("Normals", 0.02)
-    sample = leave_outliers(scaled, needed, lambda: report("Normals", 0.04))
-    report("Normals", 0.06)
-    sample = divide_components(sample, needed)
-    report("Normals", 0.1)
-    surface = fit_surface(sample, options.sheets)
-    report("Normals", 0.12)
-    surface = remove_noise(surface, options)
-    report("Normals", 0.16)
-    if options.sheets:
-        surface = divide_sheets(surface, needed)
+    scaled, surface = read_surface(points, options, report)
     sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
 
     report("Normals", 0.18)
@@ -194,6 +183,30 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
             narrow=np.mean(lengths > _NARROW * depth(nearest, boundary.distance)) > _MANY,
         ),
     )
+
+
+def read_surface(points, options, report):
+    """Go from coordinates, checked, to quadrics.
+
+    Returns
+    -------
+    ScaledPoints
+        All distinct points.
+    Surface
+        Of those that take part.
+    """
+    needed = options.neighbors + 1
+    scaled = scale_points(points, needed)
+    report("Normals", 0.02)
+    sample = leave_outliers(scaled, needed, lambda: report("Normals", 0.04))
+    report("Normals", 0.06)
+    sample = divide_components(sample, needed)
+    report("Normals", 0.1)
+    surface = fit_surface(sample, options.sheets)
+    report("Normals", 0.12)
+    surface = remove_noise(surface, options)
+    report("Normals", 0.16)
+    return scaled, divide_sheets(surface, needed) if options.sheets else surface
 
 
 def leave_outliers(scaled, needed, report=lambda: None):
@@ -438,3 +451,71 @@ def estimate_normals(points, options=LaplacianOptions()):
     """
     cloud = read_cloud(points, options)
     return cloud.scaled.scatter(cloud.normals, (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """Discs in the tangent planes of points, made by `surface_discs`.
+
+    Attributes
+    ----------
+    normals : ndarray, (n, 3)
+        Unit normals, outwards on closed surfaces; the z axis at points that lie off the surface.
+    radii : ndarray, (n,)
+        As far as the part of the surface reaches that is nearest to the point [L], so that all together leave no hole.
+    """
+
+    normals: np.ndarray
+    radii: np.ndarray
+
+
+def surface_discs(points, *, progress=None):
+    """Find discs that cover the surface as far as the points tell it, to be drawn: much faster than the operator.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Coordinates [L].
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    Discs
+        Where there are no neighbors, at open boundaries and in holes, they reach a spacing far.
+
+    Raises
+    ------
+    PointCloudError
+        The points have no tangent planes; see `build_laplacian`.
+
+    See Also
+    --------
+    estimate_normals : The normals alone, where noise was smoothed.
+
+    Examples
+    --------
+    On the unit sphere with 800 points, whose spacing is ``sqrt(4 pi / 800)``, 0.13:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> discs = core.surface_discs(points)
+    >>> print(discs.radii.mean().round(2), np.abs(discs.normals - points).max().round(2))
+    0.08 0.0
+    """
+    report = progress or (lambda stage, fraction: None)
+    report("Normals", 0.0)
+    scaled, surface = read_surface(check_points(points), LaplacianOptions(neighbors=_DRAWN, projection="off"), report)
+    sample = surface.sample
+    oriented = orient_normals(sample.nearest, surface.quadrics.normals)
+    report("Discs", 0.5)
+    curvature, everywhere = surface.quadrics.gaussian_curvature, no_boundary(len(oriented))
+    cells = measure_cells(
+        sample.nearest, oriented, curvature, everywhere, sample.component, lambda: report("Discs", 0.6)
+    )
+    radii = cells.reach * scaled.scale
+    kept = sample.scaled
+    return Discs(kept.scatter(oriented, (0.0, 0.0, 1.0)), kept.scatter(radii, np.median(radii)))

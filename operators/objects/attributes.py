@@ -33,6 +33,7 @@ BOUNDARY = "lb_boundary"
 COMPONENT = "lb_component"
 TRUST = "lb_trust"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"  # principal ones
+DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
 SEGMENT = "lb_segment"
 FIELD = "lb_field"
@@ -45,7 +46,7 @@ HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # f
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT, TRUST
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {  # all others are FLOAT
-    **dict.fromkeys((NORMAL, DIRECTION_1, DISPLACEMENT, REST), "FLOAT_VECTOR"),
+    **dict.fromkeys((NORMAL, DIRECTION_1, DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
     **dict.fromkeys((COMPONENT, SEGMENT), "INT"),
     BOUNDARY: "BOOLEAN",
 }

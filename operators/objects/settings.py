@@ -239,6 +239,16 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         step=5,
         update=_resize,
     )
+    point_shape: EnumProperty(
+        name="Point Shape",
+        description="What points are drawn as, where Show as Surface has found how they lie",
+        items=(
+            ("DISCS", "Discs", "Discs in the surface, as large as the gaps between the points ask"),
+            ("DOTS", "Dots", "Round dots of one size"),
+        ),
+        default="DISCS",
+        update=_resize,
+    )
     show_groups: BoolProperty(
         name="Group Colors",
         description="Color the points of the groups below, over what is on show",

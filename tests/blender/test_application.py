@@ -11,6 +11,7 @@ from tests.blender.test_bad_input import CLOUDS
 from tests.blender.test_smooth import rough_sphere, shown_points
 
 SETTINGS = {
+    "show_surface": {},
     "principal_curvatures": {},
     "roughness": {},
     "smooth": {},

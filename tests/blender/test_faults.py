@@ -54,6 +54,7 @@ def animated():
 RUNS = [
     (colored, "analyze", {"modes": 4}),
     (shared, "analyze", {}),
+    (colored, "show_surface", {}),
     (handled, "spectrum", {"count": 5}),
     (handled, "principal_curvatures", {}),
     (keyed, "roughness", {}),

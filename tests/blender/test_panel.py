@@ -45,6 +45,7 @@ OPERATORS = (
     "select_grow",
     "select_boundary",
     "separate_by_segment",
+    "show_surface",
     "signature",
     "smooth",
     "spectrum",

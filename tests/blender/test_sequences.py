@@ -22,6 +22,7 @@ STEPS = [
     ("colormap", {"attribute": "lb_area"}),
     ("principal_curvatures", {"display": "CURVEDNESS"}),
     ("roughness", {}),
+    ("show_surface", {}),
     ("segment", {"parts": 3}),
     ("segment", {"parts": 2, "vertex_groups": True}),
     ("separate_by_segment", {}),

@@ -37,6 +37,7 @@ SHOWN = [
     "smooth_points",
     "solve_poisson",
     "spectral_filter",
+    "surface_discs",
     "wave_kernel_signature",
 ]
 SECTIONS = ["Parameters", "Attributes", "Returns", "Raises", "See Also", "Notes", "References", "Examples"]

@@ -1,0 +1,43 @@
+"""Show points as the surface that they lie on: as discs, before anything is analyzed."""
+
+import bpy
+import numpy as np
+
+from ...core import surface_discs
+from ..objects.attributes import DISC, tag_changed, write_attribute
+from ..objects.handlers import tell
+from ..objects.reading import read_points, typical_distance
+from ..running import cache
+from ..running.application import ApplicationOperator
+
+
+class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
+    """Draw each point as a disc in the surface, as large as the gaps around it, lit as a surface is"""
+
+    bl_idname = "meshfree.show_surface"
+    bl_label = "Show as Surface"
+    writes = (DISC,)
+
+    def plan(self, context, obj):
+        reading = read_points(context, obj)
+        local = reading.local(reading.points)
+
+        def compute(progress):
+            discs = cache.fetch(cache.content("discs", local), lambda: surface_discs(local, progress=progress))
+            spacing = typical_distance(local) or np.median(discs.radii)  # none where many points share a place
+            return discs.normals * (discs.radii / spacing)[:, None]
+
+        return compute
+
+    def write(self, context, obj, result):
+        write_attribute(obj.data, DISC, result)
+        obj.meshfree.point_shape = "DISCS"
+        tag_changed(obj.data)
+        return [f"{obj.name}: {len(result):,} points are shown as discs"]
+
+    def conclude(self, context, objects):
+        for obj in objects:
+            tell("surface_found", obj)
+
+
+CLASSES = (MESHFREE_OT_show_surface,)

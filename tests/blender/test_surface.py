@@ -1,0 +1,109 @@
+"""Points as discs: where they lie, how large they are, and what the display makes of them."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils.bvhtree import BVHTree
+from numpy.testing import assert_allclose
+
+from tests.blender.clouds import add_object, attribute, local_points, sphere_points
+
+
+@pytest.fixture
+def obj():
+    return add_object(sphere_points(600))
+
+
+def drawn(obj):
+    """Corners of all that the display draws, as many rows as there are points."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    mesh = obj.evaluated_get(graph).to_mesh()
+    corners = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", corners.reshape(-1))
+    return corners.reshape(len(obj.data.vertices), -1, 3).astype(np.float64)
+
+
+def test_each_point_is_a_disc_in_its_tangent_plane(obj):
+    assert bpy.ops.meshfree.show_surface() == {"FINISHED"}
+    points, corners = local_points(obj), drawn(obj)
+    assert corners.shape[1] == 8
+    assert_allclose(corners.mean(axis=1), points, atol=1e-5)
+    offset = corners - points[:, None]
+    normals = attribute(obj, "lb_disc") / np.linalg.norm(attribute(obj, "lb_disc"), axis=1)[:, None]
+    size = np.linalg.norm(offset, axis=2)
+    assert np.abs(np.einsum("ijk,ik->ij", offset, normals)).max() < 1e-5
+    assert np.abs(np.einsum("ij,ij->i", normals, points)).min() > 0.98
+    assert_allclose(size, size[:, :1] * np.ones(8), rtol=1e-3)
+
+
+def test_discs_are_those_of_core_at_the_default_size(obj, core):
+    bpy.ops.meshfree.show_surface()
+    size = np.linalg.norm(drawn(obj) - local_points(obj)[:, None], axis=2)[:, 0]
+    radii = core.surface_discs(local_points(obj)).radii
+    assert_allclose(size, 1.1 * radii / np.cos(np.pi / 8.0), rtol=1e-3)
+
+
+def test_discs_keep_the_scale_of_the_object_out(obj, core):
+    obj.scale = 2.0, 2.0, 2.0
+    bpy.context.view_layer.update()
+    bpy.ops.meshfree.show_surface()
+    size = np.linalg.norm(drawn(obj) - local_points(obj)[:, None], axis=2)[:, 0]
+    assert_allclose(size, 1.1 * core.surface_discs(local_points(obj)).radii / np.cos(np.pi / 8.0), rtol=1e-3)
+
+
+def test_point_shape_and_point_size_answer_at_once(obj):
+    bpy.ops.meshfree.show_surface()
+    before = drawn(obj)
+    obj.meshfree.point_size *= 2.0
+    points = local_points(obj)[:, None]
+    assert_allclose(drawn(obj) - points, 2.0 * (before - points), atol=1e-5)
+    obj.meshfree.point_shape = "DOTS"
+    graph = bpy.context.evaluated_depsgraph_get()
+    assert len(obj.evaluated_get(graph).to_mesh().vertices) == 0
+    bpy.ops.meshfree.show_surface()
+    assert obj.meshfree.point_shape == "DISCS"
+    assert drawn(obj).shape[1] == 8
+
+
+def test_results_color_the_discs(obj, extension):
+    bpy.ops.meshfree.show_surface()
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert extension.ui.display.shown_attribute(obj) == "lb_area"
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    assert len(mesh.vertices) == 8 * 600
+    values = np.empty(len(mesh.vertices), np.float32)
+    mesh.attributes["lb_area"].data.foreach_get("value", values)
+    assert_allclose(values.reshape(600, 8), np.repeat(attribute(obj, "lb_area")[:, None], 8, axis=1))
+
+
+def test_a_point_that_was_added_since_is_still_seen(obj):
+    bpy.ops.meshfree.show_surface()
+    obj.data.vertices.add(1)
+    obj.data.vertices[600].co = 3.0, 0.0, 0.0
+    obj.data.update()
+    assert np.linalg.norm(drawn(obj)[600] - [3.0, 0.0, 0.0], axis=1).min() > 0.01
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="meshes become point clouds from Blender 4.5 on")
+def test_point_clouds_are_drawn_as_discs_too(obj):
+    bpy.ops.meshfree.convert()
+    assert bpy.ops.meshfree.show_surface() == {"FINISHED"}
+    assert len(attribute(obj, "lb_disc")) == 600
+
+
+@pytest.mark.parametrize("count", [600, 3000])
+def test_a_closed_cloud_shows_no_hole_from_any_side(count):
+    obj = add_object(sphere_points(count))
+    bpy.ops.meshfree.show_surface()
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    discs = BVHTree.FromPolygons([vertex.co for vertex in mesh.vertices], [face.vertices for face in mesh.polygons])
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        frame = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        radius, angle = 0.95 * np.sqrt(rng.random(400)), 2.0 * np.pi * rng.random(400)
+        starts = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(400, 3.0)], axis=1) @ frame.T
+        for start in starts:
+            place, _, _, _ = discs.ray_cast(start, -frame[:, 2])
+            assert place is not None
+            assert np.array(place) @ frame[:, 2] > 0.0  # not one of the far side

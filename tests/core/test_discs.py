@@ -1,0 +1,57 @@
+"""Discs for drawing: they cover the surface, are no larger than its gaps ask, and lie in the tangent planes."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial import cKDTree
+
+import core
+from benchmarks.samplings import random_sphere, torus_points, uneven_sphere
+
+SHAPES = {
+    "sphere": (random_sphere, 4.0 * np.pi),
+    "uneven sphere": (uneven_sphere, 4.0 * np.pi),
+    "torus": (torus_points, 1.6 * np.pi**2),
+}
+
+
+def covered(points, radii, places):
+    """Share of places that lie on the disc of one of the points near them."""
+    distance, index = cKDTree(points).query(places, k=30)
+    return np.mean((distance <= radii[index]).any(axis=1))
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_they_cover_the_surface_and_not_much_more(name):
+    sample, area = SHAPES[name]
+    points = sample(4000)
+    discs = core.surface_discs(points)
+    assert covered(points, 1.03 * discs.radii, sample(20_000, seed=7)) > 0.999
+    assert covered(points, 0.8 * discs.radii, sample(20_000, seed=7)) < 0.99
+    assert np.pi * np.sum(discs.radii**2) < 4.0 * area
+
+
+def test_normals_point_outwards():
+    points = random_sphere(2000)
+    assert np.einsum("ij,ij->i", core.surface_discs(points).normals, points).min() > 0.99
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_they_grow_with_the_points(scale):
+    points = random_sphere(500)
+    discs, others = core.surface_discs(points), core.surface_discs(scale * points)
+    assert_allclose(others.radii, scale * discs.radii, rtol=1e-9)
+    assert_allclose(others.normals, discs.normals, atol=1e-9)
+
+
+def test_a_point_off_the_surface_gets_a_disc_like_the_others():
+    points = np.vstack([random_sphere(800), [[9.0, 0.0, 0.0]]])
+    discs = core.surface_discs(points)
+    assert_allclose(discs.normals[-1], [0.0, 0.0, 1.0])
+    assert discs.radii[-1] == np.median(discs.radii[:-1])
+
+
+def test_few_points_are_enough():
+    assert np.isfinite(core.surface_discs(random_sphere(40)).radii).all()
+    with pytest.raises(core.TooFewPointsError):
+        core.surface_discs(random_sphere(15))
