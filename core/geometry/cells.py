@@ -15,6 +15,7 @@ _SAME = 1e-9  # share of the longest cut, or of their product, by which two that
 _BENT = -0.5  # least Gaussian curvature times the squared reach, where the fit is poor
 _OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
+_CLOSEST = 1e-6  # spacings that a cut lies off its point, at least: by `_SAME`, a longer one hides the others
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,7 @@ def _cuts(nearest, normals, gaussian_curvature, boundary, component, rows, wider
     # The arc leaves the point along the chord, bent away from it by a third of the turn.
     way = (chord + ((right - left) / 6.0)[:, :, None] * other) @ frame
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -0.25, 0.25))
+    length = np.maximum(length, _CLOSEST * nearest.spacing[rows, None])
     cuts = way * (counted / (np.maximum(np.linalg.norm(way, axis=2), 1e-300) * length))[:, :, None]
     inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])
     outward = np.einsum("iac,ick->iak", boundary.outward[rows], frame) / inside[:, :, None]

@@ -57,6 +57,11 @@ def test_a_jump_of_density_leaves_no_gap(ratio):
     assert cell_areas(points).sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
 
 
+def test_points_that_smoothing_brings_together_have_cells():
+    grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    assert (cell_areas(grid, sheets=False, neighbors=20, bandwidth_factor=1.0) > 1e-3).all()
+
+
 def test_the_reach_is_that_of_the_wider_spacing():
     # Rows four times finer along than across.
     x, y = np.meshgrid(np.arange(160) / 4.0, np.arange(40.0))
