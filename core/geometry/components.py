@@ -22,7 +22,7 @@ def label_components(nearest):
         The largest component is 0. Those of fewer than 50 points, which get no operator, are -1.
     """
     index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
-    reach = _GAP * distance[:, _REACH - 1]
+    reach = _GAP * distance[:, :_REACH][:, -1]  # of eight points there are seven neighbors
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
     close = number_by_size(label_connected(index, strict))
     large = close >= 0

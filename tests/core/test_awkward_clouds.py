@@ -352,6 +352,7 @@ def calls():
     yield core.build_laplacian, {"points": points}, {"boundary": top, "boundary_distance": np.full(n, np.inf)}
     yield core.estimate_areas, {}, {"points": points, "normals": points, "options": core.LaplacianOptions()}
     yield core.estimate_normals, {}, {"points": points, "options": core.LaplacianOptions()}
+    yield core.surface_discs, {}, {"points": points}
     yield core.check_points, {}, {"points": points}
     yield core.blue_noise_subset, {}, {"points": points, "count": 100}
     yield core.Prolongation, {}, {"points": points, "subset": np.arange(150), "normals": points[:150]}

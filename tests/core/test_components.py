@@ -49,6 +49,11 @@ class TestLabels:
     def test_one_surface_is_one_component(self, points):
         assert np.all(label_components(find_nearest(points)) == 0)
 
+    def test_eight_points_are_enough(self):
+        cube = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        options = core.LaplacianOptions(bandwidth="local", neighbors=6, bandwidth_factor=1.0)
+        np.testing.assert_array_equal(core.build_laplacian(cube, options=options).component, 0)
+
     def test_the_gap_is_measured_in_spacings(self):
         square = grid_points(range(20), range(20), [0.0])
         for scale in (1.0, 1e-3):
