@@ -4,7 +4,7 @@ import math
 
 import bpy
 
-from ..operators.objects.attributes import DISC
+from ..operators.objects.attributes import CORNER, DISC
 from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, has_input, is_intact, new_group
 from . import colormaps
 from .value_range import CLASSES, STEPPED
@@ -113,6 +113,9 @@ def _shaped(group, given, points, size):
     length = add_node(group, "ShaderNodeVectorMath", 6, -900, operation="LENGTH")
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -300)
     realized = add_node(group, "GeometryNodeRealizeInstances", 8, -300)
+    marked = add_node(group, "GeometryNodeStoreNamedAttribute", 8, -500, data_type="BOOLEAN")
+    marked.inputs["Name"].default_value = CORNER
+    next(socket for socket in marked.inputs if socket.name == "Value" and socket.type == "BOOLEAN").default_value = True
     chosen = add_node(group, "GeometryNodeSwitch", 9, -200, input_type="GEOMETRY")
     unknown = _math(group, 7, -1300, "LESS_THAN", length.outputs["Value"], 1e-6)  # of points added since: like a dot
     scale = _math(group, 7, -900, "MULTIPLY", _math(group, 7, -1100, "ADD", length.outputs["Value"], unknown), size)
@@ -126,7 +129,8 @@ def _shaped(group, given, points, size):
         (placed.outputs["Instances"], realized.inputs["Geometry"]),
         (given.outputs[DISCS], chosen.inputs["Switch"]),
         (points, chosen.inputs["False"]),
-        (realized.outputs["Geometry"], chosen.inputs["True"]),
+        (realized.outputs["Geometry"], marked.inputs["Geometry"]),
+        (marked.outputs["Geometry"], chosen.inputs["True"]),
     ):
         group.links.new(source, target)
     return chosen.outputs["Output"]

@@ -6,6 +6,7 @@ import bpy
 import gpu
 
 from ..operators.deform.binding import positions_now
+from ..operators.deform.nodes import find_deform
 from ..operators.objects.attributes import DISC, MEAN_CURVATURE, read_attribute
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
@@ -48,6 +49,7 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
         set_input(modifier, "Radius", radius)
     elif new or not _sized_by_hand(obj):
         resize(obj)
+    reshape(obj)
     _color(obj, name, values)
 
 
@@ -59,6 +61,11 @@ def _add_display(obj):
         modifier = obj.modifiers.new(NAME, "NODES")
         modifier.node_group = display_group()
         set_input(modifier, MOST, viewport_points())
+    elif not has_input(modifier.node_group, DISCS):  # of an earlier version
+        radius, material = (get_input(modifier, name) for name in ("Radius", "Material"))
+        modifier.node_group = display_group()
+        set_input(modifier, "Radius", radius)
+        set_input(modifier, "Material", material)
     modifier.use_pin_to_last = True
     obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
     return modifier, new
@@ -109,12 +116,7 @@ def show_result(obj, name):
 
 def show_surface(obj):
     """Show the points of an object as discs, in the colors that they have."""
-    modifier, _ = _add_display(obj)
-    if not has_input(modifier.node_group, DISCS):
-        radius, material = (get_input(modifier, name) for name in ("Radius", "Material"))
-        modifier.node_group = display_group()
-        set_input(modifier, "Radius", radius)
-        set_input(modifier, "Material", material)
+    _add_display(obj)
     resize(obj)
 
 
@@ -138,8 +140,15 @@ def resize(obj):
     elif not kept.spacing:
         kept.spacing = typical_distance(positions_now(obj))
     set_input(modifier, "Radius", _radius(kept))
-    if has_input(modifier.node_group, DISCS):  # those of an earlier version have none
-        set_input(modifier, DISCS, kept.point_shape == "DISCS" and DISC in obj.data.attributes)
+    reshape(obj)
+
+
+def reshape(obj):
+    """Draw discs where that is chosen and they are known; while handles move the points, dots, which need no turn."""
+    modifier = find_display(obj)
+    if modifier is not None and has_input(modifier.node_group, DISCS):
+        chosen = obj.meshfree.point_shape == "DISCS" and DISC in obj.data.attributes
+        set_input(modifier, DISCS, chosen and find_deform(obj) is None)
     obj.update_tag()
 
 
@@ -219,6 +228,7 @@ def _views():
 _HANDLERS = {
     "colors_changed": recolor,
     "size_changed": resize,
+    "shape_changed": reshape,
     "groups_changed": show_groups,
     "surface_found": show_surface,
     "result_written": show_result,

@@ -80,6 +80,8 @@ class Cloud:
         Of local quadrics; zero where the options do not ask for it.
     cell_areas : ndarray, (m,)
         Areas of the points' Voronoi cells.
+    reach : ndarray, (m,)
+        Distance of the furthest corner of each cell.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
     misfit : ndarray, (m,)
@@ -100,6 +102,7 @@ class Cloud:
     shape_operator: np.ndarray
     gaussian_curvature: np.ndarray
     cell_areas: np.ndarray
+    reach: np.ndarray
     spacing: np.ndarray
     misfit: np.ndarray
     roughness: np.ndarray
@@ -169,6 +172,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         shape_operator=side[:, None, None] * quadrics.shape_operator,
         gaussian_curvature=gaussian,
         cell_areas=cells.areas,
+        reach=cells.reach,
         spacing=nearest.spacing,
         misfit=quadrics.misfit,
         # What sticks out is noise where there is any, and shape where not.

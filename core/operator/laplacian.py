@@ -41,6 +41,8 @@ class LaplaceBeltrami:
         tangent t, positive where the surface bends away from the normal.
     gaussian_curvature : ndarray, (n,)
         Product of the two principal curvatures [1 / L^2], from local quadrics; zero without the curvature correction.
+    reach : ndarray, (n,)
+        Distance of the furthest corner of the Voronoi cell [L]: discs of this radius leave no hole.
     boundary : ndarray, (n,) bool
         Points at a boundary of the surface.
     near_boundary : ndarray, (n,) bool
@@ -77,6 +79,7 @@ class LaplaceBeltrami:
     areas: np.ndarray
     shape_operator: np.ndarray
     gaussian_curvature: np.ndarray
+    reach: np.ndarray
     boundary: np.ndarray
     near_boundary: np.ndarray
     boundary_distance: np.ndarray
@@ -347,6 +350,7 @@ def build_laplacian(
         areas=scaled.scatter(solution.areas * scaled.scale**2 / scaled.copies, NO_AREA),
         shape_operator=scaled.scatter(cloud.shape_operator / scaled.scale, 0.0),
         gaussian_curvature=scaled.scatter(cloud.gaussian_curvature / scaled.scale**2, 0.0),
+        reach=scaled.scatter(cloud.reach * scaled.scale, np.median(cloud.reach) * scaled.scale),
         boundary=scaled.scatter(cloud.boundary.at_boundary, False),
         near_boundary=scaled.scatter(cloud.boundary.reached(pairs.lengths), False),
         boundary_distance=scaled.scatter(cloud.boundary.distance[:, 0] * scaled.scale, np.inf),

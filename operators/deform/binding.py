@@ -24,6 +24,7 @@ from ..objects.attributes import (
 )
 from ..objects.counting import members, summarize
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
+from ..objects.handlers import tell
 from ..objects.options import settings_values
 from ..objects.reading import TYPES, fingerprint, sharing_objects
 from .nodes import find_deform, is_baked
@@ -346,6 +347,7 @@ def forget(obj):
     modifier = find_deform(obj)
     if modifier is not None:
         obj.modifiers.remove(modifier)
+        tell("shape_changed", obj)
 
 
 def goal(obj, constraints, rest, depsgraph=None):

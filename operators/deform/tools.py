@@ -9,6 +9,7 @@ from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import REST, own_positions, point_count, read_attribute, write_own_positions
 from ..objects.groups import HANDLE, assign, check_assignable, handle_names, has_group
+from ..objects.handlers import tell
 from ..objects.modifiers import get_input
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
@@ -117,6 +118,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
             empties.append(moved_by)
         record(obj, made.rest, made.matrix, made.constraints, empties)
         add_deform(obj)
+        tell("shape_changed", obj)
         # Blender crashes when it draws what a render's handlers change, and handles are there to be animated.
         context.scene.render.use_lock_interface = True
         live.keep(obj, made)

@@ -34,6 +34,7 @@ COMPONENT = "lb_component"
 TRUST = "lb_trust"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"  # principal ones
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
+CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
 SEGMENT = "lb_segment"
 FIELD = "lb_field"

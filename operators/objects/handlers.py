@@ -6,6 +6,7 @@ import bpy
 _OWN = {
     "colors_changed": [],  # (obj) by a setting: ui/show.py
     "size_changed": [],  # (obj) of its points, by a setting: ui/show.py
+    "shape_changed": [],  # (obj) of its points, dots or discs: ui/show.py
     "groups_changed": [],  # (obj) what they hold, or whether they are colored: ui/show.py
     "surface_found": [],  # (obj) of its discs, which are to be shown: ui/show.py
     "result_written": [],  # (obj, name of the attribute to show, empty for the one on show): ui/show.py

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ...core import PointCloudError, check_points
 from ...core.geometry.boundary import FEWEST
-from .attributes import own_positions, point_count
+from .attributes import CORNER, own_positions, point_count
 from .counting import members
 from .groups import chosen_members
 from .modifiers import is_own, modifier_settings
@@ -49,13 +49,13 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
     edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
     if obj.mode not in modes or edited:
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
+    # Convert takes what modifiers show, and ours shows dots or discs.
+    kind = "vertices" if obj.type == "MESH" else "points"
+    lost = obj.meshfree.point_count and not point_count(obj.data)
+    if lost or CORNER in obj.data.attributes:
+        what = f"lost its {kind}" if lost else "corners of discs in place of its points"
+        return f'"{obj.name}" has {what}. Undo, and instead of Object > Convert use Convert under Points and Groups'
     if not point_count(obj.data):
-        kind = "vertices" if obj.type == "MESH" else "points"
-        if obj.meshfree.point_count:  # it had some: Convert takes what modifiers show, and ours shows points
-            return (
-                f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under'
-                " Points and Groups"
-            )
         return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
 
@@ -229,6 +229,12 @@ def find_object(uid):
 def spacing(data) -> float:
     """Typical distance between neighbouring points of a mesh or a point cloud in local lengths; 0 if unknown."""
     return typical_distance(own_positions(data))
+
+
+def discs(normals, radii, points):
+    """Discs as the display takes them, (n, 3): unit normals times radii in spacings."""
+    spacing = typical_distance(points) or np.median(radii)  # none where many points share a place
+    return normals * (radii / spacing)[:, None]
 
 
 def typical_distance(positions) -> float:

@@ -33,6 +33,10 @@ def _resize(settings, context):
     tell("size_changed", settings.id_data)
 
 
+def _reshape(settings, _context):
+    tell("shape_changed", settings.id_data)
+
+
 def _show_groups(settings, context):
     tell("groups_changed", settings.id_data)
 
@@ -247,7 +251,7 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
             ("DOTS", "Dots", "Round dots of one size"),
         ),
         default="DISCS",
-        update=_resize,
+        update=_reshape,
     )
     show_groups: BoolProperty(
         name="Group Colors",

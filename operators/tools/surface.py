@@ -1,12 +1,11 @@
 """Show points as the surface that they lie on: as discs, before anything is analyzed."""
 
 import bpy
-import numpy as np
 
 from ...core import surface_discs
 from ..objects.attributes import DISC, tag_changed, write_attribute
 from ..objects.handlers import tell
-from ..objects.reading import read_points, typical_distance
+from ..objects.reading import discs, read_points
 from ..running import cache
 from ..running.application import ApplicationOperator
 
@@ -23,9 +22,8 @@ class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
         local = reading.local(reading.points)
 
         def compute(progress):
-            discs = cache.fetch(cache.content("discs", local), lambda: surface_discs(local, progress=progress))
-            spacing = typical_distance(local) or np.median(discs.radii)  # none where many points share a place
-            return discs.normals * (discs.radii / spacing)[:, None]
+            found = cache.fetch(cache.content("discs", local), lambda: surface_discs(local, progress=progress))
+            return discs(found.normals, found.radii, local)
 
         return compute
 

@@ -9,6 +9,7 @@ RESULTS = [
     "lb_area",
     "lb_boundary",
     "lb_component",
+    "lb_disc",
     "lb_gaussian_curvature",
     "lb_mean_curvature",
     "lb_normal",

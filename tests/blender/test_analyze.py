@@ -14,10 +14,13 @@ def expected(core, obj):
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     laplacian = core.build_laplacian(local_points(obj) @ matrix.T, options=core.LaplacianOptions(orient=True))
     normals = laplacian.normals @ matrix
+    squared = ((laplacian.points[:, None] - laplacian.points) ** 2).sum(axis=2)
+    spacing = np.median(np.sqrt(np.sort(squared, axis=1)[:, 8] * np.pi / 8.0))
     return {
         "lb_area": laplacian.areas,
         "lb_boundary": laplacian.boundary,
         "lb_component": laplacian.component,
+        "lb_disc": normals / np.linalg.norm(normals, axis=1)[:, None] * (laplacian.reach / spacing)[:, None],
         "lb_gaussian_curvature": laplacian.gaussian_curvature,
         "lb_mean_curvature": core.mean_curvature(laplacian),
         "lb_normal": normals / np.linalg.norm(normals, axis=1)[:, None],
@@ -49,7 +52,7 @@ def test_types_of_the_attributes():
     obj = add_object(sphere_points())
     bpy.ops.meshfree.analyze()
     types = {name: obj.data.attributes[name].data_type for name in RESULTS}
-    assert types.pop("lb_normal") == "FLOAT_VECTOR"
+    assert {types.pop("lb_normal"), types.pop("lb_disc")} == {"FLOAT_VECTOR"}
     assert types.pop("lb_boundary") == "BOOLEAN"
     assert types.pop("lb_component") == "INT"
     assert set(types.values()) == {"FLOAT"}

@@ -357,10 +357,12 @@ class TestObstacles:
             bpy.ops.meshfree.analyze()
 
     @POINT_CLOUDS
-    def test_points_lost_by_blenders_own_conversion(self, cloud):
+    @pytest.mark.parametrize("shape", ["DOTS", "DISCS"])
+    def test_points_lost_by_blenders_own_conversion(self, cloud, shape):
+        cloud.meshfree.point_shape = shape
         bpy.ops.meshfree.analyze()
         bpy.ops.object.convert(target="POINTCLOUD")
-        with pytest.raises(RuntimeError, match="has lost its points. Undo, and instead of Object > Convert"):
+        with pytest.raises(RuntimeError, match="Undo, and instead of Object > Convert"):
             bpy.ops.meshfree.analyze()
 
 
@@ -392,6 +394,7 @@ class TestOrdinaryEdits:
         assert cloud.meshfree.component_count == 2
         assert "lb_eigenvalues" not in cloud
         assert not [name for name in cloud.data.attributes.keys() if "eigenvector" in name]
+        cloud.meshfree.point_shape = "DOTS"
         ((count, *_),) = display_points(cloud)
         assert count == 1100
 

@@ -247,6 +247,7 @@ def test_points_after_modifiers():
 
 def test_it_shows_colors():
     cloud = add_pointcloud(rough_sphere(1000))
+    cloud.meshfree.point_shape = "DOTS"
     bpy.ops.meshfree.analyze()
     ((count, names, radii, materials),) = display_points(cloud)
     assert count == 1000

@@ -107,3 +107,24 @@ def test_a_closed_cloud_shows_no_hole_from_any_side(count):
             place, _, _, _ = discs.ray_cast(start, -frame[:, 2])
             assert place is not None
             assert np.array(place) @ frame[:, 2] > 0.0  # not one of the far side
+
+
+def test_an_analysis_finds_discs_too(obj):
+    bpy.ops.meshfree.analyze()
+    assert drawn(obj).shape[1] == 8
+    bpy.ops.meshfree.show_surface()
+    normals = attribute(obj, "lb_disc")
+    bpy.ops.meshfree.analyze()
+    cosine = np.einsum("ij,ij->i", normals, attribute(obj, "lb_disc")) / np.linalg.norm(normals, axis=1)
+    assert_allclose(cosine, np.linalg.norm(normals, axis=1), rtol=0.05)
+
+
+def test_points_that_follow_handles_are_dots(obj, extension):
+    bpy.ops.meshfree.analyze()
+    for name, chosen in (("Handle", local_points(obj)[:, 2] > 0.9), ("Anchor", local_points(obj)[:, 2] < -0.9)):
+        obj.vertex_groups.new(name=name).add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+    bpy.ops.meshfree.deform_bind()
+    graph = bpy.context.evaluated_depsgraph_get()
+    assert len(obj.evaluated_get(graph).to_mesh().vertices) == 0
+    bpy.ops.meshfree.deform_unbind()
+    assert drawn(obj).shape[1] == 8
