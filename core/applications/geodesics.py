@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from ..blocks import blocks, on_all_cores
@@ -180,7 +180,13 @@ def _lengths_of_pairs(laplacian, report):
 
     on_all_cores(measure, blocks(len(first), _BLOCK), report)
     arcs = np.maximum(arcs, 1e-300)  # points at one place are neighbours too
-    first, second = first[kept], second[kept]
-    start = np.concatenate([[0], np.cumsum(np.bincount(first, minlength=count))])
-    half = sparse.csr_array((arcs[kept], second, start.astype(np.int32)), shape=(count, count))
+
+    def upper(chosen):
+        start = np.concatenate([[0], np.cumsum(np.bincount(first[chosen], minlength=count))])
+        return sparse.csr_array((arcs[chosen], second[chosen], start.astype(np.int32)), shape=(count, count))
+
+    # On few points all the ways from one may bend too much: a poor way is better than none.
+    label = connected_components(upper(kept), directed=False)[1]
+    kept |= label[first] != label[second]
+    half = upper(kept)
     return half + half.T.tocsr()

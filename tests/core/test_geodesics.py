@@ -85,6 +85,15 @@ def test_other_parts_are_infinitely_far():
     assert np.isinf(found[sheet == 1]).all()
 
 
+def test_the_poles_of_few_points_are_reached():
+    turn, rise = np.meshgrid(np.arange(10) * 0.2 * np.pi, np.linspace(0.0, np.pi, 5))
+    points = np.stack([np.sin(rise) * np.cos(turn), np.sin(rise) * np.sin(turn), np.cos(rise)], axis=-1).reshape(-1, 3)
+    laplacian = core.build_laplacian(points, options=core.LaplacianOptions(neighbors=20, bandwidth_factor=1.0))
+    distance = core.geodesic_distance(laplacian, [0])
+    assert np.abs(distance[:10]).max() < 1e-9
+    assert np.abs(distance[40:] - np.pi).max() < 0.1 * np.pi
+
+
 def test_points_left_out():
     points = np.concatenate([fibonacci_sphere(900), [[20.0, 0.0, 0.0]]])
     laplacian = core.build_laplacian(points)
