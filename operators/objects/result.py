@@ -8,7 +8,6 @@ from .attributes import (
     AREA,
     BOUNDARY,
     COMPONENT,
-    DISC,
     EIGENVECTOR,
     GAUSSIAN_CURVATURE,
     MEAN_CURVATURE,
@@ -57,7 +56,7 @@ def check_writable(obj, names, make_single_user: bool, among=()):
 
 def analysis_names(modes: int) -> list:
     """Names of the attributes of an analysis with so many modes."""
-    return [*RESULTS, DISC, *map(eigenvector_name, range(1, modes + 1))]
+    return [*RESULTS, *map(eigenvector_name, range(1, modes + 1))]
 
 
 def write_result(obj, analysis, write_limit: int):
@@ -79,7 +78,6 @@ def write_result(obj, analysis, write_limit: int):
     write_attribute(mesh, AREA, measures.areas)
     check_size(f"{AREA}, summed up,", analysis.total_area)
     write_attribute(mesh, NORMAL, analysis.local_normals)
-    write_attribute(mesh, DISC, analysis.local_discs)
     write_attribute(mesh, MEAN_CURVATURE, measures.mean_curvature)
     write_attribute(mesh, GAUSSIAN_CURVATURE, measures.gaussian_curvature)
     write_attribute(mesh, BOUNDARY, measures.boundary)

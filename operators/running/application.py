@@ -6,9 +6,10 @@ from bpy.props import BoolProperty
 
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
+from ..objects.attributes import DISC, write_attribute
 from ..objects.handlers import tell
 from ..objects.options import laplacian_options
-from ..objects.reading import TYPES, obstacle, read_points, sharing_objects
+from ..objects.reading import TYPES, discs, obstacle, read_points, sharing_objects
 from ..objects.result import check_writable
 from . import cache
 from .job import JobOperator
@@ -108,8 +109,19 @@ class ShownOperator(ApplicationOperator):
     def conclude(self, context, objects):
         sharing = [other for obj in objects for other in sharing_objects(obj) if other in context.selected_objects]
         if self.show:
+            for obj in objects:
+                _write_discs(context, obj)
             for obj in [*objects, *sharing]:
                 tell("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
+
+
+def _write_discs(context, obj):
+    """Keep how the display is to draw the points of an object, where the operator of all of them is known."""
+    reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
+    if DISC in obj.vertex_groups or not cache.holds(reading.points, options, reading.boundary):
+        return
+    laplacian = cache.build(reading.points, options, reading.boundary, lambda *_: None).laplacian
+    write_attribute(obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.reach, reading.points))
 
 
 def compute_all(plans, progress):

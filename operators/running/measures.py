@@ -16,7 +16,6 @@ class Measures(NamedTuple):
 
     areas: np.ndarray
     normals: np.ndarray
-    reach: np.ndarray
     mean_curvature: np.ndarray
     gaussian_curvature: np.ndarray
     boundary: np.ndarray
@@ -96,7 +95,6 @@ def _measures(laplacian, curvature):
     return Measures(
         laplacian.areas,
         laplacian.normals,
-        laplacian.reach,
         curvature,
         laplacian.gaussian_curvature,
         laplacian.boundary,
@@ -111,11 +109,9 @@ def _carry(prolongation, known):
     smooth = prolongation.interpolate(smooth)
     normals = smooth[:, :3]
     length = np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
-    areas = prolongation.shares(known.areas)
     return Measures(
-        areas=areas,
+        areas=prolongation.shares(known.areas),
         normals=np.divide(normals, length, out=prolongation.labels(known.normals), where=length > 0.5),
-        reach=prolongation.labels(known.reach) * np.sqrt(areas / prolongation.labels(known.areas)),
         mean_curvature=smooth[:, 3],
         gaussian_curvature=smooth[:, 4],
         boundary=prolongation.labels(known.boundary),

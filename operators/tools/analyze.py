@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, IntProperty
 from ...core import LaplaceBeltrami, Spectrum, UnresolvedModesError
 from ..objects.attributes import point_count
 from ..objects.options import laplacian_options, point_budget
-from ..objects.reading import discs, read_points
+from ..objects.reading import read_points
 from ..objects.result import analysis_names, area_text, write_result
 from ..running import cache
 from ..running.application import ShownOperator
@@ -26,7 +26,6 @@ class Analysis:
     laplacian: LaplaceBeltrami  # of the subset, where there is one
     measures: Measures
     local_normals: np.ndarray
-    local_discs: np.ndarray
     spectrum: Spectrum | None
     subset_count: int  # points that it was computed on; 0 for all
     seconds: dict
@@ -63,12 +62,10 @@ def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT):
             if spectrum is not None and len(measured.subset):
                 times("All Points", 1.0)
                 spectrum = replace(spectrum, eigenvectors=measured.carried(spectrum.eigenvectors[:, :write_limit]))
-        normals = reading.local_normals(measured.measures.normals)
         return Analysis(
             laplacian=measured.laplacian,
             measures=measured.measures,
-            local_normals=normals,
-            local_discs=discs(normals, measured.measures.reach, reading.points),
+            local_normals=reading.local_normals(measured.measures.normals),
             spectrum=spectrum,
             subset_count=len(measured.subset),
             seconds=times.seconds,
