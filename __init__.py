@@ -51,9 +51,9 @@ def _modules():
         range_selection,
         presets,
         panel,
-        points,
         applications,
         deform_panel,
+        points,
         menus,
         overlay,
     )

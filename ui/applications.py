@@ -5,32 +5,34 @@ import bpy
 from .panel import ReadyPanel
 
 
-class MESHFREE_PT_curvature(ReadyPanel, bpy.types.Panel):
-    """How the surface bends, and how rough it is"""
+class MESHFREE_PT_measure(ReadyPanel, bpy.types.Panel):
+    """What can be told of each point: how the surface bends, how rough it is, how far it is to others"""
 
-    bl_label = "Curvature"
+    bl_label = "Measure"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         column = self.layout.column(align=True)
         column.operator("meshfree.principal_curvatures", text="Principal Curvatures...")
         column.operator("meshfree.roughness", text="Roughness...")
+        column = self.layout.column(align=True)
+        column.operator("meshfree.geodesic_distance", text="Geodesic Distance...")
+        column.operator("meshfree.harmonic_field", text="Harmonic Field...")
+        self.layout.operator("meshfree.signature", text="Signatures...")
 
 
-class MESHFREE_PT_shape(ReadyPanel, bpy.types.Panel):
-    """Shapes by frequency"""
+class MESHFREE_PT_clean(ReadyPanel, bpy.types.Panel):
+    """Removing noise, and other filters of the shape"""
 
-    bl_label = "Smooth"
+    bl_label = "Clean"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        column = self.layout.column(align=True)
-        column.operator("meshfree.smooth", text="Smooth Points...")
-        column.operator("meshfree.mode_shape", text="Deform by Mode...")
+        self.layout.operator("meshfree.smooth", text="Smooth Points...")
 
 
 class MESHFREE_PT_segment(ReadyPanel, bpy.types.Panel):
-    """Parts and signatures"""
+    """Parts of the surface"""
 
     bl_label = "Segment"
     bl_options = {"DEFAULT_CLOSED"}
@@ -39,19 +41,6 @@ class MESHFREE_PT_segment(ReadyPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         column.operator("meshfree.segment", text="Segment...")
         column.operator("meshfree.separate_by_segment")
-        self.layout.operator("meshfree.signature", text="Signatures...")
-
-
-class MESHFREE_PT_fields(ReadyPanel, bpy.types.Panel):
-    """Fields and distances"""
-
-    bl_label = "Fields"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context):
-        column = self.layout.column(align=True)
-        column.operator("meshfree.geodesic_distance", text="Geodesic Distance...")
-        column.operator("meshfree.harmonic_field", text="Harmonic Field...")
 
 
 class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
@@ -59,15 +48,10 @@ class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
 
     bl_label = "Minimal Surface"
     bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 1  # below what is done every day
 
     def draw(self, context):
         self.layout.operator("meshfree.minimal_surface", text="Minimal Surface...")
 
 
-CLASSES = (
-    MESHFREE_PT_curvature,
-    MESHFREE_PT_shape,
-    MESHFREE_PT_segment,
-    MESHFREE_PT_fields,
-    MESHFREE_PT_minimal,
-)
+CLASSES = (MESHFREE_PT_measure, MESHFREE_PT_clean, MESHFREE_PT_segment, MESHFREE_PT_minimal)

@@ -17,7 +17,7 @@ _WIDTH = 38  # letters in a line of the panel
 class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
     """Deformation by handles"""
 
-    bl_label = "Deform"
+    bl_label = "Bend"
     bl_parent_id = "MESHFREE_PT_main"
     bl_options = {"DEFAULT_CLOSED"}
 

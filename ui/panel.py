@@ -64,7 +64,8 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
         _draw_summary(layout, obj)
-        layout.operator("meshfree.show_surface")
+        if DISC not in obj.data.attributes:
+            layout.operator("meshfree.show_surface")
         row = layout.row(align=True)
         row.operator("meshfree.analyze").modes = obj.meshfree.modes
         row.prop(obj.meshfree, "modes")
@@ -72,6 +73,9 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             _draw_result(layout, obj.meshfree)
             if is_stale(obj, glance=True):
                 layout.label(text="Points or settings changed: analyze again", icon="ERROR")
+        row = layout.row(align=True)  # of tasks that one click does, each with its defaults
+        for name, text in (("smooth", "Clean"), ("segment", "Segment"), ("principal_curvatures", "Curvature")):
+            row.operator(f"meshfree.{name}", text=text).at_once = True
 
 
 def _draw_job(layout, job):
@@ -127,6 +131,7 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
 
     bl_label = "Settings"
     bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 2  # the last ones
 
     def draw(self, context):
         layout = self.layout
@@ -156,11 +161,14 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
     """Vibration modes and their eigenvalues"""
 
     bl_label = "Spectrum"
+    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 1  # below what is done every day
 
     def draw(self, context):
         layout = self.layout
         obj = context.object
         layout.operator("meshfree.spectrum").count = obj.meshfree.modes
+        layout.operator("meshfree.mode_shape", text="Deform by Mode...")
         eigenvalues = read_eigenvalues(obj)
         if not len(eigenvalues):
             return
@@ -188,7 +196,6 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
     """What is shown as colors on the points"""
 
     bl_label = "Display"
-    bl_order = 1  # below the tools
 
     @classmethod
     def poll(cls, context):

@@ -61,9 +61,17 @@ class ApplicationOperator(Tool, JobOperator):
 
     only_active = False  # for what has one object by nature
 
+    at_once: BoolProperty(
+        name="At Once",
+        description="Do it with these settings, without asking",
+        default=False,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
     def invoke(self, context, event):
         self._attended = True
-        return context.window_manager.invoke_props_dialog(self) if self.asks else self.execute(context)
+        asked = self.asks and not self.at_once
+        return context.window_manager.invoke_props_dialog(self) if asked else self.execute(context)
 
     @reporting
     def execute(self, context):

@@ -70,10 +70,9 @@ PANELS = (
     "spectrum",
     "display",
     "points",
-    "curvature",
-    "shape",
+    "measure",
+    "clean",
     "segment",
-    "fields",
     "deform",
     "minimal",
 )
