@@ -48,7 +48,7 @@ def wheel_names(name):
     tags = {"linux-x64": "manylinux.*_x86_64", "windows-x64": "win_amd64"}
     tags.update({"macos-arm64": "macosx.*_arm64", "macos-x64": "macosx.*_x86_64"})
     wheels = [path.rpartition("/")[2] for path in read_manifest()["wheels"]]
-    return [wheel for wheel in wheels if re.search(f"-{tags[name]}\\.whl$", wheel)]
+    return [wheel for wheel in wheels if re.search(f"-({tags[name]}|any)\\.whl$", wheel)]
 
 
 def pinned_hashes():
@@ -69,11 +69,13 @@ def fetch(wheels, python):
             path.unlink(missing_ok=True)
             print(f"Fetching {wheel}", flush=True)
             _, _, interpreter, abi, tags = path.stem.split("-")
+            wanted = ["--implementation", "cp", "--python-version", interpreter[2:], "--abi", abi]
+            wanted += ["--platform", tags.partition(".")[0]]
+            # Brings the wheels of all that is pinned; those for any platform are fetched as for this one.
             run(
                 [python, "-m", "pip", "download", "--quiet", "--no-input", "--disable-pip-version-check"]
                 + ["--require-hashes", "--only-binary=:all:", "--no-deps", "--dest", WHEELS, "--requirement", PINS]
-                + ["--implementation", "cp", "--python-version", interpreter[2:], "--abi", abi]
-                + ["--platform", tags.partition(".")[0]]
+                + ([] if tags == "any" else wanted)
             )
         if not path.exists() or sha256(path) not in pinned_hashes():
             sys.exit(f"{wheel} is not what wheels.txt pins; compare it with the wheels in blender_manifest.toml")
@@ -95,12 +97,12 @@ def stage(platforms):
             shutil.copy2(source, STAGE / name)
         else:
             sys.exit(f"{name} is missing, the package needs it")
-    for name in read_manifest()["platforms"]:
-        for wheel in wheel_names(name):
-            if name in platforms:
-                shutil.copy2(WHEELS / wheel, STAGE / "wheels")
-            else:
-                (STAGE / "wheels" / wheel).touch()
+    needed = {wheel for name in platforms for wheel in wheel_names(name)}
+    for wheel in {wheel for name in read_manifest()["platforms"] for wheel in wheel_names(name)}:
+        if wheel in needed:
+            shutil.copy2(WHEELS / wheel, STAGE / "wheels")
+        else:
+            (STAGE / "wheels" / wheel).touch()
 
 
 def tool(python, *arguments):

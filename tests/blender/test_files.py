@@ -246,11 +246,29 @@ def test_import_needs_object_mode(tmp_path):
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
+@pytest.mark.parametrize("name", ["scan.las", "scan.laz"])
+def test_laser_scans_are_imported(extension, tmp_path, name):
+    import laspy  # that of the extension
+
+    las = laspy.create(point_format=2, file_version="1.2")
+    las.header.scales, las.header.offsets = np.full(3, 0.001), np.array([446_000.0, 4_000_000.0, 0.0])
+    points = sphere_points(300) + las.header.offsets
+    las.x, las.y, las.z = points.T
+    las.classification = np.arange(300) % 5
+    las.red = np.full(300, 65535)
+    las.write(str(tmp_path / name))
+    assert bpy.ops.meshfree.import_points(filepath=str(tmp_path / name)) == {"FINISHED"}
+    obj = bpy.context.object
+    assert_allclose(local_points(obj) + np.array(obj["lb_offset"]), points, rtol=0.0, atol=1e-3)
+    assert_array_equal(attribute(obj, "classification"), np.arange(300) % 5)
+    assert {"intensity", "return_number", "Color"} <= {*obj.data.attributes.keys()}
+
+
 @pytest.mark.parametrize(
     ("name", "data", "text"),
     [
         ("missing.ply", None, "There is no file"),
-        ("a.laz", b"LASF", "make convert LAS=a.laz"),
+        ("a.laz", b"LASF", "ends before its points begin"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n", "line 5: '' does not belong"),
         ("a.xyz", b"", "there are none"),
         ("a.csv", b"x,y,z\n", "there are none"),
@@ -380,7 +398,7 @@ class TestMenus:
         ours = handlers.pop("MESHFREE_FH_points")
         assert ours.bl_import_operator == "meshfree.import_points"
         extensions = set(ours.bl_file_extensions.split(";"))
-        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".las", ".laz"}
+        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".las", ".laz", ".pcd"}
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
 

@@ -1,86 +1,112 @@
-"""LAS and LAZ files become PLY files that keep their coordinates, outside Blender."""
+"""LAS and LAZ files: coordinates in double precision, and what else scanners write."""
 
-import subprocess
 import sys
-from pathlib import Path
 
 import laspy
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-import las_to_ply
+from core import PointCloudError
 from core.files import read_points
 
-ROOT = Path(__file__).parents[2]
 POINTS = np.round(np.random.default_rng(0).uniform(0.0, 100.0, (500, 3)), 3) + [446_000.0, 4_000_000.0, 120.0]
 
 
-def write_las(path, points=POINTS):
-    header = laspy.LasHeader(point_format=2, version="1.2")
+def write_las(path, points=POINTS, kind=2, version="1.2", full=65535):
+    header = laspy.LasHeader(point_format=kind, version=version)
     header.offsets, header.scales = np.floor(POINTS.min(axis=0)), np.full(3, 0.001)
     header.add_extra_dim(laspy.ExtraBytesParams("height", np.float32))
+    header.add_extra_dim(laspy.ExtraBytesParams("way", "3f8"))
+    header.add_extra_dim(laspy.ExtraBytesParams("pair", "2u1"))
     las = laspy.LasData(header)
     las.x, las.y, las.z = points.T
     las.intensity = np.arange(len(points))
     las.classification = np.full(len(points), 2)
-    las.red, las.green, las.blue = np.tile([[65535], [0], [32768]], len(points))
+    if "red" in las.point_format.dimension_names:
+        las.red, las.green, las.blue = np.tile([[full], [0], [(full + 1) // 2]], len(points))
     las.height = np.linspace(0.0, 1.0, len(points))
+    las.way = 2.0 * points
     las.write(str(path))
 
 
-@pytest.fixture
-def convert(monkeypatch):
-    def run(*paths):
-        monkeypatch.setattr(sys, "argv", ["las_to_ply.py", *map(str, paths)])
-        las_to_ply.main()
-
-    return run
-
-
-@pytest.mark.parametrize("name", ["a.las", "a.laz"])
-def test_coordinates_and_columns_survive(convert, capsys, tmp_path, name):
-    write_las(tmp_path / name)
-    convert(tmp_path / name)
-    printed = capsys.readouterr()
-    assert "500 points, intensity, classification" in printed.out
-    assert printed.err == ""
-    table = read_points(tmp_path / "a.ply")
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+@pytest.mark.parametrize(
+    ("kind", "version"), [(0, "1.2"), (1, "1.2"), (2, "1.2"), (3, "1.2"), (6, "1.4"), (7, "1.4"), (8, "1.4")]
+)
+def test_coordinates_and_columns_survive(tmp_path, suffix, kind, version):
+    path = tmp_path / f"a{suffix}"
+    write_las(path, kind=kind, version=version)
+    table = read_points(path)
     assert_allclose(table.points, POINTS, rtol=0.0, atol=1e-6)
+    assert not table.single
     assert_array_equal(table.attributes["intensity"], np.arange(500))
     assert_array_equal(table.attributes["classification"], np.full(500, 2))
     assert_allclose(table.attributes["height"], np.linspace(0.0, 1.0, 500), atol=1e-6)
-    assert_allclose(table.colors[0], [1.0, 0.0, 0.5, 1.0], atol=0.01)
-    with pytest.raises(SystemExit, match="exists already"):
-        convert(tmp_path / name)
+    assert_allclose(table.attributes["way"], 2.0 * POINTS)
+    assert "pair" not in table.attributes
+    if kind in (2, 3, 7, 8):
+        assert_allclose(table.colors, np.tile([1.0, 0.0, 0.5, 1.0], (500, 1)), atol=0.01)
+    else:
+        assert table.colors is None
 
 
-def test_as_a_program(tmp_path):
-    write_las(tmp_path / "a.las")
-    command = [sys.executable, "-m", "scripts.las_to_ply", str(tmp_path / "a.las")]
-    first, again = (subprocess.run(command, cwd=ROOT, capture_output=True, text=True) for _ in range(2))
-    assert (first.returncode, first.stderr) == (0, "")
-    assert "500 points" in first.stdout
-    assert again.returncode == 1
-    assert "exists already" in again.stderr
-    assert "Traceback" not in again.stderr
-
-
-def test_broken_files(convert, tmp_path):
-    (tmp_path / "a.las").write_bytes(b"LASF, but no more")
-    write_las(tmp_path / "b.laz", POINTS[:0])
-    for name, text in (("a.las", "cannot be read"), ("b.laz", "no points"), ("c.las", "cannot be read")):
-        with pytest.raises(SystemExit, match=text):  # said, without a traceback
-            convert(tmp_path / name)
-    assert not list(tmp_path.glob("*.ply"))
+def test_colors_of_eight_bits(tmp_path):
+    write_las(tmp_path / "a.las", full=255)
+    assert_allclose(read_points(tmp_path / "a.las").colors[0], [1.0, 0.0, 0.5, 1.0], atol=0.01)
 
 
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
-def test_a_header_that_names_too_many_points(convert, tmp_path, name):
+def test_more_points_than_one_block(monkeypatch, tmp_path, name):
+    write_las(tmp_path / name)
+    monkeypatch.setattr("core.files.las._BLOCK", 64)
+    table = read_points(tmp_path / name)
+    assert_allclose(table.points, POINTS, rtol=0.0, atol=1e-6)
+    assert_array_equal(table.attributes["intensity"], np.arange(500))
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_a_header_that_names_too_many_points(tmp_path, name):
     """They are refused before there is memory for them."""
     write_las(tmp_path / name)
     data = bytearray((tmp_path / name).read_bytes())
     data[107:111] = b"\xff\xff\xff\x7f"  # their number
     (tmp_path / name).write_bytes(data)
-    with pytest.raises(SystemExit, match="too short for the 2,147,483,647 points .* Copy it again"):
-        convert(tmp_path / name)
+    with pytest.raises(PointCloudError, match="too short for the 2,147,483,647 points .* Copy it again"):
+        read_points(tmp_path / name)
+
+
+def test_no_points(tmp_path):
+    write_las(tmp_path / "a.laz", POINTS[:0])
+    with pytest.raises(PointCloudError, match="no points"):
+        read_points(tmp_path / "a.laz")
+
+
+def test_without_laspy(monkeypatch, tmp_path):
+    write_las(tmp_path / "a.las")
+    monkeypatch.setitem(sys.modules, "lazrs", None)
+    with pytest.raises(PointCloudError, match="read by laspy and lazrs, which are not there .* Install both"):
+        read_points(tmp_path / "a.las")
+
+
+def test_more_chunks_than_the_file_can_hold(tmp_path):
+    """Lazrs would end the process."""
+    path = tmp_path / "a.laz"
+    write_las(path)
+    data = bytearray(path.read_bytes())
+    begin = int.from_bytes(data[96:100], "little")
+    table = int.from_bytes(data[begin : begin + 8], "little")
+    data[table + 4 : table + 8] = b"\xff" * 4
+    path.write_bytes(data)
+    with pytest.raises(PointCloudError, match="too short for the chunks"):
+        read_points(path)
+
+
+def test_what_lazrs_does_not_expect(tmp_path):
+    path = tmp_path / "a.laz"
+    write_las(path)
+    data = path.read_bytes()
+    items = data.index(b"laszip encoded") + 52 + 32  # how many parts a point has, in the record of that name
+    path.write_bytes(data[:items] + bytes(2) + data[items + 2 :])
+    with pytest.raises(PointCloudError, match="is a broken LA. file"):
+        read_points(path)

@@ -7,6 +7,7 @@ import time
 import tracemalloc
 import zipfile
 
+import laspy
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -78,6 +79,20 @@ def make_archive(member, compression=zipfile.ZIP_DEFLATED, name="points.npy"):
     return file.getvalue()
 
 
+def make_las(compressed=False):
+    las = laspy.create(point_format=3, file_version="1.2")
+    las.header.scales = np.full(3, 0.001)
+    las.x, las.y, las.z = POINTS.T
+    file = io.BytesIO()
+    las.write(file, do_compress=compressed)
+    return file.getvalue()
+
+
+def make_pcd(data):
+    head = "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 30\nHEIGHT 1\nPOINTS 30\n" + f"DATA {data}\n"
+    return head.encode() + (make_rows("{} {} {}").encode() if data == "ascii" else POINTS.tobytes())
+
+
 GOOD = {
     "ascii.ply": make_ply("ascii"),
     "little.ply": make_ply("little"),
@@ -92,6 +107,10 @@ GOOD = {
     "array.npy": make_array(),
     "plain.npz": make_archive(make_array(), zipfile.ZIP_STORED),
     "small.npz": make_archive(make_array()),
+    "scan.las": make_las(),
+    "scan.laz": make_las(compressed=True),
+    "text.pcd": make_pcd("ascii"),
+    "camera.pcd": make_pcd("binary"),
 }
 
 
