@@ -13,10 +13,12 @@ MOST = "Viewport Points"  # input of the display: how many it draws there
 DISCS = "Discs"  # another: whether it draws discs
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
+BACK = "Back Side"  # another: how dark what is seen from behind is
 _SIDES = 8  # of a disc
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
+_DIM = 0.85  # how dark the back side becomes where it is dimmed
 _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but groups
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
@@ -139,11 +141,16 @@ def _shaped(group, given, points, size):
 def color_plain(material, groups):
     """Let a material show nothing but groups, see `color_by_number`."""
     kind = f"{_PLAIN} {groups}"
-    if material.get(_KIND) != kind or material.node_tree is None:
+    if material.get(_KIND) != kind or material.node_tree is None or BACK not in material.node_tree.nodes:
         gray = add_node(new_tree(material), "ShaderNodeRGB", 0, 0)
         gray.outputs[0].default_value = _GRAY
         _shine(material.node_tree, gray.outputs[0], groups)
         material[_KIND] = kind
+
+
+def dim_back(material, dimmed):
+    """Let a material show what is seen from behind darker, such as the inside of an open scan, or alike."""
+    material.node_tree.nodes[BACK].inputs[1].default_value = _DIM if dimmed else 0.0
 
 
 def is_plain(material) -> bool:
@@ -202,7 +209,7 @@ def _begin(material, name, kind, needed=()):
 
     So it is where its nodes were of another kind, or somebody has deleted one that is needed.
     """
-    fits = material.get(_KIND) == kind and {ATTRIBUTE, *needed} <= set(material.node_tree.nodes.keys())
+    fits = material.get(_KIND) == kind and {ATTRIBUTE, BACK, *needed} <= set(material.node_tree.nodes.keys())
     if not fits:
         add_node(new_tree(material), "ShaderNodeAttribute", 0, 0, name=ATTRIBUTE)
         material[_KIND] = kind
@@ -247,7 +254,8 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
 def _shine(tree, color, groups, hidden=None):
     """Give the surface a colour, and points of groups theirs; nothing is seen where a number, if there is one, is 1.
 
-    Mostly emission, so that colours read as in the legend; some diffuse light, so that shapes show.
+    Mostly emission, so that colours read as in the legend; some diffuse light, so that shapes show. For the back side
+    see `dim_back`.
     """
     column = 9
     for name, group_color in groups.items():
@@ -256,6 +264,10 @@ def _shine(tree, color, groups, hidden=None):
         color = _mix(tree, column + 2, inside, color, group_color)
         column += 1
     column += 2 if groups else 0
+    seen = add_node(tree, "ShaderNodeNewGeometry", column, -900)
+    behind = _math(tree, column + 1, -900, "MULTIPLY", seen.outputs["Backfacing"], name=BACK)
+    color = _mix(tree, column + 2, behind, color, _BEYOND)
+    column += 3
     diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", column, 100)
     emission = add_node(tree, "ShaderNodeEmission", column, -100)
     mixed = add_node(tree, "ShaderNodeMixShader", column + 1, 0)

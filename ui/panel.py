@@ -223,6 +223,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             _draw_colors(layout, obj)
         if DISC in attributes:
             layout.prop(obj.meshfree, "point_shape")
+            layout.prop(obj.meshfree, "dim_back")
         layout.prop(obj.meshfree, "point_size")
         column = layout.column(align=True, heading="Show")
         column.prop(obj.meshfree, "legend")

@@ -14,7 +14,7 @@ from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set
 from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
 from . import colormaps, legend
 from .display import NAME, component, find_display, find_material, numbers, shown_attribute, without_unreached
-from .nodes import DISCS, MOST, color_by_direction, color_by_number, color_plain, display_group, is_plain
+from .nodes import DISCS, MOST, color_by_direction, color_by_number, color_plain, dim_back, display_group, is_plain
 from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
@@ -102,6 +102,7 @@ def show_groups(obj):
         plain = True
     if plain and obj.meshfree.show_groups:
         color_plain(_own_material(obj), _group_colors(obj))
+        dim_back(_own_material(obj), obj.meshfree.dim_back)
         obj.update_tag()
     recolor(obj)
     if obj.meshfree.show_groups:
@@ -176,6 +177,7 @@ def _color(obj, name, values):
             settings.range_low, settings.range_high = low, high
         component_shown = part if values.ndim > 1 else ""
         color_by_number(material, name, component_shown, color_map, low, high, settings, groups)
+    dim_back(material, settings.dim_back)
     obj.update_tag()
     legend.renew(obj)
     redraw_views()

@@ -253,6 +253,12 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         default="DISCS",
         update=_reshape,
     )
+    dim_back: BoolProperty(
+        name="Dim Back Side",
+        description="Darken discs that are seen from behind, such as those of the inside of an open scan",
+        default=False,
+        update=_recolor,
+    )
     show_groups: BoolProperty(
         name="Group Colors",
         description="Color the points of the groups below, over what is on show",

@@ -128,3 +128,34 @@ def test_points_that_follow_handles_are_dots(obj, extension):
     assert len(obj.evaluated_get(graph).to_mesh().vertices) == 0
     bpy.ops.meshfree.deform_unbind()
     assert drawn(obj).shape[1] == 8
+
+
+def brightness(path, below):
+    """Render a flat square from above or below; return how bright its middle is."""
+    scene = bpy.context.scene
+    camera = scene.camera or bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    if scene.camera is None:
+        scene.collection.objects.link(camera)
+        scene.camera = camera
+        camera.data.type, camera.data.ortho_scale = "ORTHO", 0.5
+    camera.location.z, camera.rotation_euler.x = (-5.0, np.pi) if below else (5.0, 0.0)
+    scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", 1
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    scene.view_settings.view_transform = "Standard"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    return np.array(image.pixels).reshape(-1, 4)[:, :3].mean()
+
+
+def test_the_back_side_is_dimmed_on_demand(tmp_path):
+    side = np.linspace(-1.0, 1.0, 25)
+    obj = add_object(np.stack([*map(np.ravel, np.meshgrid(side, side)), np.zeros(625)], axis=1))
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    below = attribute(obj, "lb_normal")[0, 2] > 0.0
+    before = brightness(tmp_path / "before.png", below), brightness(tmp_path / "front.png", not below)
+    obj.meshfree.dim_back = True
+    after = brightness(tmp_path / "after.png", below), brightness(tmp_path / "still.png", not below)
+    assert after[0] < 0.7 * before[0]
+    assert after[1] > 0.85 * before[1]  # some of the light comes from discs in the same plane, from behind
