@@ -19,6 +19,7 @@ from .applications import (
     Geodesics,
     MinimalSurface,
     PointBlend,
+    SurfaceMesh,
     band,
     boost,
     chebyshev_filter,
@@ -30,6 +31,7 @@ from .applications import (
     grow,
     harmonic_field,
     heat_kernel_signature,
+    mesh_surface,
     minimal_surface,
     modes_needed,
     nodal_domains,
@@ -41,6 +43,7 @@ from .applications import (
     smoothing_base,
     solve_poisson,
     spectral_filter,
+    values_on_mesh,
     wave_kernel_signature,
 )
 from .errors import (
@@ -90,6 +93,7 @@ __all__ = [
     "SolverError",
     "Spectrum",
     "Stability",
+    "SurfaceMesh",
     "TooFewPointsError",
     "UnresolvedModesError",
     "band",
@@ -110,6 +114,7 @@ __all__ = [
     "harmonic_field",
     "heat_kernel_signature",
     "mean_curvature",
+    "mesh_surface",
     "minimal_surface",
     "modes_needed",
     "nodal_domains",
@@ -124,5 +129,6 @@ __all__ = [
     "solve_poisson",
     "spectral_filter",
     "surface_discs",
+    "values_on_mesh",
     "wave_kernel_signature",
 ]

@@ -29,6 +29,7 @@ SHOWN = [
     "harmonic_field",
     "heat_kernel_signature",
     "mean_curvature",
+    "mesh_surface",
     "minimal_surface",
     "nodal_domains",
     "principal_curvatures",
