@@ -52,6 +52,16 @@ def surface(path):
     row((dots, discs), path, legend=None)
 
 
+def mesh(path):
+    """Points, and the mesh of their surface in the same colors."""
+    points = coral()
+    bpy.ops.meshfree.analyze(show=False)
+    studio.show(points, "lb_mean_curvature", radius=0.3)
+    bpy.ops.meshfree.mesh_surface()
+    points.hide_set(False)
+    row((points, bpy.context.object), path, legend=points)
+
+
 def shape_index(path):
     """The shape index: caps, ridges, saddles, valleys and cups."""
     obj = coral()
@@ -175,6 +185,7 @@ PICTURES = {
     "mode_shape": mode_shape,
     "segment": segment,
     "surface": surface,
+    "mesh": mesh,
     "shape_index": shape_index,
     "roughness": roughness,
     "signature": signature,

@@ -5,6 +5,16 @@ import bpy
 from .panel import ReadyPanel
 
 
+class MESHFREE_PT_surface(ReadyPanel, bpy.types.Panel):
+    """The surface as a mesh"""
+
+    bl_label = "Surface"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        self.layout.operator("meshfree.mesh_surface", text="Surface from Points...")
+
+
 class MESHFREE_PT_curvature(ReadyPanel, bpy.types.Panel):
     """How the surface bends, and how rough it is"""
 
@@ -65,6 +75,7 @@ class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
 
 
 CLASSES = (
+    MESHFREE_PT_surface,
     MESHFREE_PT_curvature,
     MESHFREE_PT_shape,
     MESHFREE_PT_segment,

@@ -118,6 +118,13 @@ def show_surface(obj):
     resize(obj)
 
 
+def show_alike(obj, made):
+    """Show on a mesh made of an object what that shows."""
+    name = shown_attribute(obj)
+    if name and name in made.data.attributes:
+        show_result(made, name)
+
+
 def use_material_preview(context):
     """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
     space = context.space_data
@@ -222,6 +229,7 @@ _HANDLERS = {
     "groups_changed": show_groups,
     "surface_found": show_surface,
     "result_written": show_result,
+    "mesh_made": show_alike,
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,
 }

@@ -55,6 +55,7 @@ RUNS = [
     (colored, "analyze", {"modes": 4}),
     (shared, "analyze", {}),
     (colored, "show_surface", {}),
+    (colored, "mesh_surface", {}),
     (handled, "spectrum", {"count": 5}),
     (handled, "principal_curvatures", {}),
     (keyed, "roughness", {}),
