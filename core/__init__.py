@@ -16,6 +16,7 @@ of the unit sphere, where answers are known:
 from .applications import (
     CoarseDeformer,
     Deformer,
+    Deviation,
     Geodesics,
     MinimalSurface,
     PointBlend,
@@ -43,6 +44,7 @@ from .applications import (
     smoothing_base,
     solve_poisson,
     spectral_filter,
+    surface_deviation,
     values_on_mesh,
     wave_kernel_signature,
 )
@@ -78,6 +80,7 @@ __all__ = [
     "CoarseDeformer",
     "ComponentError",
     "Deformer",
+    "Deviation",
     "Discs",
     "Geodesics",
     "InvalidPointsError",
@@ -128,6 +131,7 @@ __all__ = [
     "smoothing_base",
     "solve_poisson",
     "spectral_filter",
+    "surface_deviation",
     "surface_discs",
     "values_on_mesh",
     "wave_kernel_signature",

@@ -9,8 +9,9 @@ from scipy.sparse.csgraph import connected_components
 from ..arguments import real
 from ..blocks import blocks, on_all_cores
 from ..errors import NotEnoughMemoryError, PointCloudError
-from ..geometry import ImplicitSurface, Prolongation
+from ..geometry import Prolongation
 from ..memory import available_memory
+from ..operator import ImplicitSurface
 
 _BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
 _REACH = 3.0  # spacings along the surface that a point is known for: wider gaps are holes
@@ -98,19 +99,11 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
         raise PointCloudError(f"The detail of the mesh is {detail!r}. Use a number above zero.")
     report("Grid", 0.5)
     kept = laplacian.component >= 0
-    center = laplacian.points[kept].mean(axis=0)
     spacing = np.sqrt(np.median(laplacian.areas[kept]))
     voxel = spacing / size
     places = laplacian.areas[kept].sum() / voxel**2
     _check_memory(places, size)
-    surface = ImplicitSurface(  # in voxels
-        (laplacian.surface_points[kept] - center) / voxel,
-        laplacian.normals[kept],
-        laplacian.shape_operator[kept] * voxel,
-        laplacian.component[kept],
-        laplacian.boundary_distance[kept] / voxel,
-        laplacian.boundary_direction[kept],
-    )
+    surface = ImplicitSurface(laplacian, voxel)
     grid, keys = _band(surface, lambda: report("Grid", 0.55))
     cuts = _cuts(surface, grid, keys, lambda: report("Grid", 0.7))
     report("Faces", 0.85)
@@ -121,7 +114,7 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
             " than the surface. Raise the detail."
         )
     vertices = _onto(surface, vertices, _rim(faces), lambda: report("Faces", 0.9))
-    return SurfaceMesh(center + voxel * vertices, faces)
+    return SurfaceMesh(surface.placed(vertices), faces)
 
 
 def values_on_mesh(laplacian, vertices, *, progress=None):

@@ -38,6 +38,7 @@ SHOWN = [
     "smooth_points",
     "solve_poisson",
     "spectral_filter",
+    "surface_deviation",
     "surface_discs",
     "wave_kernel_signature",
 ]

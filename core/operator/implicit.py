@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..blocks import blocks, on_all_cores
-from .nearest import SMOOTH, find_nearest
+from ..geometry import SMOOTH, find_nearest
 
 _NEIGHBORS = 12  # of a place, whose quadrics are averaged
 _BLOCK = 1 << 13  # places looked at at one time
@@ -18,13 +18,13 @@ class Heights(NamedTuple):
     Attributes
     ----------
     height : ndarray, (k,)
-        Distance from the surface [L], positive on the side of the normals: exact for quadrics, to second order.
+        Distance from the surface, positive on the side of the normals: exact for quadrics, to second order.
     normal : ndarray, (k, 3)
         Unit normals of the surface nearby.
     distance : ndarray, (k,)
         From the nearest point, in spacings of the points there.
     beyond : ndarray, (k,)
-        How far the place lies beyond the boundary of the surface [L]; negative inside, -inf where none is near.
+        How far the place lies beyond the boundary of the surface; negative inside, -inf where none is near.
     outward : ndarray, (k, 3)
         Unit vector across that boundary; zero where none is near.
     """
@@ -49,36 +49,49 @@ class ImplicitSurface:
 
     Parameters
     ----------
-    points, normals : ndarray, (n, 3)
-        Points on the surface [L], and unit normals whose signs agree.
-    shape_operator : ndarray, (n, 3, 3)
-        Second fundamental form [1 / L], positive where the surface bends away from the normal.
-    component : ndarray, (n,) int
-        Numbers of components, which are kept apart.
-    boundary_distance : ndarray, (n,)
-        Distance to the boundary [L]; infinite where there is none near.
-    boundary_direction : ndarray, (n, 3)
-        Unit vector across it, outwards.
+    laplacian : LaplaceBeltrami
+        Its normals must agree in sign. Points that it leaves out make no surface.
+    unit : float
+        Length [L] that counts as one in all that is measured.
 
     Attributes
     ----------
-    spacing : ndarray, (n,)
-        Distance between neighbouring points [L]; next to a change of density the larger one.
+    points, normals : ndarray, (m, 3)
+        The points on the surface in these units, from their middle on, and unit normals.
+    spacing : ndarray, (m,)
+        Distance between neighbouring points in these units; next to a change of density the larger one.
     """
 
-    def __init__(self, points, normals, shape_operator, component, boundary_distance, boundary_direction):
+    def __init__(self, laplacian, unit):
+        kept = laplacian.component >= 0
+        self._middle, self._unit = laplacian.surface_points[kept].mean(axis=0), unit
+        points = self.scaled(laplacian.surface_points[kept])
         nearest = find_nearest(points)
         self.points, self._tree = points, nearest.tree
         self.spacing = nearest.spacing.copy()
         # Where dense points end and sparse ones begin, the gap between them is as wide as those of the sparse ones.
         np.maximum.at(self.spacing, nearest.index, self.spacing[:, None] - nearest.distance / _BELONGS)
-        self.normals, self._shape_operator, self._component = normals, shape_operator, component
-        known = np.isfinite(boundary_distance) & boundary_direction.any(axis=1)
-        self._inside = np.where(known, boundary_distance, np.inf)
-        self._outward = np.where(known[:, None], boundary_direction, 0.0)
+        self.normals, self._component = laplacian.normals[kept], laplacian.component[kept]
+        self._shape_operator = laplacian.shape_operator[kept] * unit
+        inside, outward = laplacian.boundary_distance[kept] / unit, laplacian.boundary_direction[kept]
+        known = np.isfinite(inside) & outward.any(axis=1)
+        self._inside = np.where(known, inside, np.inf)
+        self._outward = np.where(known[:, None], outward, 0.0)
+
+    def scaled(self, points):
+        """Return points [L], (k, 3), in the units and from the middle that all else is measured in."""
+        return (points - self._middle) / self._unit
+
+    def placed(self, points):
+        """Return points in these units, (k, 3), as they are [L]."""
+        return self._middle + self._unit * points
+
+    def nearest(self, places):
+        """Return the number of the point that is nearest to each place, (k,) int."""
+        return self._tree.query(places, workers=-1)[1]
 
     def bend(self, rows):
-        """Return half a curvature of some points, (k,) [1 / L]: how fast the surface leaves their tangent planes."""
+        """Return half a curvature of some points, (k,): how fast the surface leaves their tangent planes."""
         forms = self._shape_operator[rows]
         return 0.5 * np.sqrt(np.einsum("iab,iab->i", forms, forms))
 
