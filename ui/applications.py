@@ -6,13 +6,15 @@ from .panel import ReadyPanel
 
 
 class MESHFREE_PT_surface(ReadyPanel, bpy.types.Panel):
-    """The surface as a mesh"""
+    """The surface as a mesh, and its distance from another"""
 
     bl_label = "Surface"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        self.layout.operator("meshfree.mesh_surface", text="Surface from Points...")
+        column = self.layout.column(align=True)
+        column.operator("meshfree.mesh_surface", text="Surface from Points...")
+        column.operator("meshfree.compare", text="Compare Points...")
 
 
 class MESHFREE_PT_curvature(ReadyPanel, bpy.types.Panel):

@@ -6,7 +6,7 @@ import bpy
 import gpu
 
 from ..operators.deform.binding import positions_now
-from ..operators.objects.attributes import DISC, MEAN_CURVATURE, read_attribute
+from ..operators.objects.attributes import DEVIATION, DISC, MEAN_CURVATURE, read_attribute
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
@@ -167,9 +167,12 @@ def _color(obj, name, values):
         color_by_direction(material, name, groups)
     else:
         locked = settings.range_low, settings.range_high
-        color_map, low, high = fit_range(
-            without_unreached(name, shown), settings.color_map, settings.range_mode, settings.coverage, locked
-        )
+        chosen = [settings.color_map, settings.range_mode]
+        if name == DEVIATION:  # zero is what it is all about, even where all of it has one sign
+            chosen = [
+                way if way != "AUTO" else zero for way, zero in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
+            ]
+        color_map, low, high = fit_range(without_unreached(name, shown), *chosen, settings.coverage, locked)
         if settings.range_mode != "LOCKED":
             settings.range_low, settings.range_high = low, high
         component_shown = part if values.ndim > 1 else ""

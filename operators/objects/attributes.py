@@ -35,6 +35,7 @@ TRUST = "lb_trust"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"  # principal ones
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
+DEVIATION, COMPARED = "lb_deviation", "lb_compared"  # from another cloud, and where there is one
 SEGMENT = "lb_segment"
 FIELD = "lb_field"
 DISTANCE = "lb_distance"
@@ -48,7 +49,7 @@ APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {  # all others are FLOAT
     **dict.fromkeys((NORMAL, DIRECTION_1, DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
     **dict.fromkeys((COMPONENT, SEGMENT), "INT"),
-    BOUNDARY: "BOOLEAN",
+    **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
 }
 STORABLE = tuple(_STORAGE)
 

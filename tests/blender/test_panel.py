@@ -14,6 +14,7 @@ OPERATORS = (
     "analyze",
     "apply_preset",
     "colormap",
+    "compare",
     "convert",
     "deform_apply",
     "deform_bake",
@@ -53,6 +54,7 @@ OPERATORS = (
     "stop",
 )
 DIALOGS = (  # operators that ask before they work, in a layout of ours
+    "compare",
     "export_points",
     "geodesic_distance",
     "harmonic_field",
