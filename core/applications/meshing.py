@@ -231,16 +231,48 @@ def _cuts(surface, grid, keys, report):
 
 
 def _quads(grid, begin, axis, forward, cut, belongs):
-    """Return a vertex for each voxel that is cut, the mean of its cuts, and a quad around each cut that belongs."""
-    second, third = grid.steps[(axis + 1) % 3], grid.steps[(axis + 2) % 3]
+    """Return the vertices of the voxels that are cut, each the mean of its cuts, and a quad around each that belongs.
+
+    A voxel that several sheets cut has a vertex for each.
+    """
+    own, second, third = (grid.steps[(axis + turn) % 3] for turn in range(3))
     around = begin[:, None] - np.stack([np.zeros_like(second), second, second + third, third], axis=1)
-    corner = np.unique(around, return_inverse=True)[1].reshape(-1)
+    sides = np.stack([begin, begin - second, begin - third, begin], axis=1)  # faces of voxels between those around
+    sides = 3 * sides + np.stack([axis + 1, axis + 2, axis + 1, axis + 2], axis=1) % 3
+    inner = np.where(forward, begin, begin + own)
+    corner = _joined(around, sides.ravel(), np.repeat(inner, 4))
     count = np.bincount(corner)
     total = [np.bincount(corner, np.repeat(cut[:, way], 4)) for way in range(3)]
     vertices = np.column_stack(total) / count[:, None]
     faces = corner.reshape(-1, 4)
     faces = np.where(forward[:, None], faces, faces[:, ::-1])[belongs]
     return vertices, faces
+
+
+def _joined(around, sides, inner):
+    """Number the vertices of quads so that each of their edges has two quads at most, (4 q,) int.
+
+    Parameters
+    ----------
+    around : ndarray, (q, 4) int
+        Voxels of the corners of quads.
+    sides : ndarray, (4 q,) int
+        What each edge, from one corner to the next, crosses: a face between two voxels.
+    inner : ndarray, (4 q,) int
+        The corner of the grid below the surface at each. Where four quads meet, two sheets pass: those of a quad and of
+        the other one around the same corner.
+    """
+    _, meeting, count = np.unique(sides, return_inverse=True, return_counts=True)
+    meeting = meeting.reshape(-1)
+    several = np.where(count[meeting] > 2, inner, -1)
+    order = np.lexsort([several, meeting])
+    same = (np.diff(meeting[order]) == 0) & (np.diff(several[order]) == 0)
+    ends = np.arange(4 * len(around)).reshape(-1, 4)
+    ends = np.stack([ends, np.roll(ends, -1, axis=1)], axis=2).reshape(-1, 2)
+    ends = np.take_along_axis(ends, np.argsort(around.ravel()[ends], axis=1), axis=1)[order]
+    first, second = ends[:-1][same].ravel(), ends[1:][same].ravel()
+    graph = sparse.coo_array((np.ones(len(first), dtype=bool), (first, second)), shape=(around.size, around.size))
+    return connected_components(graph, directed=False)[1]
 
 
 def _without_fragments(vertices, faces, least):
