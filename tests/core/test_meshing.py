@@ -87,6 +87,14 @@ def test_sheets_apart_are_two_meshes():
     assert euler_characteristic(mesh) == 4
 
 
+def test_sheets_within_one_voxel_share_no_vertex():
+    turn = Rotation.from_rotvec([0.4, 0.3, 0.2]).as_matrix()
+    laplacian = core.build_laplacian(fibonacci_sphere(12000) * [1.0, 0.8, 0.06] @ turn)
+    mesh = core.mesh_surface(laplacian)
+    assert np.all(edges_of(mesh) == 2)
+    assert euler_characteristic(mesh) == 2
+
+
 def test_order_of_the_points_makes_no_difference(operators):
     points = operators("another random sphere").points
     order = np.random.default_rng(1).permutation(len(points))
