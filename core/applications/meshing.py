@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arguments import real
 from ..blocks import blocks, on_all_cores
 from ..errors import NotEnoughMemoryError, PointCloudError
-from ..geometry import Prolongation
+from ..geometry import Prolongation, check_points
 from ..memory import available_memory
 from ..operator import ImplicitSurface
 
@@ -134,11 +134,16 @@ def values_on_mesh(laplacian, vertices, *, progress=None):
         Its `interpolate` and `labels` take values on the n points and return those at the n points and then at the m
         vertices.
 
+    Raises
+    ------
+    InvalidPointsError
+        Vertices of a wrong shape or not finite.
+
     See Also
     --------
     mesh_surface : Makes vertices.
     """
-    places = np.concatenate([laplacian.points, vertices])
+    places = np.concatenate([laplacian.points, check_points(vertices)])
     subset = np.arange(len(laplacian.points))
     return Prolongation(places, subset, laplacian.normals, laplacian.component, progress=progress)
 
