@@ -376,6 +376,7 @@ def calls():
     )
     yield core.fair_points, on, {"time": 0.01, "order": 3, "dirichlet": False, "keep": None}
     yield core.roughness, on, {"wavelength": 0.5}
+    yield core.surface_discs, {}, {"points": points}
     yield core.mesh_surface, on, {"detail": 1.0}
     yield core.values_on_mesh, on, {"vertices": points[:9]}
     yield core.surface_deviation, on, {"points": points[:9], "normals": points[:9], "greatest": 1.0}
