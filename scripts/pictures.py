@@ -15,6 +15,7 @@ import package
 import paper_pictures
 import scan_pictures
 import studio
+from coral import spread_directions
 from studio import row, single
 
 OUTPUT = package.ROOT / "docs" / "pictures"
@@ -50,6 +51,32 @@ def surface(path):
     dots.meshfree.point_shape = "DOTS"
     dots.meshfree.point_size = 0.5
     row((dots, discs), path, legend=None)
+
+
+def mesh(path):
+    """Points, and the mesh of their surface in the same colors."""
+    points = coral()
+    bpy.ops.meshfree.analyze(show=False)
+    studio.show(points, "lb_mean_curvature", radius=0.3)
+    bpy.ops.meshfree.mesh_surface()
+    points.hide_set(False)
+    row((points, bpy.context.object), path, legend=points)
+
+
+def compare(path):
+    """A shape, and a later scan of it with a longer arm and a shorter one, colored by that."""
+    before, points = coral(), demo.Coral().sample(demo.POINTS, seed=5)
+    ways, arms = points / np.linalg.norm(points, axis=1)[:, None], spread_directions(9)
+    for toward, growth in (((1.0, -1.0, 0.0), 0.15), ((-1.0, -1.0, 0.0), -0.15)):
+        arm = arms[(arms @ toward).argmax()]
+        points *= 1.0 + growth * np.exp(8.0 * (ways @ arm - 1.0))[:, None]
+    after = studio.make_object(points, "Later")
+    for obj in (before, after):
+        obj.select_set(True)
+    bpy.ops.meshfree.compare()
+    studio.show(after, "lb_deviation")
+    studio.show_shape(before)
+    row((before, after), path, legend=after)
 
 
 def shape_index(path):
@@ -175,6 +202,8 @@ PICTURES = {
     "mode_shape": mode_shape,
     "segment": segment,
     "surface": surface,
+    "mesh": mesh,
+    "compare": compare,
     "shape_index": shape_index,
     "roughness": roughness,
     "signature": signature,

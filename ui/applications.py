@@ -19,6 +19,7 @@ class MESHFREE_PT_measure(ReadyPanel, bpy.types.Panel):
         column.operator("meshfree.geodesic_distance", text="Geodesic Distance...")
         column.operator("meshfree.harmonic_field", text="Harmonic Field...")
         self.layout.operator("meshfree.signature", text="Signatures...")
+        self.layout.operator("meshfree.compare", text="Compare Points...")
 
 
 class MESHFREE_PT_clean(ReadyPanel, bpy.types.Panel):
@@ -43,6 +44,16 @@ class MESHFREE_PT_segment(ReadyPanel, bpy.types.Panel):
         column.operator("meshfree.separate_by_segment")
 
 
+class MESHFREE_PT_surface(ReadyPanel, bpy.types.Panel):
+    """The surface as a mesh"""
+
+    bl_label = "Mesh"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        self.layout.operator("meshfree.mesh_surface", text="Surface from Points...")
+
+
 class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
     """Minimal surfaces"""
 
@@ -54,4 +65,4 @@ class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
         self.layout.operator("meshfree.minimal_surface", text="Minimal Surface...")
 
 
-CLASSES = (MESHFREE_PT_measure, MESHFREE_PT_clean, MESHFREE_PT_segment, MESHFREE_PT_minimal)
+CLASSES = (MESHFREE_PT_measure, MESHFREE_PT_clean, MESHFREE_PT_segment, MESHFREE_PT_surface, MESHFREE_PT_minimal)

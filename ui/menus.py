@@ -6,6 +6,7 @@ from ..operators.files.importing import OWN
 
 _TOOLS = (
     ("show_surface", "analyze", "spectrum", "colormap", "legend"),
+    ("mesh_surface", "compare"),
     ("principal_curvatures", "roughness"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),

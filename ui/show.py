@@ -7,7 +7,7 @@ import gpu
 
 from ..operators.deform.binding import positions_now
 from ..operators.deform.nodes import find_deform
-from ..operators.objects.attributes import DISC, MEAN_CURVATURE, read_attribute
+from ..operators.objects.attributes import DEVIATION, DISC, MEAN_CURVATURE, read_attribute
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
@@ -121,6 +121,13 @@ def show_surface(obj):
     resize(obj)
 
 
+def show_alike(obj, made):
+    """Show on a mesh made of an object what that shows."""
+    name = shown_attribute(obj)
+    if name and name in made.data.attributes:
+        show_result(made, name)
+
+
 def use_material_preview(context):
     """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
     space = context.space_data
@@ -170,9 +177,12 @@ def _color(obj, name, values):
         color_by_direction(material, name, groups)
     else:
         locked = settings.range_low, settings.range_high
-        color_map, low, high = fit_range(
-            without_unreached(name, shown), settings.color_map, settings.range_mode, settings.coverage, locked
-        )
+        chosen = [settings.color_map, settings.range_mode]
+        if name == DEVIATION:  # zero is what it is all about, even where all of it has one sign
+            chosen = [
+                way if way != "AUTO" else zero for way, zero in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
+            ]
+        color_map, low, high = fit_range(without_unreached(name, shown), *chosen, settings.coverage, locked)
         if settings.range_mode != "LOCKED":
             settings.range_low, settings.range_high = low, high
         component_shown = part if values.ndim > 1 else ""
@@ -234,6 +244,7 @@ _HANDLERS = {
     "groups_changed": show_groups,
     "surface_found": show_surface,
     "result_written": show_result,
+    "mesh_made": show_alike,
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,
 }

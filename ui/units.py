@@ -5,6 +5,7 @@ from ..operators.objects.attributes import (
     CURVATURE_1,
     CURVATURE_2,
     CURVEDNESS,
+    DEVIATION,
     DISPLACEMENT,
     DISTANCE,
     GAUSSIAN_CURVATURE,
@@ -17,7 +18,7 @@ _POWERS = {  # of a length
     AREA: 2,
     GAUSSIAN_CURVATURE: -2,
     **dict.fromkeys((MEAN_CURVATURE, CURVATURE_1, CURVATURE_2, CURVEDNESS), -1),
-    **dict.fromkeys((DISTANCE, DISPLACEMENT, ROUGHNESS), 1),
+    **dict.fromkeys((DISTANCE, DISPLACEMENT, ROUGHNESS, DEVIATION), 1),
 }
 _METERS = {
     "KILOMETERS": ("km", 1000.0),

@@ -3,9 +3,11 @@
 from .coarse_deformation import CoarseDeformer
 from .deformation import Deformer
 from .descriptors import heat_kernel_signature, signature_energies, signature_times, wave_kernel_signature
+from .deviation import Deviation, surface_deviation
 from .fields import harmonic_field, solve_poisson
 from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
 from .geodesics import Geodesics, geodesic_distance
+from .meshing import SurfaceMesh, mesh_surface, values_on_mesh
 from .minimal_surface import MinimalSurface, minimal_surface
 from .segmentation import modes_needed, nodal_domains, segment
 from .selection import grow

@@ -5,6 +5,7 @@ from .cholesky import factorize
 from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
 from .factors import dissect, sparsify
 from .hierarchy import Rows
+from .implicit import ImplicitSurface
 from .laplacian import LaplaceBeltrami, build_laplacian, narrow_laplacian
 from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_symmetric
 from .spectrum import Spectrum, symmetric_form

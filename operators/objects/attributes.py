@@ -36,6 +36,7 @@ CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
 CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
+DEVIATION, COMPARED = "lb_deviation", "lb_compared"  # from another cloud, and where there is one
 SEGMENT = "lb_segment"
 FIELD = "lb_field"
 DISTANCE = "lb_distance"
@@ -49,7 +50,7 @@ APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {  # all others are FLOAT
     **dict.fromkeys((NORMAL, DIRECTION_1, DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
     **dict.fromkeys((COMPONENT, SEGMENT), "INT"),
-    BOUNDARY: "BOOLEAN",
+    **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
 }
 STORABLE = tuple(_STORAGE)
 

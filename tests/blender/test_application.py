@@ -12,6 +12,7 @@ from tests.blender.test_smooth import rough_sphere, shown_points
 
 SETTINGS = {
     "show_surface": {},
+    "mesh_surface": {},
     "principal_curvatures": {},
     "roughness": {},
     "smooth": {},

@@ -28,6 +28,7 @@ AGAIN = {
     "keep modes": ("smooth", {"method": "MODES", "modes": 30}, {"method": "MODES", "modes": 20, "strength": 0.5}),
     "mode_shape": ({}, {"mode": 7, "amplitude": 0.2, "phase": 1.0, "animate": True}),
     "show_surface": ({}, {}),
+    "mesh_surface": ({}, {"keep_open": False}),
     "principal_curvatures": ({}, {"display": "CURVEDNESS", "show": False}),
     "roughness": ({}, {"show": False}),
     "segment": ({"parts": 3}, {"parts": 3, "vertex_groups": True, "show": False}),
@@ -40,6 +41,7 @@ AGAIN = {
 COSTLY = {  # where each is called from
     "operators.running.cache": ("build_laplacian", "mean_curvature"),
     "operators.tools.minimal": ("minimal_surface",),
+    "operators.tools.mesh": ("mesh_surface", "values_on_mesh"),
     "operators.tools.surface": ("surface_discs",),
     "core.operator.laplacian": ("build_laplacian",),
     "core.operator.cholesky": ("dpotrf",),

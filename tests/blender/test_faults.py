@@ -51,10 +51,22 @@ def animated():
     return obj
 
 
+def compared():
+    """Two selected spheres of other sizes, the first one active."""
+    obj = handled()
+    other = add_object(1.1 * sphere_points(300, seed=3), "Other")
+    bpy.context.view_layer.objects.active = obj
+    for each in (obj, other):
+        each.select_set(True)
+    return obj
+
+
 RUNS = [
     (colored, "analyze", {"modes": 4}),
     (shared, "analyze", {}),
     (colored, "show_surface", {}),
+    (colored, "mesh_surface", {}),
+    (compared, "compare", {}),
     (handled, "spectrum", {"count": 5}),
     (handled, "principal_curvatures", {}),
     (keyed, "roughness", {}),

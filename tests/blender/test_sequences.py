@@ -23,6 +23,7 @@ STEPS = [
     ("principal_curvatures", {"display": "CURVEDNESS"}),
     ("roughness", {}),
     ("show_surface", {}),
+    ("mesh_surface", {"detail": 0.7}),
     ("segment", {"parts": 3}),
     ("segment", {"parts": 2, "vertex_groups": True}),
     ("separate_by_segment", {}),

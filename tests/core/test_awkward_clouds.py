@@ -261,6 +261,8 @@ USES = {
     "mean curvature": (-1, core.mean_curvature),
     "curvature": (-1, lambda on: core.principal_curvatures(on).curvedness),
     "roughness": (1, core.roughness),
+    "mesh": (1, lambda on: core.mesh_surface(on).vertices),
+    "deviation": (1, lambda on: core.surface_deviation(on.points, on.normals, on).distance),
     "fair": (1, core.fair_points),
     "fair inside": (1, lambda on: core.fair_points(on, dirichlet=True)),
     "fair, area": (1, lambda on: core.fair_points(on, keep="area")),
@@ -375,6 +377,10 @@ def calls():
     )
     yield core.fair_points, on, {"time": 0.01, "order": 3, "dirichlet": False, "keep": None}
     yield core.roughness, on, {"wavelength": 0.5}
+    yield core.surface_discs, {}, {"points": points}
+    yield core.mesh_surface, on, {"detail": 1.0}
+    yield core.values_on_mesh, on, {"vertices": points[:9]}
+    yield core.surface_deviation, on, {"points": points[:9], "normals": points[:9], "greatest": 1.0}
     yield core.displace_by_mode, on, {"mode": low, "amplitude": 0.1, "phase": 0.0}
     yield core.segment, {**on, **of}, {"parts": 2}
     yield core.nodal_domains, on, {"values": low, "threshold": 0.02, "bridge": 0.1, "smallest": 5}

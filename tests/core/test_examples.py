@@ -29,6 +29,7 @@ SHOWN = [
     "harmonic_field",
     "heat_kernel_signature",
     "mean_curvature",
+    "mesh_surface",
     "minimal_surface",
     "nodal_domains",
     "principal_curvatures",
@@ -37,6 +38,7 @@ SHOWN = [
     "smooth_points",
     "solve_poisson",
     "spectral_filter",
+    "surface_deviation",
     "surface_discs",
     "wave_kernel_signature",
 ]

@@ -1,0 +1,309 @@
+"""A mesh of the surface that the points lie on: surface nets on a grid that is known near the points only."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from ..arguments import real
+from ..blocks import blocks, on_all_cores
+from ..errors import NotEnoughMemoryError, PointCloudError
+from ..geometry import Prolongation, check_points
+from ..memory import available_memory
+from ..operator import ImplicitSurface
+
+_BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
+_REACH = 3.0  # spacings along the surface that a point is known for: wider gaps are holes
+_JUMP = 0.5  # voxels off the surface at which a change of sign is no cut, but a seam between sheets
+_ROUNDS = 2  # of moving vertices onto the surface, after which they are a thousandth of a voxel off
+_FRAGMENT = 20.0  # cells of points that a piece of the mesh covers at least: fewer points make no surface
+_FEWEST = 20  # faces of a mesh that is no shapeless lump
+_CANDIDATES = 1 << 20  # corners of the grid looked at at one time
+_BYTES = 1200  # of each place where a voxel of the grid meets the surface, at the peak
+_SHARE = 0.8  # of the free memory, for what else goes on meanwhile
+
+
+class SurfaceMesh(NamedTuple):
+    """A mesh of a surface.
+
+    Attributes
+    ----------
+    vertices : ndarray, (m, 3)
+        Places on the surface [L].
+    faces : ndarray, (q, 4) int
+        Quads, by their vertices: counterclockwise as the normals see them.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+
+
+def mesh_surface(laplacian, detail=1.0, *, progress=None):
+    """Make a mesh of the surface that the points lie on.
+
+    Quadrics of near points tell how far the corners of a regular grid are from the surface, in a narrow band around
+    it. Each voxel that the surface cuts gets a vertex and each cut edge a quad (surface nets); the vertices are then
+    moved onto the surface, to which they are as close as the quadrics: an error of third order in the spacing. Where
+    the points end, at a boundary or at gaps of several spacings, the mesh ends too.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Its normals must agree in sign, as those from quadrics do, and others with ``LaplacianOptions(orient=True)``.
+        Points that it leaves out make no surface.
+    detail : float
+        How many voxels there are along a typical spacing of the points: 2 gives four times as many faces as 1.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    SurfaceMesh
+
+    Raises
+    ------
+    PointCloudError
+        A detail that is not above zero, or so fine or so coarse that there is no mesh.
+    NotEnoughMemoryError
+        More voxels than the free memory is enough for, before the start.
+
+    See Also
+    --------
+    values_on_mesh : Carries functions from the points to the vertices.
+    surface_discs : Draws a surface without a mesh.
+
+    References
+    ----------
+    S. F. F. Gibson, Constrained elastic surface nets, 1998; R. Kolluri, Provably good moving least squares, 2008.
+
+    Examples
+    --------
+    A mesh of the unit sphere has no boundary and no handles, vertices - edges + faces = 2, where each quad has two
+    edges to itself:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> mesh = core.mesh_surface(core.build_laplacian(points))
+    >>> print(len(mesh.vertices) - len(mesh.faces))
+    2
+    >>> print(np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 1e-3)
+    True
+    """
+    report = progress or (lambda stage, fraction: None)
+    size = real(detail)
+    if not 0.0 < size < np.inf:
+        raise PointCloudError(f"The detail of the mesh is {detail!r}. Use a number above zero.")
+    report("Grid", 0.5)
+    kept = laplacian.component >= 0
+    spacing = np.sqrt(np.median(laplacian.areas[kept]))
+    voxel = spacing / size
+    places = laplacian.areas[kept].sum() / voxel**2
+    _check_memory(places, size)
+    surface = ImplicitSurface(laplacian, voxel)
+    grid, keys = _band(surface, lambda: report("Grid", 0.55))
+    cuts = _cuts(surface, grid, keys, lambda: report("Grid", 0.7))
+    report("Faces", 0.85)
+    vertices, faces = _without_fragments(*_quads(grid, *cuts), _FRAGMENT * size**2)
+    if not len(faces) or places < _FEWEST:
+        raise PointCloudError(
+            f"The {np.count_nonzero(kept)} points give no mesh at a detail of {size:g}: it would have voxels larger"
+            " than the surface. Raise the detail."
+        )
+    vertices = _onto(surface, vertices, _rim(faces), lambda: report("Faces", 0.9))
+    return SurfaceMesh(surface.placed(vertices), faces)
+
+
+def values_on_mesh(laplacian, vertices, *, progress=None):
+    """Prepare to carry functions on the points to the vertices of their mesh, along the surface.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+    vertices : array_like, (m, 3)
+        Places on or near the surface [L].
+    progress : callable, optional
+        Called without arguments again and again; may raise `Cancelled`.
+
+    Returns
+    -------
+    Prolongation
+        Its `interpolate` and `labels` take values on the n points and return those at the n points and then at the m
+        vertices.
+
+    Raises
+    ------
+    InvalidPointsError
+        Vertices of a wrong shape or not finite.
+
+    See Also
+    --------
+    mesh_surface : Makes vertices.
+    """
+    places = np.concatenate([laplacian.points, check_points(vertices)])
+    subset = np.arange(len(laplacian.points))
+    return Prolongation(places, subset, laplacian.normals, laplacian.component, progress=progress)
+
+
+def _check_memory(places, detail):
+    free = available_memory()
+    if free is not None and _BYTES * places > _SHARE * free:
+        raise NotEnoughMemoryError(
+            f"A mesh at a detail of {detail:g} would take about {_BYTES * places / 2**30:.1f} GB of memory, and"
+            f" {free / 2**30:.1f} GB are free. Lower the detail, or free memory.",
+            fitting=int(_SHARE * free / _BYTES),
+        )
+
+
+class _Grid:
+    """Corners of voxels of size one by their numbers, (k,) int64."""
+
+    def __init__(self, points, margin):
+        self.low = np.floor(points.min(axis=0)) - margin
+        counts = np.ceil(np.ptp(points, axis=0)) + 2.0 * margin + 2.0
+        if np.prod(counts) > 2.0**62:
+            raise PointCloudError(
+                "The points are so far apart, for their spacing, that no grid reaches over all of them. Delete the far"
+                " ones, or lower the detail."
+            )
+        self.steps = np.array([counts[1] * counts[2], counts[2], 1.0]).astype(np.int64)
+
+    def keys(self, corners):
+        """Return the numbers of corners, (..., 3) float whole numbers as from `corners`."""
+        return (corners - self.low).astype(np.int64) @ self.steps
+
+    def corners(self, keys):
+        """Return the places of corners, (k, 3) float."""
+        first, rest = np.divmod(keys, self.steps[0])
+        second, third = np.divmod(rest, self.steps[1])
+        return np.column_stack([first, second, third]) + self.low
+
+
+def _band(surface, report):
+    """Return a grid and its corners near the surface as sorted numbers: within gaps of the points, and above them."""
+    reach = _REACH * surface.spacing + 1.0
+    grid = _Grid(surface.points, np.ceil(reach.max()) + 3.0)
+    order = np.argsort(grid.keys(np.floor(surface.points / 8.0) * 8.0), kind="stable")  # neighbours work together
+    half = np.ceil(np.hypot(reach, _BAND)).astype(int)
+    parts = []
+    for size in np.unique(half):
+        rows = order[half[order] == size]
+        across = np.arange(-size, size + 1)
+        steps = np.stack(np.meshgrid(across, across, across, indexing="ij"), axis=-1).reshape(-1, 3)
+        parts += [(rows[part], steps) for part in blocks(len(rows), max(_CANDIDATES // len(steps), 1))]
+
+    def near(part):
+        rows, steps = part
+        corner = np.round(surface.points[rows])
+        shift = surface.points[rows] - corner
+        normals = surface.normals[rows]
+        squared = -2.0 * shift @ steps.T + (steps * steps).sum(axis=1) + (shift * shift).sum(axis=1)[:, None]
+        height = normals @ steps.T - np.einsum("ij,ij->i", normals, shift)[:, None]
+        bend = surface.bend(rows)[:, None] * squared
+        held = (np.abs(height) < _BAND + bend) & (squared < (reach[rows] ** 2 + _BAND**2)[:, None])
+        row, step = np.nonzero(held)
+        return np.unique(grid.keys(corner)[row] + (steps @ grid.steps)[step])
+
+    found = on_all_cores(near, parts, report)
+    return grid, np.unique(np.concatenate(found))
+
+
+def _cuts(surface, grid, keys, report):
+    """Find the edges of the grid that the surface cuts.
+
+    Returns
+    -------
+    ndarrays, (k,) int, (k,) int, (k,) bool, (k, 3), (k,) bool
+        The corner each begins at, its axis, whether the normal points forward along it, where it is cut, and whether
+        the surface there is that of the points.
+    """
+    height = surface.heights(grid.corners(keys), report).height
+    found = []
+    for axis, step in enumerate(grid.steps):
+        place = np.minimum(np.searchsorted(keys, keys + step), len(keys) - 1)
+        begin = np.flatnonzero((keys[place] == keys + step) & ((height < 0.0) != (height[place] < 0.0)))
+        low, high = height[begin], height[place[begin]]
+        cut = grid.corners(keys[begin])
+        cut[:, axis] += low / (low - high)
+        found.append((keys[begin], np.full(len(begin), axis), low < high, cut))
+    begin, axis, forward, cut = (np.concatenate(part) for part in zip(*found, strict=True))
+    there = surface.heights(cut, report)
+    real_cut = np.abs(there.height) < _JUMP
+    return begin[real_cut], axis[real_cut], forward[real_cut], cut[real_cut], there.belongs[real_cut]
+
+
+def _quads(grid, begin, axis, forward, cut, belongs):
+    """Return the vertices of the voxels that are cut, each the mean of its cuts, and a quad around each that belongs.
+
+    A voxel that several sheets cut has a vertex for each.
+    """
+    own, second, third = (grid.steps[(axis + turn) % 3] for turn in range(3))
+    around = begin[:, None] - np.stack([np.zeros_like(second), second, second + third, third], axis=1)
+    sides = np.stack([begin, begin - second, begin - third, begin], axis=1)  # faces of voxels between those around
+    sides = 3 * sides + np.stack([axis + 1, axis + 2, axis + 1, axis + 2], axis=1) % 3
+    inner = np.where(forward, begin, begin + own)
+    corner = _joined(around, sides.ravel(), np.repeat(inner, 4))
+    count = np.bincount(corner)
+    total = [np.bincount(corner, np.repeat(cut[:, way], 4)) for way in range(3)]
+    vertices = np.column_stack(total) / count[:, None]
+    faces = corner.reshape(-1, 4)
+    faces = np.where(forward[:, None], faces, faces[:, ::-1])[belongs]
+    return vertices, faces
+
+
+def _joined(around, sides, inner):
+    """Number the vertices of quads so that each of their edges has two quads at most, (4 q,) int.
+
+    Parameters
+    ----------
+    around : ndarray, (q, 4) int
+        Voxels of the corners of quads.
+    sides : ndarray, (4 q,) int
+        What each edge, from one corner to the next, crosses: a face between two voxels.
+    inner : ndarray, (4 q,) int
+        The corner of the grid below the surface at each. Where four quads meet, two sheets pass: those of a quad and of
+        the other one around the same corner.
+    """
+    _, meeting, count = np.unique(sides, return_inverse=True, return_counts=True)
+    meeting = meeting.reshape(-1)
+    several = np.where(count[meeting] > 2, inner, -1)
+    order = np.lexsort([several, meeting])
+    same = (np.diff(meeting[order]) == 0) & (np.diff(several[order]) == 0)
+    ends = np.arange(4 * len(around)).reshape(-1, 4)
+    ends = np.stack([ends, np.roll(ends, -1, axis=1)], axis=2).reshape(-1, 2)
+    ends = np.take_along_axis(ends, np.argsort(around.ravel()[ends], axis=1), axis=1)[order]
+    first, second = ends[:-1][same].ravel(), ends[1:][same].ravel()
+    graph = sparse.coo_array((np.ones(len(first), dtype=bool), (first, second)), shape=(around.size, around.size))
+    return connected_components(graph, directed=False)[1]
+
+
+def _without_fragments(vertices, faces, least):
+    """Leave out the faces of pieces of less than so many faces, and all vertices without faces."""
+    count = len(vertices)
+    edges = (np.ones(3 * len(faces), dtype=bool), (np.repeat(faces[:, 0], 3), faces[:, 1:].ravel()))
+    piece = connected_components(sparse.coo_array(edges, shape=(count, count)), directed=False)[1][faces[:, 0]]
+    faces = faces[np.bincount(piece)[piece] >= least] if len(faces) else faces
+    used, faces = np.unique(faces, return_inverse=True)
+    return vertices[used], faces.reshape(-1, 4).astype(np.int32)
+
+
+def _rim(faces):
+    """Return the vertices at edges of one face, (k,) int."""
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1).astype(np.int64)
+    keys, count = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)
+    lone = keys[count == 1]
+    return np.unique(np.concatenate([lone >> 32, lone & 0xFFFFFFFF]))
+
+
+def _onto(surface, vertices, rim, report):
+    """Move vertices onto the surface, and those at the rim to the boundary where there is one within a voxel."""
+    for _ in range(_ROUNDS):
+        there = surface.heights(vertices[rim], report)
+        ahead = np.where(np.abs(there.beyond) < 2.0, there.beyond, 0.0)
+        vertices[rim] -= ahead[:, None] * there.outward
+        there = surface.heights(vertices, report)
+        vertices -= np.clip(there.height, -0.5, 0.5)[:, None] * there.normal
+    return vertices

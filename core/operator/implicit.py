@@ -1,0 +1,147 @@
+"""The surface that points lie on, as the zero of a function around them: the mean of what near quadrics tell."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..blocks import blocks, on_all_cores
+from ..geometry import SMOOTH, find_nearest
+
+_NEIGHBORS = 12  # of a place, whose quadrics are averaged
+_BLOCK = 1 << 13  # places looked at at one time
+_BELONGS = 3.0  # spacings from the nearest point within which a place of the surface belongs to the points
+
+
+class Heights(NamedTuple):
+    """What is known at some places near a surface.
+
+    Attributes
+    ----------
+    height : ndarray, (k,)
+        Distance from the surface, positive on the side of the normals: exact for quadrics, to second order.
+    normal : ndarray, (k, 3)
+        Unit normals of the surface nearby.
+    distance : ndarray, (k,)
+        From the nearest point, in spacings of the points there.
+    beyond : ndarray, (k,)
+        How far the place lies beyond the boundary of the surface; negative inside, -inf where none is near.
+    outward : ndarray, (k, 3)
+        Unit vector across that boundary; zero where none is near.
+    """
+
+    height: np.ndarray
+    normal: np.ndarray
+    distance: np.ndarray
+    beyond: np.ndarray
+    outward: np.ndarray
+
+    @property
+    def belongs(self):
+        """Whether the surface next to the place is that of the points, (k,) bool: no gap between them, nor outside."""
+        return (self.distance < _BELONGS) & (self.beyond <= 0.0)
+
+
+class ImplicitSurface:
+    """The surface of points with quadrics, as the zero of a signed height: implicit moving least squares.
+
+    Of the nearest points of a place, those of the same sheet as the very nearest one each tell how far the place is
+    above their quadric; the mean of that, weighted by distance, is its height. So sharp edges stay sharp.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Its normals must agree in sign. Points that it leaves out make no surface.
+    unit : float
+        Length [L] that counts as one in all that is measured.
+
+    Attributes
+    ----------
+    points, normals : ndarray, (m, 3)
+        The points on the surface in these units, from their middle on, and unit normals.
+    spacing : ndarray, (m,)
+        Distance between neighbouring points in these units; next to a change of density the larger one.
+    """
+
+    def __init__(self, laplacian, unit):
+        kept = laplacian.component >= 0
+        self._middle, self._unit = laplacian.surface_points[kept].mean(axis=0), unit
+        points = self.scaled(laplacian.surface_points[kept])
+        nearest = find_nearest(points)
+        self.points, self._tree = points, nearest.tree
+        self.spacing = nearest.spacing.copy()
+        # Where dense points end and sparse ones begin, the gap between them is as wide as those of the sparse ones.
+        np.maximum.at(self.spacing, nearest.index, self.spacing[:, None] - nearest.distance / _BELONGS)
+        self.normals, self._component = laplacian.normals[kept], laplacian.component[kept]
+        self._shape_operator = laplacian.shape_operator[kept] * unit
+        inside, outward = laplacian.boundary_distance[kept] / unit, laplacian.boundary_direction[kept]
+        known = np.isfinite(inside) & outward.any(axis=1)
+        self._inside = np.where(known, inside, np.inf)
+        self._outward = np.where(known[:, None], outward, 0.0)
+
+    def scaled(self, points):
+        """Return points [L], (k, 3), in the units and from the middle that all else is measured in."""
+        return (points - self._middle) / self._unit
+
+    def placed(self, points):
+        """Return points in these units, (k, 3), as they are [L]."""
+        return self._middle + self._unit * points
+
+    def nearest(self, places):
+        """Return the number of the point that is nearest to each place, (k,) int."""
+        return self._tree.query(places, workers=-1)[1]
+
+    def bend(self, rows):
+        """Return half a curvature of some points, (k,): how fast the surface leaves their tangent planes."""
+        forms = self._shape_operator[rows]
+        return 0.5 * np.sqrt(np.einsum("iab,iab->i", forms, forms))
+
+    def heights(self, places, report=lambda: None):
+        """Measure places near the surface.
+
+        Parameters
+        ----------
+        places : ndarray, (k, 3)
+        report : callable
+            Called again and again; may raise `Cancelled`.
+
+        Returns
+        -------
+        Heights
+        """
+        count = len(places)
+        result = Heights(np.empty(count), np.empty((count, 3)), np.empty(count), np.empty(count), np.empty((count, 3)))
+
+        def measure(block):
+            for known, found in zip(result, self._measure(places[block]), strict=True):
+                known[block] = found
+
+        on_all_cores(measure, blocks(count, _BLOCK), report)
+        return result
+
+    def _measure(self, places):
+        many = min(_NEIGHBORS, len(self.points))
+        distance, index = self._tree.query(places, k=many)
+        first, normals = index[:, 0], self.normals[index]
+        spacing = self.spacing[first]
+        same = np.einsum("ikc,ic->ik", normals, normals[:, 0]) > SMOOTH
+        same &= self._component[index] == self._component[first, None]
+        # Of a place far off the surface all points are about as far: what counts is by how much they are further.
+        weight = np.where(same, np.exp((distance[:, :1] ** 2 - distance**2) / spacing[:, None] ** 2), 0.0)
+        weight /= weight.sum(axis=1, keepdims=True)
+        offset = places[:, None] - self.points[index]
+        bent = np.einsum("ikcd,ikd->ikc", self._shape_operator[index], offset)
+        above = np.einsum("ikc,ikc->ik", offset, normals + 0.5 * bent)
+        height = np.einsum("ik,ik->i", weight, above)
+        normal = _units(np.einsum("ik,ikc->ic", weight, normals + bent))
+
+        inside, outward = self._inside[index], self._outward[index]
+        near = np.where(np.isfinite(inside[:, :1]), weight * np.isfinite(inside), 0.0)
+        total = np.maximum(near.sum(axis=1), 1e-300)
+        past = np.einsum("ikc,ikc->ik", offset, outward) - np.where(near > 0.0, inside, 0.0)
+        beyond = np.where(near[:, 0] > 0.0, np.einsum("ik,ik->i", near, past) / total, -np.inf)
+        outward = _units(np.einsum("ik,ikc->ic", near, outward))
+        return height, normal, distance[:, 0] / spacing, beyond, outward
+
+
+def _units(vectors):
+    return vectors / np.maximum(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), 1e-300)[:, None]

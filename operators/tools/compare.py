@@ -1,0 +1,95 @@
+"""Compare two clouds: how far the points of one are from the surface of the other."""
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty
+
+from ...core import PointCloudError, surface_deviation
+from ..objects.attributes import COMPARED, DEVIATION, tag_changed, write_attribute
+from ..objects.reading import TYPES, obstacle
+from ..objects.result import length_text
+from ..running.application import ShownOperator, naming, operator_reader
+
+
+class MESHFREE_OT_compare(ShownOperator, bpy.types.Operator):
+    """Measure how far the points of the active object are from the surface of the other selected one"""
+
+    bl_idname = "meshfree.compare"
+    bl_label = "Compare Points"
+    writes = (DEVIATION, COMPARED)
+    asks = ("greatest", "show")
+    only_active = True
+
+    greatest: FloatProperty(
+        name="Greatest Distance",
+        description="Points farther from the other surface are not compared; 0 for any distance",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason:
+            return reason
+        count = len(_others(context))
+        if count != 1:
+            many = f"{count} others are" if count else "no other is"
+            return f'"{context.object.name}" is compared with one other cloud, and {many} selected. Select one'
+        return obstacle(_others(context)[0])
+
+    def plan(self, context, obj):
+        [other] = _others(context)
+        reading, operator = operator_reader(context, obj)
+        with naming(other.name):
+            _, other_operator = operator_reader(context, other)
+        # Points are read without the place of their objects: here as they lie about the other one.
+        shift = np.array(obj.matrix_world.translation) - np.array(other.matrix_world.translation)
+        greatest, own_name, name = self.greatest or None, obj.name, other.name
+
+        def compute(progress):
+            normals = operator(lambda stage, fraction: progress(stage, 0.4 * fraction)).normals
+            with naming(name):
+                laplacian = other_operator(lambda stage, fraction: progress(stage, 0.4 + 0.4 * fraction))
+            found = surface_deviation(
+                reading.points + shift,
+                normals,
+                laplacian,
+                greatest,
+                progress=lambda stage, fraction: progress(stage, 0.8 + 0.2 * fraction),
+            )
+            if not found.known.any():
+                raise PointCloudError(
+                    f'No point of "{own_name}" has the surface of "{name}" above or below it. Move the objects onto'
+                    " each other, or raise Greatest Distance."
+                )
+            return found, name
+
+        return compute
+
+    def write(self, context, obj, result):
+        found, name = result
+        write_attribute(obj.data, DEVIATION, found.distance)
+        write_attribute(obj.data, COMPARED, found.known)
+        tag_changed(obj.data)
+        sizes = np.abs(found.distance[found.known])
+        mean, most = length_text(sizes.mean()), length_text(sizes.max())
+        within = length_text(np.percentile(sizes, 95.0))
+        line = f"{obj.name}: {mean} from {name} on average, 95 % within {within}, {most} at most"
+        left = np.count_nonzero(~found.known)
+        if not left:
+            return [line]
+        notice = (
+            f"{left:,} of {len(found.known):,} points lie beside the surface of {name}, or too far from it: they are"
+            f" not compared, and {COMPARED} is false there."
+        )
+        return [notice, line]
+
+
+def _others(context):
+    """Return the other selected objects that hold points."""
+    return [other for other in context.selected_objects if other != context.object and other.type in TYPES]
+
+
+CLASSES = (MESHFREE_OT_compare,)

@@ -1,0 +1,186 @@
+"""Make a mesh of the surface that the points lie on, with all that they hold on its vertices."""
+
+import bmesh
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, FloatProperty
+
+from ...core import mesh_surface, values_on_mesh
+from ..objects.attributes import DIRECTION_1, DISC, NORMAL, STORABLE, point_count, read_attribute, write_attribute
+from ..objects.color_choices import COLOR_CHOICES
+from ..objects.handlers import tell
+from ..running import cache
+from ..running.application import ApplicationOperator, operator_reader
+
+_COLORS = "FLOAT_COLOR", "BYTE_COLOR"
+_LEFT = DISC, "position"  # attributes that mean nothing on a mesh, or something else
+_GAP = 12  # edges around a hole that is no opening, but a gap between points
+_STEPS = 255  # of weights
+
+
+class MESHFREE_OT_mesh_surface(ApplicationOperator, bpy.types.Operator):
+    """Make a mesh of the surface that the points lie on, with their results, colors and groups on its vertices"""
+
+    bl_idname = "meshfree.mesh_surface"
+    bl_label = "Surface from Points"
+    asks = ("detail", "keep_open")
+    adjustable = ("keep_open",)
+    _made = ()  # names of objects, and of those that hold their meshes
+
+    detail: FloatProperty(
+        name="Detail",
+        description="How many edges there are along the distance between neighboring points; 2 makes four times as many"
+        " faces as 1",
+        default=1.0,
+        min=0.05,
+        soft_min=0.25,
+        soft_max=4.0,
+        max=16.0,
+    )
+    keep_open: BoolProperty(
+        name="Keep Open",
+        description="End the mesh where the points end; otherwise all openings are closed, such as for printing",
+        default=True,
+    )
+
+    def plan(self, context, obj):
+        reading, operator = operator_reader(context, obj)
+        detail, kept = self.detail, _Kept(obj)
+
+        def make(laplacian, progress):
+            mesh = mesh_surface(laplacian, detail, progress=progress)
+            carrying = values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
+            return mesh, carrying
+
+        def compute(progress):
+            laplacian = operator(progress)
+            mesh, carrying = cache.result(laplacian, "mesh", detail, compute=lambda: make(laplacian, progress))
+            faces = mesh.faces if np.linalg.det(reading.matrix) > 0.0 else mesh.faces[:, ::-1]
+            return reading.local(mesh.vertices), faces, kept.carried(carrying, len(mesh.vertices))
+
+        return compute
+
+    def write(self, context, obj, result):
+        vertices, faces, carried = result
+        made = bpy.data.objects.new(f"{obj.name} Surface", _mesh(f"{obj.name} Surface", vertices, faces))
+        for collection in obj.users_collection:
+            collection.objects.link(made)
+        made.matrix_world = obj.matrix_world
+        opened = _close(made.data, _GAP if self.keep_open else 0)
+        carried.write(made)
+        for name in COLOR_CHOICES:
+            setattr(made.meshfree, name, getattr(obj.meshfree, name))
+        self._made = (*self._made, (obj.name, made.name))
+        state = "closed" if not opened else "open"
+        return [f"{made.name}: {len(made.data.polygons):,} faces, {state}. The points are hidden"]
+
+    def conclude(self, context, objects):
+        """Show the meshes as their points were shown, and hide these."""
+        made = {name: bpy.data.objects[other] for name, other in self._made}
+        self._made = ()
+        for obj in objects:
+            tell("mesh_made", obj, made[obj.name])
+        for other in context.selected_objects:
+            other.select_set(False)
+        for obj in objects:
+            made[obj.name].select_set(True)
+        context.view_layer.objects.active = made[objects[0].name]
+        for obj in objects:
+            obj.hide_set(True)
+
+
+class _Kept:
+    """What the points of an object hold: attributes, colors, and weights in vertex groups."""
+
+    def __init__(self, obj):
+        self._types, self._values = {}, {}
+        for attribute in obj.data.attributes:
+            name = attribute.name
+            if attribute.domain != "POINT" or name in _LEFT or name.startswith("."):
+                continue
+            if attribute.data_type in STORABLE:
+                self._values[name] = read_attribute(obj.data, name)
+            elif attribute.data_type in _COLORS:
+                self._values[name] = np.empty((point_count(obj.data), 4), np.float32)
+                attribute.data.foreach_get("color", self._values[name].reshape(-1))
+            else:
+                continue
+            self._types[name] = attribute.data_type
+        self._groups = _weights(obj)
+
+    def carried(self, carrying, count):
+        """Return the same on the vertices of a mesh, the last ones of so many, by a `Prolongation`."""
+        result = object.__new__(_Kept)
+        result._types = self._types
+        result._values = {name: self._carry(carrying, name, values)[-count:] for name, values in self._values.items()}
+        result._groups = {
+            name: np.clip(carrying.interpolate(weights)[-count:], 0.0, 1.0) for name, weights in self._groups.items()
+        }
+        return result
+
+    def _carry(self, carrying, name, values):
+        if values.dtype.kind != "f" or name == DIRECTION_1:  # which has no sign
+            return carrying.labels(values)
+        smooth = carrying.interpolate(values)
+        if name == NORMAL:
+            smooth /= np.maximum(np.linalg.norm(smooth, axis=1), 1e-30)[:, None]
+        return np.clip(smooth, 0.0, None) if self._types[name] in _COLORS else smooth
+
+    def write(self, obj):
+        """Put all of it on the vertices of a mesh."""
+        for name, values in self._values.items():
+            if self._types[name] in _COLORS:
+                layer = obj.data.attributes.new(name, self._types[name], "POINT")
+                layer.data.foreach_set("color", np.ascontiguousarray(values, np.float32).reshape(-1))
+            else:
+                write_attribute(obj.data, name, values, self._types[name])
+        for name, weights in self._groups.items():
+            group = obj.vertex_groups.new(name=name)
+            steps = np.round(_STEPS * weights).astype(int)
+            order = np.argsort(steps, kind="stable")
+            for part in np.split(order, np.flatnonzero(np.diff(steps[order])) + 1):
+                if steps[part[0]]:
+                    group.add(part.tolist(), steps[part[0]] / _STEPS, "REPLACE")
+
+
+def _weights(obj):
+    """Read the weights in all vertex groups of an object, by name, (n,) each; points outside weigh nothing."""
+    if obj.type != "MESH" or not obj.vertex_groups:
+        return {}
+    weights = np.zeros((len(obj.vertex_groups), point_count(obj.data)), np.float32)
+    for vertex in obj.data.vertices:
+        for item in vertex.groups:
+            weights[item.group, vertex.index] = item.weight
+    return {group.name: weights[group.index] for group in obj.vertex_groups}
+
+
+def _mesh(name, vertices, faces):
+    """Return a mesh, shaded smooth, of vertices (m, 3) and quads (q, 4)."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).reshape(-1))
+    mesh.loops.add(faces.size)
+    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(faces, np.int32).reshape(-1))
+    mesh.polygons.add(len(faces))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, faces.size, 4, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    return mesh
+
+
+def _close(mesh, most):
+    """Close the holes of a mesh of so many edges at most, 0 for all; return how many edges are left open."""
+    shape = bmesh.new()
+    shape.from_mesh(mesh)
+    edges = [edge for edge in shape.edges if edge.is_boundary]
+    if edges:
+        filled = bmesh.ops.holes_fill(shape, edges=edges, sides=most)["faces"]
+        bmesh.ops.triangulate(shape, faces=[face for face in filled if len(face.verts) > 4])
+    for face in shape.faces:
+        face.smooth = True
+    opened = sum(edge.is_boundary for edge in shape.edges)
+    shape.to_mesh(mesh)
+    shape.free()
+    return opened
+
+
+CLASSES = (MESHFREE_OT_mesh_surface,)
