@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
 
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
@@ -17,6 +18,7 @@ _CERTAIN = 0.9  # cosine of a link that carries a sign without doubt: 26 degrees
 _PATCHES = 200  # that a surface is divided into at most
 _CLUMPS = 4000  # of points, each a dipole; pairs of them are summed in blocks
 _BLOCK = 250
+_SPHERE = 30.0  # radius that points are mirrored in to see which are hidden, over that of the cloud
 _COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
 
 
@@ -31,8 +33,9 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
         Of any length and sign.
     method : {"winding", "outside", "viewpoint"}
         'outside' lets neighbours agree and each connected part point away from its middle; 'viewpoint' lets patches
-        look to where they were seen from; 'winding' decides patch by patch so that the winding number is as close to
-        constant off the surface as it can be, which holds in noise and where parts of the surface are missing.
+        look to where they were seen from, of one place by the points that are not hidden from it; 'winding' decides
+        patch by patch so that the winding number is as close to constant off the surface as it can be, which holds in
+        noise and where parts of the surface are missing.
     viewpoint : array_like, (3,) or (n, 3), optional
         For 'viewpoint': one place, or the place of the scanner for each point [L].
     areas : array_like, (n,), optional
@@ -107,7 +110,9 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
         place = scaled.points + sample.moved  # where components stand as they do
         if method == "viewpoint":
             votes = np.einsum("ij,ij->i", oriented, towards[scaled.first])
-            sign = np.where(np.bincount(patch, votes) < 0.0, -1.0, 1.0)
+            if np.ndim(viewpoint) == 1:
+                votes = np.where(_seen(points[scaled.first] - viewpoint), votes, 0.0)
+            sign = _elected(votes, patch, sample.component)
         else:
             weight = nearest.spacing**2
             if areas is not None:
@@ -149,6 +154,30 @@ def _checked_areas(areas, count):
         bad = np.count_nonzero(~(np.isfinite(given) & (given > 0.0)))
         raise InvalidPointsError(f"{bad} of {count} areas are not above zero. Leave the areas out to have them found.")
     return given / given.max()
+
+
+def _seen(offset):
+    """Tell which points are not hidden by others, (m,) bool, by their places as seen from the viewpoint, (m, 3).
+
+    Points mirrored in a large sphere about the viewpoint lie on the convex hull where they are seen (Katz, Tal, Basri
+    2007. Direct visibility of point sets).
+    """
+    distance = np.linalg.norm(offset, axis=1)
+    largest = distance.max()
+    distance = np.maximum(distance, np.finfo(float).eps * largest)[:, None]
+    mirrored = offset / distance * (2.0 * _SPHERE - distance / largest)
+    hull = ConvexHull(np.append(mirrored, np.zeros((1, 3)), axis=0), qhull_options="QJ")  # flat clouds have one, too
+    seen = np.zeros(len(offset) + 1, dtype=bool)
+    seen[hull.vertices] = True
+    return seen[:-1]
+
+
+def _elected(votes, patch, component):
+    """Return the sign of each patch for which its points vote, (m,); where none does, those of its component."""
+    of_patch = np.empty(patch.max() + 1, dtype=int)
+    of_patch[patch] = component
+    total = np.bincount(patch, votes)
+    return np.where(np.where(total == 0.0, np.bincount(component, votes)[of_patch], total) < 0.0, -1.0, 1.0)
 
 
 def _patches(points, normals, tree):

@@ -83,6 +83,24 @@ def test_viewpoint_within_turns_all_inwards_and_one_per_point_outwards():
     np.testing.assert_array_equal(outer, normals)
 
 
+@pytest.mark.parametrize("distance", [1.5, 3.0, 1000.0])
+def test_the_hidden_side_of_a_closed_surface_does_not_vote(distance):
+    sphere = fibonacci_sphere(1000)
+    seen = core.orient_normals(sphere, mixed(sphere), method="viewpoint", viewpoint=[0.0, distance, 0.0])
+    np.testing.assert_allclose(seen, sphere, atol=1e-12)
+    half = sphere[:, 1] > 0.2
+    found = core.orient_normals(sphere[half], mixed(sphere[half]), method="viewpoint", viewpoint=[0.0, -distance, 0.0])
+    np.testing.assert_allclose(found, -sphere[half], atol=1e-12)
+
+
+def test_viewpoint_of_a_flat_cloud():
+    x, y = np.mgrid[0:1:20j, 0:1:20j].reshape(2, -1)
+    points = np.column_stack([x, y, 0.0 * x])
+    up = np.tile([0.0, 0.0, 1.0], (len(x), 1))
+    found = core.orient_normals(points, mixed(up), method="viewpoint", viewpoint=[0.0, 9.0, -1.0])
+    np.testing.assert_array_equal(found, -up)
+
+
 def test_few_wrong_viewpoints_are_outvoted():
     sphere = fibonacci_sphere(1000)
     seen = 3.0 * sphere
