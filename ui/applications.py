@@ -15,6 +15,7 @@ class MESHFREE_PT_curvature(ReadyPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         column.operator("meshfree.principal_curvatures", text="Principal Curvatures...")
         column.operator("meshfree.roughness", text="Roughness...")
+        self.layout.operator("meshfree.orient_normals", text="Orient Normals...")
 
 
 class MESHFREE_PT_shape(ReadyPanel, bpy.types.Panel):

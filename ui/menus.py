@@ -6,7 +6,7 @@ from ..operators.files.importing import OWN
 
 _TOOLS = (
     ("show_surface", "analyze", "spectrum", "colormap", "legend"),
-    ("principal_curvatures", "roughness"),
+    ("principal_curvatures", "roughness", "orient_normals"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
     ("geodesic_distance", "harmonic_field"),

@@ -167,4 +167,8 @@ def operator_reader(context, obj):
     """Read an object's points; return them, and a function of a progress callback that gives their operator."""
     reading = read_points(context, obj)
     options = laplacian_options(obj.meshfree)
-    return reading, lambda progress: cache.build(reading.points, options, reading.boundary, progress).laplacian
+
+    def operator(progress):
+        return cache.build(reading.points, options, reading.boundary, progress, reading.orientation).laplacian
+
+    return reading, operator

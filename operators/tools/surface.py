@@ -4,9 +4,10 @@ import bpy
 import numpy as np
 
 from ...core import surface_discs
+from ...core.geometry import toward
 from ..objects.attributes import DISC, tag_changed, write_attribute
 from ..objects.handlers import tell
-from ..objects.reading import read_points, typical_distance
+from ..objects.reading import chosen_sides, read_points, typical_distance
 from ..running import cache
 from ..running.application import ApplicationOperator
 
@@ -21,11 +22,13 @@ class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
     def plan(self, context, obj):
         reading = read_points(context, obj)
         local = reading.local(reading.points)
+        sides = chosen_sides(obj)
 
         def compute(progress):
             discs = cache.fetch(cache.content("discs", local), lambda: surface_discs(local, progress=progress))
             spacing = typical_distance(local) or np.median(discs.radii)  # none where many points share a place
-            return discs.normals * (discs.radii / spacing)[:, None]
+            normals = discs.normals if sides is None else toward(discs.normals, sides)
+            return normals * (discs.radii / spacing)[:, None]
 
         return compute
 

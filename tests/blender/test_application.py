@@ -14,6 +14,7 @@ SETTINGS = {
     "show_surface": {},
     "principal_curvatures": {},
     "roughness": {},
+    "orient_normals": {},
     "smooth": {},
     "mode_shape": {},
     "segment": {"parts": 3, "vertex_groups": True},

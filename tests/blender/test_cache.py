@@ -30,6 +30,7 @@ AGAIN = {
     "show_surface": ({}, {}),
     "principal_curvatures": ({}, {"display": "CURVEDNESS", "show": False}),
     "roughness": ({}, {"show": False}),
+    "orient_normals": ({}, {"flip": True, "show": False}),
     "segment": ({"parts": 3}, {"parts": 3, "vertex_groups": True, "show": False}),
     "signs": ("segment", {"method": "NODAL"}, {"method": "NODAL", "show": False}),
     "signature": ({"modes": 12}, {"modes": 12, "kind": "WAVE", "count": 3}),
@@ -40,6 +41,7 @@ AGAIN = {
 COSTLY = {  # where each is called from
     "operators.running.cache": ("build_laplacian", "mean_curvature"),
     "operators.tools.minimal": ("minimal_surface",),
+    "operators.tools.orient": ("orient_normals",),
     "operators.tools.surface": ("surface_discs",),
     "core.operator.laplacian": ("build_laplacian",),
     "core.operator.cholesky": ("dpotrf",),

@@ -22,6 +22,8 @@ STEPS = [
     ("colormap", {"attribute": "lb_area"}),
     ("principal_curvatures", {"display": "CURVEDNESS"}),
     ("roughness", {}),
+    ("orient_normals", {}),
+    ("orient_normals", {"method": "KEEP", "flip": True}),
     ("show_surface", {}),
     ("segment", {"parts": 3}),
     ("segment", {"parts": 2, "vertex_groups": True}),
