@@ -60,7 +60,15 @@ from .errors import (
     TooFewPointsError,
     UnresolvedModesError,
 )
-from .geometry import Discs, Prolongation, blue_noise_subset, check_points, estimate_normals, surface_discs
+from .geometry import (
+    Discs,
+    Prolongation,
+    blue_noise_subset,
+    check_points,
+    estimate_normals,
+    orient_normals,
+    surface_discs,
+)
 from .memory import points_that_fit
 from .operator import (
     LaplaceBeltrami,
@@ -121,6 +129,7 @@ __all__ = [
     "minimal_surface",
     "modes_needed",
     "nodal_domains",
+    "orient_normals",
     "points_that_fit",
     "principal_curvatures",
     "roughness",

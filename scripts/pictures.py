@@ -96,6 +96,29 @@ def roughness(path):
     single(obj, "lb_roughness", path)
 
 
+def orient(path):
+    """A noisy ring whose scan has gaps all along, colored by the side that looks at the viewer, before and after."""
+    around, across, places = np.random.default_rng(2).random((3, 9_000))
+    around, across = 2.0 * np.pi * around, 2.0 * np.pi * across
+    kept = (places < (2.0 + np.cos(across)) / 3.0) & (np.abs(np.cos(across)) > 0.3)
+    around, across = around[kept], across[kept]
+    out = np.column_stack([np.cos(around), np.sin(around), 0.0 * around])
+    points = 2.0 * out + np.cos(across)[:, None] * out + np.sin(across)[:, None] * [0.0, 0.0, 1.0]
+    points += 0.4 * 0.07 * places[kept].std() * np.random.default_rng(3).standard_normal(points.shape)
+    before, after = studio.make_object(points, "Before"), studio.make_object(points, "After")
+    for obj, kind in ((before, "OUTSIDE"), (after, "WINDING")):
+        studio.activate(obj)
+        bpy.ops.meshfree.orient_normals(method=kind, show=False)
+        normals = np.empty(3 * len(points), np.float32)
+        obj.data.attributes["lb_normal"].data.foreach_get("vector", normals)
+        outer = np.where(np.cos(across) > 0.0, 1.0, -1.0) * np.einsum("ij,ij->i", normals.reshape(-1, 3), out)
+        layer = obj.data.attributes.new("outer", "FLOAT", "POINT")
+        layer.data.foreach_set("value", np.sign(outer).astype(np.float32))
+        obj.meshfree.color_map = "COOL_WARM"
+        studio.show(obj, "outer")
+    row((before, after), path, legend=None)
+
+
 def mode(path):
     """One vibration mode."""
     obj = coral()
@@ -206,6 +229,7 @@ PICTURES = {
     "compare": compare,
     "shape_index": shape_index,
     "roughness": roughness,
+    "orient": orient,
     "signature": signature,
     "distance": distance,
     "field": field,

@@ -23,13 +23,15 @@ class MESHFREE_PT_measure(ReadyPanel, bpy.types.Panel):
 
 
 class MESHFREE_PT_clean(ReadyPanel, bpy.types.Panel):
-    """Removing noise, and other filters of the shape"""
+    """Removing noise and other filters of the shape, and which side normals point to"""
 
     bl_label = "Clean"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        self.layout.operator("meshfree.smooth", text="Smooth Points...")
+        column = self.layout.column(align=True)
+        column.operator("meshfree.smooth", text="Smooth Points...")
+        column.operator("meshfree.orient_normals", text="Orient Normals...")
 
 
 class MESHFREE_PT_segment(ReadyPanel, bpy.types.Panel):

@@ -1,5 +1,7 @@
 """The layouts of dialogs and of Adjust Last Operation, from what operators say that they ask for."""
 
+import bpy
+
 from ..operators.files.exporting import MESHFREE_OT_export_points
 from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.objects.groups import ROLES, has_group
@@ -10,6 +12,8 @@ def draw_setting(layout, settings, name: str, obj):
     """Draw a setting; one that names a group or an attribute of an object with a list of those."""
     if name.endswith("group"):
         search_group(layout, settings, name, obj)
+    elif name == "viewpoint":
+        layout.prop_search(settings, name, bpy.data, "objects")
     elif name == "source":
         layout.prop_search(settings, name, obj.data, "attributes")
     else:

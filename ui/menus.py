@@ -7,7 +7,7 @@ from ..operators.files.importing import OWN
 _TOOLS = (
     ("show_surface", "analyze", "spectrum", "colormap", "legend"),
     ("mesh_surface", "compare"),
-    ("principal_curvatures", "roughness"),
+    ("principal_curvatures", "roughness", "orient_normals"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
     ("geodesic_distance", "harmonic_field"),

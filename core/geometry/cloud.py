@@ -13,7 +13,7 @@ from .components import label_components, move_apart
 from .distances import measure_roughness
 from .nearest import Nearest, find_nearest
 from .noise import FILLING, LEFT, MOST, noise_level, project_points
-from .normals import covariance_normals, orient_normals, unit_normals
+from .normals import covariance_normals, orient_outwards, unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, check_boundary, check_distances, check_points, scale_points
@@ -141,7 +141,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
     report("Normals", 0.18)
     given = None if normals is None else unit_normals(normals, len(points))[sample.scaled.first]
-    oriented = orient_normals(nearest, quadrics.normals if given is None else given)
+    oriented = orient_outwards(nearest, quadrics.normals if given is None else given)
 
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature if options.curvature_correction else np.zeros(len(oriented))
@@ -394,7 +394,7 @@ def final_normals(nearest, pairs, given, oriented, options):
     if options.normals == "quadric":
         return oriented
     normals = covariance_normals(pairs, weighted=options.normals == "wpca")
-    return orient_normals(nearest, normals) if options.orient else normals
+    return orient_outwards(nearest, normals) if options.orient else normals
 
 
 def _notices(duplicates, left_out, share, noise, narrow):
@@ -514,7 +514,7 @@ def surface_discs(points, *, progress=None):
     report("Normals", 0.0)
     scaled, surface = read_surface(check_points(points), LaplacianOptions(neighbors=_DRAWN, projection="off"), report)
     sample = surface.sample
-    oriented = orient_normals(sample.nearest, surface.quadrics.normals)
+    oriented = orient_outwards(sample.nearest, surface.quadrics.normals)
     report("Discs", 0.5)
     curvature, everywhere = surface.quadrics.gaussian_curvature, no_boundary(len(oriented))
     cells = measure_cells(

@@ -80,8 +80,32 @@ def covariance_normals(pairs, weighted=True):
     return np.ascontiguousarray(directions[:, :, 0])
 
 
-def orient_normals(nearest, normals):
+def orient_outwards(nearest, normals):
     """Flip normals so that neighbours agree, outwards where the cloud encloses a volume.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals of arbitrary sign.
+
+    Returns
+    -------
+    ndarray, (m, 3)
+        The same normals with consistent signs. Every component points away from its own centroid on the whole.
+    """
+    points = nearest.points
+    normals, tree = propagate_signs(nearest, normals)
+    count, component = connected_components(tree, directed=False)
+    size = np.bincount(component, minlength=count)
+    centroid = np.column_stack([np.bincount(component, points[:, axis], count) for axis in range(3)]) / size[:, None]
+    outward = np.bincount(component, np.einsum("ij,ij->i", points - centroid[component], normals), count)
+    return normals * np.where(outward < 0.0, -1.0, 1.0)[component, None]
+
+
+def propagate_signs(nearest, normals):
+    """Flip normals so that neighbours agree.
 
     The sign travels along a minimum spanning tree of the neighbour graph, whose edges cost least where a circular arc
     joins both points best (Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1992). Along an arc the second normal is the
@@ -97,7 +121,9 @@ def orient_normals(nearest, normals):
     Returns
     -------
     ndarray, (m, 3)
-        The same normals with consistent signs. Every component points away from its own centroid on the whole.
+        The same normals with consistent signs.
+    csr_array, (m, m)
+        The tree.
     """
     points = nearest.points
     n = len(points)
@@ -105,9 +131,9 @@ def orient_normals(nearest, normals):
     cost = (
         1.0 + 1e-9 - np.minimum(np.abs(mirrored_cosine(points, normals, first, second)), 1.0)
     )  # zero would be no edge
-    graph = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
-    graph = graph + graph.T
-    count, component = connected_components(graph, directed=False)
+    tree = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
+    graph = tree + tree.T
+    component = connected_components(graph, directed=False)[1]
 
     parent = np.arange(n)
     for root in np.unique(component, return_index=True)[1]:
@@ -119,12 +145,7 @@ def orient_normals(nearest, normals):
     while np.any(parent != parent[parent]):  # each round doubles the length of the path already multiplied
         sign *= sign[parent]
         parent = parent[parent]
-    normals = normals * sign[:, None]
-
-    size = np.bincount(component, minlength=count)
-    centroid = np.column_stack([np.bincount(component, points[:, axis], count) for axis in range(3)]) / size[:, None]
-    outward = np.bincount(component, np.einsum("ij,ij->i", points - centroid[component], normals), count)
-    return normals * np.where(outward < 0.0, -1.0, 1.0)[component, None]
+    return normals * sign[:, None], tree
 
 
 def near_edges(nearest):

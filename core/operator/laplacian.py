@@ -6,7 +6,8 @@ import numpy as np
 from scipy import sparse
 
 from ..arguments import check_switches
-from ..geometry import arc_length, check_points, check_values, move_apart, projected_distance, read_cloud
+from ..errors import InvalidPointsError
+from ..geometry import arc_length, check_points, check_values, move_apart, projected_distance, read_cloud, toward
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
@@ -113,6 +114,54 @@ class LaplaceBeltrami:
         """
         pull = sparse.diags_array(self.images.sum(axis=1)) + self.images
         return (self.stiffness + 2.0 * self.images).tocsr(), pull.tocsr()
+
+    def toward(self, directions):
+        """Return the same operator with normals that point to the side of given directions.
+
+        Parameters
+        ----------
+        directions : array_like, (n, 3)
+            Such as of `orient_normals`; where they are zero the normal stays as it is.
+
+        Returns
+        -------
+        LaplaceBeltrami
+            Normals, and the curvature that takes its sign from them, are reversed where they pointed against the
+            directions. All else is the same: the Laplacian knows no sides.
+
+        Raises
+        ------
+        InvalidPointsError
+            Directions that do not fit the points, or are not finite.
+
+        See Also
+        --------
+        orient_normals : Finds the sides.
+        mean_curvature : Has the sign that the normals give it.
+
+        Examples
+        --------
+        A sphere seen from within is hollow:
+
+        >>> import numpy as np
+        >>> import core
+        >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+        >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+        >>> points = np.column_stack([ring.real, ring.imag, z])
+        >>> inner = core.build_laplacian(points).toward(-points)
+        >>> print(core.mean_curvature(inner).mean().round(2))
+        -1.0
+        """
+        directions = check_values(directions, len(self.normals))
+        if directions.ndim != 2 or directions.shape[1] != 3:
+            raise InvalidPointsError(
+                f"Directions of shape {directions.shape} do not fit {len(self.normals)} normals. Give three numbers"
+                " for each."
+            )
+        normals = toward(self.normals, directions)
+        reversed_ = np.einsum("ij,ij->i", normals, self.normals) < 0.0
+        shape_operator = np.where(reversed_[:, None, None], -self.shape_operator, self.shape_operator)
+        return replace(self, normals=normals, shape_operator=shape_operator)
 
     def apply(self, values, raw=False):
         """Apply the operator in its strong form.

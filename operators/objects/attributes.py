@@ -27,6 +27,7 @@ SELECTION = ".selection"  # of point clouds, as Blender names it
 PREFIX = "lb_"
 AREA = "lb_area"
 NORMAL = "lb_normal"
+ORIENTATION = "lb_orientation"  # vectors whose side the normals take, where a user chose it
 MEAN_CURVATURE = "lb_mean_curvature"
 GAUSSIAN_CURVATURE = "lb_gaussian_curvature"
 BOUNDARY = "lb_boundary"
@@ -48,7 +49,7 @@ HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # f
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT, TRUST
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {  # all others are FLOAT
-    **dict.fromkeys((NORMAL, DIRECTION_1, DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
+    **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
     **dict.fromkeys((COMPONENT, SEGMENT), "INT"),
     **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
 }

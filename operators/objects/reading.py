@@ -2,7 +2,7 @@
 
 import zlib
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ...core import PointCloudError, check_points
 from ...core.geometry.boundary import FEWEST
-from .attributes import CORNER, own_positions, point_count
+from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_attribute
 from .counting import members
 from .groups import chosen_members
 from .modifiers import is_own, modifier_settings
@@ -74,12 +74,15 @@ class Reading:
         Points at the boundary, where the user's vertex group names them.
     notices : list of str
         What the user should know about how the object was read.
+    orientation : ndarray, (n, 3) float64, or None
+        Vectors whose side the normals take, where Orient Normals or the user chose it.
     """
 
     points: np.ndarray
     matrix: np.ndarray
     boundary: np.ndarray | None = None
     notices: list = field(default_factory=list)
+    orientation: np.ndarray | None = None
 
     def local(self, vectors):
         """Turn points or shifts as they were read into local ones."""
@@ -96,6 +99,10 @@ class Reading:
     def local_normals(self, normals):
         """Turn normals of the points into unit normals of the local positions: covectors, so by M^T, not M^-1."""
         return _units(normals @ self.matrix)
+
+    def placed_normals(self, normals):
+        """Turn normals of the local positions into such of the points as they were read, of any length."""
+        return normals @ np.linalg.inv(self.matrix)
 
 
 def _units(vectors):
@@ -121,7 +128,18 @@ def read_points(context, obj) -> Reading:
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
         notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
-    return Reading(check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices)
+    reading = Reading(check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices)
+    sides = chosen_sides(obj)
+    return reading if sides is None else replace(reading, orientation=reading.placed_normals(sides))
+
+
+def chosen_sides(obj):
+    """Read the local vectors whose side the normals of an object take, (n, 3) float64; None where nobody chose it."""
+    attribute = obj.data.attributes.get(ORIENTATION)
+    if attribute is None or (attribute.data_type, attribute.domain) != ("FLOAT_VECTOR", "POINT"):
+        return None
+    sides = read_attribute(obj.data, ORIENTATION).astype(np.float64)
+    return np.where(np.isfinite(sides).all(axis=1)[:, None], sides, 0.0)
 
 
 def seen_positions(context, obj):

@@ -1,5 +1,7 @@
 """What an analysis leaves on an object: attributes, eigenvalues, total area, and what tells whether they still hold."""
 
+import zlib
+
 import bpy
 import numpy as np
 
@@ -12,6 +14,7 @@ from .attributes import (
     GAUSSIAN_CURVATURE,
     MEAN_CURVATURE,
     NORMAL,
+    ORIENTATION,
     RESULTS,
     TRUST,
     check_names,
@@ -23,7 +26,7 @@ from .attributes import (
     write_attribute,
 )
 from .options import point_budget, settings_values
-from .reading import fingerprint, metric, sharing_objects
+from .reading import chosen_sides, fingerprint, metric, sharing_objects
 
 EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
 
@@ -59,8 +62,11 @@ def analysis_names(modes: int) -> list:
     return [*RESULTS, *map(eigenvector_name, range(1, modes + 1))]
 
 
-def write_result(obj, analysis, write_limit: int):
-    """Write an analysis to its object and those that share its mesh; modes up to `write_limit` become attributes."""
+def write_result(obj, analysis, write_limit: int, oriented=False):
+    """Write an analysis to its object and those that share its mesh; modes up to `write_limit` become attributes.
+
+    Where it was `oriented`, later ones take the side of its normals.
+    """
     mesh, owners = obj.data, [obj, *sharing_objects(obj)]
     if analysis.spectrum is not None:
         vectors = analysis.spectrum.eigenvectors[:, :write_limit]
@@ -74,6 +80,8 @@ def write_result(obj, analysis, write_limit: int):
         remove_numbered(mesh, EIGENVECTOR, beyond=0)
         for owner in owners:
             owner.pop(EIGENVALUES, None)
+    if oriented:
+        write_attribute(mesh, ORIENTATION, analysis.local_normals)
     measures = analysis.measures
     write_attribute(mesh, AREA, measures.areas)
     check_size(f"{AREA}, summed up,", analysis.total_area)
@@ -89,10 +97,15 @@ def write_result(obj, analysis, write_limit: int):
 
 
 def _settings(obj):
-    """Write the settings that results depend on; of the budget only where it asks for a smaller number of points."""
+    """Write what results depend on besides points; of the budget only where it asks for a smaller number of them."""
     kept = obj.meshfree
     budget = point_budget(kept)
-    return repr(settings_values(kept)) + (f" {budget}" if budget and budget < point_count(obj.data) else "")
+    sides = chosen_sides(obj)
+    return (
+        repr(settings_values(kept))
+        + (f" {budget}" if budget and budget < point_count(obj.data) else "")
+        + ("" if sides is None else f" {zlib.crc32(sides):08x}")
+    )
 
 
 def _note_analysis(obj, analysis, settings):

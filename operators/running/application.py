@@ -128,7 +128,7 @@ def _write_discs(context, obj):
     reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
     if DISC in obj.vertex_groups or not cache.holds(reading.points, options, reading.boundary):
         return
-    laplacian = cache.build(reading.points, options, reading.boundary, lambda *_: None).laplacian
+    laplacian = cache.build(reading.points, options, reading.boundary, lambda *_: None, reading.orientation).laplacian
     write_attribute(obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.reach, reading.points))
 
 
@@ -187,4 +187,8 @@ def operator_reader(context, obj):
     """Read an object's points; return them, and a function of a progress callback that gives their operator."""
     reading = read_points(context, obj)
     options = laplacian_options(obj.meshfree)
-    return reading, lambda progress: cache.build(reading.points, options, reading.boundary, progress).laplacian
+
+    def operator(progress):
+        return cache.build(reading.points, options, reading.boundary, progress, reading.orientation).laplacian
+
+    return reading, operator

@@ -26,7 +26,7 @@ class Built(NamedTuple):
     mean_curvature: np.ndarray
 
 
-def build(points, options, boundary, progress) -> Built:
+def build(points, options, boundary, progress, orientation=None) -> Built:
     """Return the operator of these points, options and boundary, built only if it is not kept.
 
     Parameters
@@ -37,6 +37,8 @@ def build(points, options, boundary, progress) -> Built:
         The points at the boundary; None leaves it to the options.
     progress : callable
         Called as ``progress(stage, fraction)``.
+    orientation : ndarray, (n, 3), or None
+        Vectors whose side its normals take; None leaves it to core. The operator is not built anew for another one.
     """
 
     def compute():
@@ -47,9 +49,19 @@ def build(points, options, boundary, progress) -> Built:
 
     key = content(points, options, boundary)
     built = fetch(key, compute)
+    if orientation is not None:
+        key = content(key, orientation)
+        plain = built
+        built = fetch(key, lambda: _oriented(plain, orientation))
     with _lock:
         _sources[built.laplacian] = key
     return built
+
+
+def _oriented(built, orientation):
+    laplacian = built.laplacian.toward(orientation)
+    kept = np.einsum("ij,ij->i", laplacian.normals, built.laplacian.normals) > 0.0
+    return Built(laplacian, np.where(kept, built.mean_curvature, -built.mean_curvature))
 
 
 def holds(points, options, boundary) -> bool:

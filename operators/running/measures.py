@@ -58,12 +58,12 @@ class Measured(NamedTuple):
         return [told, *self.laplacian.notices]
 
 
-def measure(points, options, boundary, budget, modes, progress) -> Measured:
+def measure(points, options, boundary, budget, modes, progress, orientation=None) -> Measured:
     """Measure the surface at each point.
 
     Parameters
     ----------
-    points, options, boundary, progress
+    points, options, boundary, progress, orientation
         See `cache.build`.
     budget : int or None
         How many points to build the operator on at most; 0 for as many as fit the memory, None for all.
@@ -72,10 +72,11 @@ def measure(points, options, boundary, budget, modes, progress) -> Measured:
     """
     subset = _subset(points, options, boundary, budget, modes, progress)
     if not len(subset):
-        laplacian, curvature = cache.build(points, options, boundary, progress)
+        laplacian, curvature = cache.build(points, options, boundary, progress, orientation)
         return Measured(laplacian, subset, _measures(laplacian, curvature), None)
     chosen = points[subset]
-    laplacian, curvature = cache.build(chosen, options, None if boundary is None else boundary[subset], progress)
+    at_boundary, sides = (None if given is None else given[subset] for given in (boundary, orientation))
+    laplacian, curvature = cache.build(chosen, options, at_boundary, progress, sides)
 
     def prolong():
         report = _within(progress, "All Points")

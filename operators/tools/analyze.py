@@ -47,17 +47,21 @@ class Analysis:
         }
 
 
-def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT):
+def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, orient=None):
     """Read an object; return a function of a progress callback that analyzes it, with the lowest modes if any.
 
-    Of a subset no more modes than `write_limit` are carried to all points.
+    Of a subset no more modes than `write_limit` are carried to all points. The normals take the side that the object's
+    attribute tells, or what `orient`, called with what was measured and a callback, returns, (n, 3).
     """
     reading = read_points(context, obj)
     options, budget = laplacian_options(obj.meshfree), point_budget(obj.meshfree)
 
     def compute(progress):
         with StageTimes(progress) as times:
-            measured = measure(reading.points, options, reading.boundary, budget, modes, times)
+            given = reading.points, options, reading.boundary, budget, modes, times
+            measured = measure(*given, reading.orientation)
+            if orient is not None:
+                measured = measure(*given, orient(measured, times))
             spectrum, unresolved = resolved_modes(measured.laplacian, modes, times) if modes else (None, [])
             if spectrum is not None and len(measured.subset):
                 times("All Points", 1.0)

@@ -3,9 +3,10 @@
 import bpy
 
 from ...core import surface_discs
+from ...core.geometry import toward
 from ..objects.attributes import DISC, tag_changed, write_attribute
 from ..objects.handlers import tell
-from ..objects.reading import discs, read_points
+from ..objects.reading import chosen_sides, discs, read_points
 from ..running import cache
 from ..running.application import ApplicationOperator
 
@@ -20,10 +21,12 @@ class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
     def plan(self, context, obj):
         reading = read_points(context, obj)
         local = reading.local(reading.points)
+        sides = chosen_sides(obj)
 
         def compute(progress):
             found = cache.fetch(cache.content("discs", local), lambda: surface_discs(local, progress=progress))
-            return discs(found.normals, found.radii, local)
+            normals = found.normals if sides is None else toward(found.normals, sides)
+            return discs(normals, found.radii, local)
 
         return compute
 

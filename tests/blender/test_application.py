@@ -15,6 +15,7 @@ SETTINGS = {
     "mesh_surface": {},
     "principal_curvatures": {},
     "roughness": {},
+    "orient_normals": {},
     "smooth": {},
     "mode_shape": {},
     "segment": {"parts": 3, "vertex_groups": True},

@@ -70,6 +70,7 @@ RUNS = [
     (handled, "spectrum", {"count": 5}),
     (handled, "principal_curvatures", {}),
     (keyed, "roughness", {}),
+    (handled, "orient_normals", {"method": "KEEP", "flip": True}),
     (handled, "segment", {"parts": 3}),
     (handled, "segment", {"method": "NODAL"}),
     (handled, "signature", {"count": 3, "modes": 10}),

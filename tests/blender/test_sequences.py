@@ -22,6 +22,8 @@ STEPS = [
     ("colormap", {"attribute": "lb_area"}),
     ("principal_curvatures", {"display": "CURVEDNESS"}),
     ("roughness", {}),
+    ("orient_normals", {}),
+    ("orient_normals", {"method": "KEEP", "flip": True}),
     ("show_surface", {}),
     ("mesh_surface", {"detail": 0.7}),
     ("segment", {"parts": 3}),

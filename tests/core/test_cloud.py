@@ -20,7 +20,7 @@ from core.geometry.cloud import (
     read_cloud,
     remove_noise,
 )
-from core.geometry.normals import orient_normals
+from core.geometry.normals import orient_outwards
 from core.geometry.points import scale_points
 
 NEEDED = 101
@@ -116,7 +116,7 @@ def test_one_sheet_stays_as_it_is():
 class TestBoundary:
     def located(self, points, search=True, **given):
         surface = fit_surface(sample_of(points), True)
-        oriented = orient_normals(surface.sample.nearest, surface.quadrics.normals)
+        oriented = orient_outwards(surface.sample.nearest, surface.quadrics.normals)
         gaps = gaps_of(surface, oriented) if search else None
         return surface.sample, locate_boundary(surface.sample, oriented, gaps, **given)
 
@@ -160,7 +160,7 @@ def test_the_walk_is_these_stages():
     points = np.concatenate([grid(24), grid(24) + [0.0, 0.0, 1.5]])
     options = core.LaplacianOptions()
     surface = divide_sheets(fit_surface(sample_of(points), True), NEEDED)
-    oriented = orient_normals(surface.sample.nearest, surface.quadrics.normals)
+    oriented = orient_outwards(surface.sample.nearest, surface.quadrics.normals)
     cloud = read_cloud(points, options)
     np.testing.assert_array_equal(cloud.component, surface.sample.component)
     np.testing.assert_array_equal(cloud.normals, oriented)

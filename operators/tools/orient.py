@@ -1,0 +1,112 @@
+"""Which side of the surface the normals point to, for this and all later analyses."""
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ...core import PointCloudError, orient_normals
+from ..objects.attributes import NORMAL, ORIENTATION, RESULTS, read_attribute
+from ..objects.reading import read_points
+from ..objects.result import write_result
+from ..running import cache
+from ..running.application import ShownOperator
+from .analyze import WRITE_LIMIT, plan_analysis
+
+
+class MESHFREE_OT_orient_normals(ShownOperator, bpy.types.Operator):
+    """Choose the side that normals point to, for this object's results and all that is computed of it later"""
+
+    bl_idname = "meshfree.orient_normals"
+    bl_label = "Orient Normals"
+    writes = (*RESULTS, ORIENTATION)
+    shown = NORMAL
+    asks = ("method", "viewpoint", "source", "holds", "flip", "show")
+    adjustable = ("flip", "show")
+
+    method: EnumProperty(
+        name="Method",
+        description="How the side is found",
+        items=[
+            ("WINDING", "Winding Number", "As closed as the surface can be, through gaps and in noise"),
+            ("OUTSIDE", "Outside", "Neighbors agree, each component points away from its middle: as analyzed at first"),
+            ("VIEWPOINT", "Viewpoint", "To where an object is, such as the camera"),
+            ("ATTRIBUTE", "Attribute", "By a vector of each point, such as the place of the scanner"),
+            ("KEEP", "As They Are", "The side that they have, to flip it"),
+        ],
+        default="WINDING",
+    )
+    viewpoint: StringProperty(
+        name="Viewpoint", description="Object that saw the points, for Viewpoint; empty for the scene's camera"
+    )
+    source: StringProperty(name="Attribute", description="Vector attribute, for Attribute")
+    holds: EnumProperty(
+        name="Attribute Holds",
+        description="What the vectors of the attribute are",
+        items=[
+            ("POSITIONS", "Positions", "Places in the object's own coordinates that the points were seen from"),
+            ("DIRECTIONS", "Directions", "Directions to the outer side, such as normals from a file"),
+        ],
+        default="POSITIONS",
+    )
+    flip: BoolProperty(name="Flip", description="Take the other side of all of them", default=False)
+
+    def plan(self, context, obj):
+        reading = read_points(context, obj)
+        method, sign = self.method, -1.0 if self.flip else 1.0
+        viewpoint = None
+        if method == "VIEWPOINT":
+            viewpoint = _place(context, obj, self.viewpoint)
+        elif method == "ATTRIBUTE":
+            viewpoint = _vectors(obj, self.source) @ reading.matrix.T
+            if self.holds == "DIRECTIONS":
+                viewpoint += reading.points
+        way = {"WINDING": "winding", "OUTSIDE": "outside"}.get(method, "viewpoint")
+
+        def orient(measured, progress):
+            normals, areas = measured.measures.normals, measured.measures.areas
+            if method == "KEEP":
+                return sign * normals
+            progress("Orientation", 0.9)
+
+            def compute():
+                return orient_normals(reading.points, normals, method=way, viewpoint=viewpoint, areas=areas)
+
+            return sign * cache.result(measured.laplacian, "sides", reading.points, way, viewpoint, compute=compute)
+
+        return plan_analysis(context, obj, orient=orient)
+
+    def write(self, context, obj, result):
+        before = obj.data.attributes.get(NORMAL)
+        turned = None if before is None else _turned(read_attribute(obj.data, NORMAL), result.local_normals)
+        write_result(obj, result, WRITE_LIMIT, oriented=True)
+        told = "normals oriented" if turned is None else f"{turned:,} of {len(result.local_normals):,} normals reversed"
+        return [*result.notices, f"{obj.name}: {told}"]
+
+
+def _turned(before, after):
+    """Return how many normals point to the other side."""
+    return int(np.count_nonzero(np.einsum("ij,ij->i", before, after) < 0.0))
+
+
+def _place(context, obj, name):
+    """Read where the named object is, or the scene's camera, in the coordinates that points are read in."""
+    found = context.scene.objects.get(name) if name else context.scene.camera
+    if found is None:
+        missing = f'The scene has no object "{name}"' if name else "The scene has no camera"
+        raise PointCloudError(f"{missing} to orient normals to. Choose an object as Viewpoint.")
+    return np.array(found.matrix_world.translation - obj.matrix_world.translation, dtype=np.float64)
+
+
+def _vectors(obj, name):
+    """Read a vector attribute, (n, 3)."""
+    if not name:
+        raise PointCloudError("No attribute is chosen to orient normals by. Choose one with a vector for each point.")
+    vectors = read_attribute(obj.data, name).astype(np.float64)
+    if vectors.ndim != 2:
+        raise PointCloudError(
+            f'The attribute "{name}" of "{obj.name}" holds no vectors. Choose one with a vector for each point.'
+        )
+    return vectors
+
+
+CLASSES = (MESHFREE_OT_orient_normals,)
