@@ -18,7 +18,7 @@ def _modules():
     from .operators.files import command, exporting, importing
     from .operators.objects import counting, earlier, settings
     from .operators.running import cache, job
-    from .operators.tools import analyze, convert, curvature, fields, minimal, segment, smooth, spectrum, surface
+    from .operators.tools import along, analyze, convert, curvature, fields, minimal, segment, smooth, spectrum, surface
     from .operators.tools import select as selecting
     from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
     from .ui import deform as deform_panel
@@ -36,6 +36,7 @@ def _modules():
         smooth,
         segment,
         fields,
+        along,
         deform,
         bake,
         live,

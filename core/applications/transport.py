@@ -269,9 +269,10 @@ def logarithmic_map(laplacian, source, direction=None, *, progress=None):
 
     Notes
     -----
-    The direction in which a way begins is the angle, where it ends, between the gradient of the distance and a direction
-    carried there from the middle, as in the Vector Heat Method; distances are those of `geodesic_distance`. On regular
-    grids, where shortest paths keep to the directions of the grid, directions are off by up to a few degrees.
+    The direction in which a way begins is the angle, where it ends, between the gradient of the distance and a
+    direction carried there from the middle, as in the Vector Heat Method; distances are those of `geodesic_distance`.
+    On regular grids, where shortest paths keep to the directions of the grid, directions are off by up to a few
+    degrees.
 
     Examples
     --------
