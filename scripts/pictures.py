@@ -138,12 +138,11 @@ def nearest_source(path):
 
 
 def unwrap(path):
-    """A checkerboard around a point of the body."""
+    """A checkerboard around the tip of an arm."""
     obj = coral()
     studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
-    bpy.ops.meshfree.show_surface()
-    bpy.ops.meshfree.unwrap()
-    single(obj, "lb_uv", path)
+    bpy.ops.meshfree.unwrap(radius=3.0)
+    row([obj], path, legend=None)
 
 
 def extend_direction(path):

@@ -115,4 +115,4 @@ def _find_node(obj, name):
 def label(name: str) -> str:
     """Title of an attribute for people: "Mode 3" for lb_eigenvector_003."""
     words = name.removeprefix("lb_").replace("eigenvector", "mode").split("_")
-    return " ".join(word.lstrip("0").title() for word in words)
+    return " ".join(word.lstrip("0").title() for word in words).replace("Uv", "UV")

@@ -37,6 +37,9 @@ def test_the_result_is_shown(strip, extension, name):
     settings = {"direction": (0.0, 1.0, 0.0)} if name == "extend_direction" else {}
     assert run(name, **settings) == {"FINISHED"}
     assert extension.ui.display.shown_attribute(strip) == NAMES[name]
+    scale = extension.ui.scale.shown_scale(strip, bpy.context.scene)
+    assert scale.title == {"nearest_source": "Cell", "unwrap": "UV", "extend_direction": "Direction"}[name]
+    assert len(scale.boxes or scale.colors) == {"nearest_source": 1, "unwrap": 2, "extend_direction": 6}[name]
 
 
 @pytest.mark.parametrize("name", NAMES)
