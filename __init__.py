@@ -19,6 +19,7 @@ def _modules():
     from .operators.objects import counting, earlier, settings
     from .operators.running import cache, job
     from .operators.tools import (
+        along,
         analyze,
         compare,
         convert,
@@ -52,6 +53,7 @@ def _modules():
         smooth,
         segment,
         fields,
+        along,
         deform,
         bake,
         live,

@@ -108,6 +108,66 @@ def geodesic():
             yield from judge(f"{name}, {label}", goals, measure(laplacian, sources, exact(points, sources)))
 
 
+def along():
+    """Sphere: directions carried along great circles, and the logarithmic map, beside the same of potpourri3d."""
+
+    def exact(points, normal, source, direction):
+        """Return the carried direction, (n, 3), and the logarithmic map, (n, 2), on the unit sphere."""
+        first = direction - (direction @ normal) * normal
+        first /= np.linalg.norm(first)
+        angle = np.arctan2(points @ np.cross(normal, first), points @ first)
+        distance = np.arccos(np.clip(points @ points[source], -1.0, 1.0))
+        total = points + points[source]
+        carried = first - (points @ first / (1.0 + points @ points[source]))[:, None] * total
+        return carried, distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+
+    def errors(found, place, truth, near):
+        cosine = np.clip(np.einsum("ij,ij->i", found, truth[0])[near], -1.0, 1.0)
+        yield np.degrees(np.sqrt(np.mean(np.arccos(cosine) ** 2)))
+        yield np.sqrt(np.mean(np.sum((place - truth[1])[near] ** 2, axis=1)))
+
+    def measure(points, source=7, direction=(0.3, -0.5, 0.8)):
+        direction = np.array(direction)
+        near = points @ points[source] > -0.9
+        laplacian = core.build_laplacian(points)
+        began = time.perf_counter()
+        carried = core.Transport(laplacian)
+        found, place = carried.extend([source], direction), carried.logarithmic_map(source, direction)
+        seconds = time.perf_counter() - began
+        yield from errors(found, place, exact(points, laplacian.normals[source], source, direction), near)
+        yield seconds
+        if potpourri3d is None:
+            yield from ["not installed"] * 3
+            return
+        began = time.perf_counter()
+        solver = potpourri3d.PointCloudHeatSolver(points)
+        first, second, normal = solver.get_tangent_frames()
+        given = np.array([first[source] @ direction, second[source] @ direction])
+        given /= np.linalg.norm(given)
+        numbers, place = solver.transport_tangent_vector(source, given), solver.compute_log_map(source)
+        seconds = time.perf_counter() - began
+        found = numbers[:, :1] * first + numbers[:, 1:] * second
+        found /= np.linalg.norm(found, axis=1)[:, None]
+        truth = (
+            exact(points, normal[source], source, direction)[0],
+            exact(points, normal[source], source, first[source])[1],
+        )
+        yield from errors(found, place, truth, near)
+        yield seconds
+
+    for name, points in (("Fibonacci", fibonacci_sphere(10_000)), ("random", random_sphere(10_000))):
+        goals = [
+            Goal(f"{whose}{figure}", bound if not whose else None, form)
+            for whose in ("", "potpourri3d, ")
+            for figure, bound, form in (
+                ("direction, degrees", 0.5, "{:.2f}"),
+                ("logarithmic map", 1e-2, "{:.4f}"),
+                ("seconds", None, "{:.1f}"),
+            )
+        ]
+        yield from judge(f"along the sphere, 10,000 {name}", goals, measure(points))
+
+
 def cost():
     """Seconds on a large scan."""
     path = Path(SCANS) / "bunny.ply"
@@ -137,4 +197,4 @@ def cost():
     )
 
 
-GROUPS = {"poisson": poisson, "harmonic": harmonic, "geodesic": geodesic, "cost": cost}
+GROUPS = {"poisson": poisson, "harmonic": harmonic, "geodesic": geodesic, "along": along, "cost": cost}

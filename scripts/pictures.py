@@ -177,6 +177,33 @@ def distance(path):
     single(obj, "lb_distance", path)
 
 
+def nearest_source(path):
+    """Cells around sixty points that lie apart."""
+    obj = coral()
+    local = studio.world_points(obj)
+    chosen = np.random.default_rng(3).permutation(len(local))[:60]
+    studio.group(obj, np.isin(np.arange(len(local)), chosen), "SOURCE")
+    obj.meshfree.color_map = "CATEGORICAL"
+    bpy.ops.meshfree.nearest_source()
+    single(obj, "lb_cell", path)
+
+
+def unwrap(path):
+    """A checkerboard around the tip of an arm."""
+    obj = coral()
+    studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
+    bpy.ops.meshfree.unwrap(radius=3.0)
+    row([obj], path, legend=None)
+
+
+def extend_direction(path):
+    """A direction carried from the tip of an arm."""
+    obj = coral()
+    studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
+    bpy.ops.meshfree.extend_direction()
+    single(obj, "lb_direction", path)
+
+
 def field(path):
     """A harmonic field between the tips of two arms."""
     obj = coral()
@@ -233,6 +260,9 @@ PICTURES = {
     "orient": orient,
     "signature": signature,
     "distance": distance,
+    "nearest_source": nearest_source,
+    "unwrap": unwrap,
+    "extend_direction": extend_direction,
     "field": field,
     "deform": deform,
     "minimal": minimal,

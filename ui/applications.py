@@ -18,6 +18,10 @@ class MESHFREE_PT_measure(ReadyPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         column.operator("meshfree.geodesic_distance", text="Geodesic Distance...")
         column.operator("meshfree.harmonic_field", text="Harmonic Field...")
+        column = self.layout.column(align=True)
+        column.operator("meshfree.nearest_source", text="Nearest Source...")
+        column.operator("meshfree.unwrap", text="Unwrap Around Point...")
+        column.operator("meshfree.extend_direction", text="Extend Direction...")
         self.layout.operator("meshfree.signature", text="Signatures...")
         self.layout.operator("meshfree.compare", text="Compare Points...")
 

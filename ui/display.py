@@ -87,12 +87,19 @@ def component(name: str, settings) -> str:
 
 
 def numbers(values, part: str):
-    """Return what of an attribute's values are the numbers to show; None for directions."""
+    """Return what of an attribute's values are the numbers to show; None for directions and texture coordinates."""
     if values.ndim == 1:
         return values
+    if is_texture(values):
+        return None
     if part == "LENGTH":
         return np.linalg.norm(values, axis=1)
     return None if part == "DIRECTION" else values[:, "XYZ".index(part)]
+
+
+def is_texture(values) -> bool:
+    """Whether an attribute's values are pairs, as texture coordinates are."""
+    return values.ndim == 2 and values.shape[1] == 2
 
 
 def without_unreached(name: str, values):
@@ -108,4 +115,4 @@ def _find_node(obj, name):
 def label(name: str) -> str:
     """Title of an attribute for people: "Mode 3" for lb_eigenvector_003."""
     words = name.removeprefix("lb_").replace("eigenvector", "mode").split("_")
-    return " ".join(word.lstrip("0").title() for word in words)
+    return " ".join(word.lstrip("0").title() for word in words).replace("Uv", "UV")

@@ -20,6 +20,8 @@ _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
 _DIM = 0.85  # how dark the back side becomes where it is dimmed
 _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but groups
+_CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
+CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
 
@@ -163,6 +165,26 @@ def color_by_direction(material, name, groups):
     if _begin(material, name, f"DIRECTION {groups}"):
         tree = material.node_tree
         _shine(tree, _direction_color(tree, tree.nodes[ATTRIBUTE].outputs["Vector"]), groups)
+
+
+def color_by_checker(material, name, groups):
+    """Let a material show texture coordinates as a checkerboard, and groups as in `color_by_number`."""
+    if _begin(material, name, f"{_CHECKERED} {groups}"):
+        tree = material.node_tree
+        checker = add_node(tree, "ShaderNodeTexChecker", 1, 0)
+        checker.inputs["Scale"].default_value = _CHECKS
+        checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = CHECKER.values()
+        # Across the planes between checks rounding would decide.
+        level = add_node(tree, "ShaderNodeVectorMath", 1, -300, operation="ADD")
+        level.inputs[1].default_value = 0.0, 0.0, 0.5 / _CHECKS
+        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], level.inputs[0])
+        tree.links.new(level.outputs[0], checker.inputs["Vector"])
+        _shine(tree, checker.outputs["Color"], groups)
+
+
+def is_checkered(material) -> bool:
+    """Whether a material shows texture coordinates."""
+    return material.get(_KIND, "").startswith(_CHECKERED)
 
 
 def color_by_number(material, name, component, color_map, low, high, settings, groups):

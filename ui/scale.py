@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from .display import color_node, label, range_node, shown_attribute, shown_range, step_colors
-from .nodes import direction_color
+from .display import color_node, find_material, label, range_node, shown_attribute, shown_range, step_colors
+from .nodes import CHECKER, direction_color, is_checkered
 from .ticks import round_ticks, tick_texts
 from .units import attribute_power, unit
 
@@ -59,6 +59,8 @@ def shown_scale(obj, scene) -> Scale | None:
         return None
     title = label(name)
     if range_node(obj) is None:
+        if is_checkered(find_material(obj)):
+            return Scale(title, "", 1.0, None, [], CHECKER, [])
         boxes = {text: direction_color(direction) for text, direction in _DIRECTIONS.items()}
         return Scale(title, "", 1.0, None, [], boxes, [])
     low, high = shown_range(obj)

@@ -13,8 +13,27 @@ from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
 from . import colormaps, legend
-from .display import NAME, component, find_display, find_material, numbers, shown_attribute, without_unreached
-from .nodes import DISCS, MOST, color_by_direction, color_by_number, color_plain, dim_back, display_group, is_plain
+from .display import (
+    NAME,
+    component,
+    find_display,
+    find_material,
+    is_texture,
+    numbers,
+    shown_attribute,
+    without_unreached,
+)
+from .nodes import (
+    DISCS,
+    MOST,
+    color_by_checker,
+    color_by_direction,
+    color_by_number,
+    color_plain,
+    dim_back,
+    display_group,
+    is_plain,
+)
 from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
@@ -173,7 +192,9 @@ def _color(obj, name, values):
     settings, material, groups = obj.meshfree, _own_material(obj), _group_colors(obj)
     part = component(name, settings)
     shown = numbers(values, part)
-    if shown is None:
+    if is_texture(values):
+        color_by_checker(material, name, groups)
+    elif shown is None:
         color_by_direction(material, name, groups)
     else:
         locked = settings.range_low, settings.range_high

@@ -6,9 +6,10 @@ from .descriptors import heat_kernel_signature, signature_energies, signature_ti
 from .deviation import Deviation, surface_deviation
 from .fields import harmonic_field, solve_poisson
 from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
-from .geodesics import Geodesics, geodesic_distance
+from .geodesics import Geodesics, geodesic_distance, nearest_source, signed_distance
 from .meshing import SurfaceMesh, mesh_surface, values_on_mesh
 from .minimal_surface import MinimalSurface, minimal_surface
 from .segmentation import modes_needed, nodal_domains, segment
 from .selection import grow
 from .smoothing import PointBlend, displace_by_mode, fair_points, roughness, smooth_points, smoothing_base
+from .transport import Transport, logarithmic_map, transport

@@ -1,15 +1,17 @@
 """Distances along the surface."""
 
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from ..arguments import check_switches
 from ..blocks import blocks, on_all_cores
 from ..errors import InvalidPointsError
-from ..geometry import as_mask, circle_arc, pair_heights
+from ..geometry import as_indices, as_mask, circle_arc, pair_heights
 from .graph import mean_spacing
 
 _BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
@@ -130,6 +132,226 @@ class Geodesics:
         result = dijkstra(self._graph, indices=known, min_only=True)
         result[chosen] = 0.0
         return result
+
+    def nearest_source(self, sources):
+        """Tell which of some points is nearest; see `nearest_source`.
+
+        Parameters
+        ----------
+        sources : array_like, (k,) int or (n,) bool
+            Points to measure from, at least one.
+
+        Returns
+        -------
+        ndarray, (n,) int
+            Place of the nearest source among the sources; -1 on components without one and at points left out.
+
+        Raises
+        ------
+        InvalidPointsError
+            No sources, all of them left out of the operator, named twice, or indices out of range.
+        """
+        known = _known_sources(self._laplacian, sources)[1]
+        index = as_indices(sources, len(self._laplacian.points), "sources")
+        label = np.full(len(self._laplacian.points) + 1, -1)  # one more for points that nothing reaches
+        label[index] = np.arange(len(index))
+        nearest = dijkstra(self._graph, indices=known, min_only=True, return_predecessors=True)[2]
+        return label[np.where(nearest < 0, -1, nearest)]
+
+    def signed_distance(self, curve, closed=False):
+        """Measure the distance from a curve, with a sign; see `signed_distance`.
+
+        Parameters
+        ----------
+        curve : array_like, (k,) int
+            The points of the curve in their order, at least two.
+        closed : bool
+            Whether the last point is joined with the first.
+
+        Returns
+        -------
+        ndarray, (n,)
+            Distances [L], negative on the right; infinity on other components and at points left out.
+
+        Raises
+        ------
+        InvalidPointsError
+            Fewer than two points, points named twice, left out or out of range, or on several components.
+        """
+        laplacian = self._laplacian
+        count = len(laplacian.points)
+        check_switches(closed=closed)
+        given = as_indices(curve, count, "points of the curve")
+        _check_curve(laplacian, given)
+        way = self._way(given, closed)
+        band, away, side = self._beside(way)
+        lengths = np.maximum(away, 1e-300)
+        start = sparse.csr_array((lengths, (np.zeros(len(band), dtype=int), band)), shape=(1, count + 1))
+        graph = sparse.vstack([sparse.hstack([self._graph, sparse.csr_array((count, 1))]), start]).tocsr()
+        distance, before = dijkstra(graph, indices=count, return_predecessors=True)
+        # The side on which a way leaves the curve is that of all of it.
+        root = np.where((before == count) | (before < 0), np.arange(count + 1), before)
+        while np.any(root != root[root]):
+            root = root[root]
+        sides = np.ones(count + 1)
+        sides[band] = side
+        result = np.where(np.isfinite(distance), sides[root] * distance, np.inf)[:count]
+        result[way] = 0.0
+        return result
+
+    def _way(self, curve, closed):
+        """Join points by shortest ways, and return all points of these in their order, (m,), the first one twice."""
+        ends = np.append(curve, curve[0]) if closed else curve
+        pieces = [ends[:1]]
+        for first, last in pairwise(ends):
+            row = self._graph.indices[self._graph.indptr[first] : self._graph.indptr[first + 1]]
+            if last in row:
+                pieces.append([last])
+                continue
+            before = dijkstra(self._graph, indices=first, return_predecessors=True)[1]
+            piece = [last]
+            while before[piece[-1]] != first:
+                piece.append(before[piece[-1]])
+            pieces.append(piece[::-1])
+        return np.concatenate(pieces)
+
+    def _beside(self, way):
+        """Return the points near a polygon, (b,), how far away they are, and on which side, 1 or -1."""
+        points, normals = self._laplacian.surface_points, self._laplacian.normals
+        # Each point of the way ends a segment before it and one after it; at the ends of an open way one of them.
+        chord = np.diff(points[way], axis=0)
+        left = np.cross(normals[way[:-1]], chord)
+        left /= np.maximum(np.linalg.norm(left, axis=1), 1e-300)[:, None]
+        corner = np.zeros((len(way), 3))
+        corner[:-1] += left
+        corner[1:] += left
+        if way[0] == way[-1]:
+            corner[[0, -1]] = left[0] + left[-1]
+        near = self._graph[way].tocoo()
+        arc = near.data / np.maximum(np.linalg.norm(points[near.col] - points[way[near.row]], axis=1), 1e-300)
+        found = []
+        for segment, kept in ((near.row, near.row < len(chord)), (near.row - 1, near.row > 0)):
+            segment, point = segment[kept], near.col[kept]
+            offset = points[point] - points[way[segment]]
+            along = np.einsum("ij,ij->i", offset, chord[segment]) / np.einsum("ij,ij->i", *(chord[segment],) * 2)
+            foot = np.clip(along, 0.0, 1.0)
+            offset -= foot[:, None] * chord[segment]
+            across = np.where(
+                ((along > 0.0) & (along < 1.0))[:, None], left[segment], corner[segment + (along >= 1.0)]
+            )  # at a corner the mean of both sides tells the side (Baerentzen, Aanaes, 2005)
+            away = np.linalg.norm(offset, axis=1) * arc[kept]
+            found.append((point, away, np.where(np.einsum("ij,ij->i", offset, across) < 0.0, -1.0, 1.0)))
+        point, away, side = (np.concatenate(values) for values in zip(*found, strict=True))
+        order = np.lexsort((away, point))
+        order = order[~np.isin(point[order], way)]
+        band, first = np.unique(point[order], return_index=True)
+        return band, away[order][first], side[order][first]
+
+
+def nearest_source(laplacian, sources, *, progress=None):
+    """Tell which of some points is nearest along the surface: Voronoi cells.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+    sources : array_like, (k,) int or (n,) bool
+        Points to measure from, at least one.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n,) int
+        Place of the nearest source among the sources, from 0; -1 on components without one and at points left out.
+
+    Raises
+    ------
+    InvalidPointsError
+        No sources, all of them left out of the operator, named twice, or indices out of range.
+
+    See Also
+    --------
+    geodesic_distance : How far it is.
+
+    Examples
+    --------
+    From both poles of a sphere, each is nearest to one half:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> label = core.nearest_source(core.build_laplacian(points), [0, 799])
+    >>> print(label[z > 0.1].max(), label[z < -0.1].min())
+    0 1
+    """
+    _known_sources(laplacian, sources)
+    return Geodesics(laplacian, progress=progress).nearest_source(sources)
+
+
+def signed_distance(laplacian, curve, closed=False, *, progress=None):
+    """Measure the distance along the surface from a curve, positive on its left and negative on its right.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+    curve : array_like, (k,) int
+        The points of the curve in their order, at least two. Points that are not neighbours are joined by the shortest
+        way between them.
+    closed : bool
+        Whether the last point is joined with the first.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n,)
+        Distances [L], zero on the curve; left is seen from where the normals point to. Beyond the ends of an open
+        curve the sign goes by its straight continuation near the end. Infinity on other components and at points left
+        out.
+
+    Raises
+    ------
+    InvalidPointsError
+        Fewer than two points, points named twice, left out or out of range, or on several components.
+
+    See Also
+    --------
+    geodesic_distance : Distances from points, without a sign.
+
+    Notes
+    -----
+    Within the kernel's reach of the curve, distance and side are those from its segments; from there on the distance is
+    that of the shortest path (see `geodesic_distance`), and the side that on which the path left the curve.
+
+    Examples
+    --------
+    From three points around the pole of the unit sphere, the poles are on either side:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> distance = core.signed_distance(core.build_laplacian(points), [100, 101, 102], closed=True)
+    >>> print(np.sign(distance[0] * distance[799]))
+    -1.0
+    """
+    _check_curve(laplacian, as_indices(curve, len(laplacian.points), "points of the curve"))
+    return Geodesics(laplacian, progress=progress).signed_distance(curve, closed)
+
+
+def _check_curve(laplacian, curve):
+    """Refuse a curve that does not lie on one component."""
+    part = laplacian.component[curve]
+    if len(curve) < 2 or part.min() < 0 or part.min() != part.max():
+        raise InvalidPointsError(
+            f"The curve has {len(curve)} points, {np.count_nonzero(part < 0)} of them left out of the operator, on"
+            f" {len(np.unique(part[part >= 0]))} components. Give at least two points of one component."
+        )
 
 
 def _known_sources(laplacian, sources):

@@ -111,7 +111,7 @@ def to_columns(table) -> dict:
     for name, values in attributes.items():
         parts = {name: values}
         if values.ndim == 2:
-            parts = {f"{name}_{axis}": part for axis, part in zip(_AXES, values.T, strict=True)}
+            parts = {f"{name}_{axis}": part for axis, part in zip(_AXES[: len(values.T)], values.T, strict=True)}
         columns.update((_free_name(part, columns), numbers) for part, numbers in parts.items())
     return columns
 

@@ -2,6 +2,7 @@
 
 from .areas import SOLVERS, AreaSolution, estimate_areas
 from .cholesky import factorize
+from .connection import connection_laplacian, tangent_frames
 from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
 from .factors import dissect, sparsify
 from .hierarchy import Rows

@@ -18,6 +18,7 @@ class _Storage(NamedTuple):
 _STORAGE = {
     "FLOAT": _Storage(np.float32, 1, "value"),
     "FLOAT_VECTOR": _Storage(np.float32, 3, "vector"),
+    "FLOAT2": _Storage(np.float32, 2, "vector"),
     "INT": _Storage(np.int32, 1, "value"),
     "BOOLEAN": _Storage(np.bool_, 1, "value"),
 }
@@ -41,6 +42,8 @@ DEVIATION, COMPARED = "lb_deviation", "lb_compared"  # from another cloud, and w
 SEGMENT = "lb_segment"
 FIELD = "lb_field"
 DISTANCE = "lb_distance"
+CELL, DIRECTION = "lb_cell", "lb_direction"  # nearest source, and what was carried from there
+UV = "lb_uv"  # texture coordinates around a point
 DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
@@ -49,9 +52,10 @@ HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # f
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT, TRUST
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {  # all others are FLOAT
-    **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
-    **dict.fromkeys((COMPONENT, SEGMENT), "INT"),
+    **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DIRECTION, DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
+    **dict.fromkeys((COMPONENT, SEGMENT, CELL), "INT"),
     **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
+    UV: "FLOAT2",
 }
 STORABLE = tuple(_STORAGE)
 
@@ -121,7 +125,7 @@ def write_attribute(data, name: str, values, data_type: str = ""):
     ----------
     data : bpy.types.Mesh or bpy.types.PointCloud
     name : str
-    values : array_like, (n,) or (n, 3)
+    values : array_like, (n,), (n, 2) or (n, 3)
     data_type : str
         As Blender names it; empty for that of our own results.
     """
@@ -175,7 +179,7 @@ def _grows(name):
 
 
 def read_attribute(data, name: str):
-    """Read an attribute of the points as an array of shape (n,) or (n, 3)."""
+    """Read an attribute of the points as an array of shape (n,), (n, 2) or (n, 3)."""
     attribute = data.attributes.get(name)
     if attribute is None:
         raise PointCloudError(f'"{data.name}" has no attribute {name}. Analyze the object, or choose another name.')
@@ -196,8 +200,8 @@ def read_attribute(data, name: str):
 def _edited_values(mesh, name, data_type):
     """Read an attribute of a mesh in Edit Mode, where only its vertices know it, one by one."""
     edited, storage = bmesh.from_edit_mesh(mesh), _STORAGE[data_type]
-    layers = getattr(edited.verts.layers, _LAYERS[data_type], None)
-    if layers is None:  # truth values in Blender 4.2
+    layers = getattr(edited.verts.layers, _LAYERS.get(data_type, ""), None)
+    if layers is None:  # pairs of numbers, and truth values in Blender 4.2
         return _copied_values(edited, name, storage)
     layer = layers[name]
     return np.array([vertex[layer] for vertex in edited.verts], storage.dtype).reshape(-1, storage.components)

@@ -17,6 +17,7 @@ RESULTS = [
 ]
 _KEYS = {
     "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
     "FLOAT": ("value", 1, np.float32),
     "BOOLEAN": ("value", 1, np.bool_),
     "INT": ("value", 1, np.int32),

@@ -23,6 +23,9 @@ SETTINGS = {
     "signature": {"modes": 12, "count": 3},
     "harmonic_field": {},
     "geodesic_distance": {},
+    "nearest_source": {},
+    "unwrap": {},
+    "extend_direction": {"direction": (1.0, 0.0, 0.0)},
     "deform_bind": {},
     "minimal_surface": {"steps": 3},
 }

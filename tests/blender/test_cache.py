@@ -37,6 +37,9 @@ AGAIN = {
     "signature": ({"modes": 12}, {"modes": 12, "kind": "WAVE", "count": 3}),
     "harmonic_field": ({}, {"low": -1.0, "high": 3.0, "show": False}),
     "geodesic_distance": ({}, {"show": False}),
+    "nearest_source": ({}, {"show": False}),
+    "unwrap": ({}, {"radius": 0.5, "angle": 1.0, "show": False}),
+    "extend_direction": ({"direction": (1.0, 0.0, 0.0)}, {"direction": (1.0, 0.0, 0.0), "show": False}),
     "minimal_surface": ({"steps": 3}, {"steps": 3, "target": "IN_PLACE"}),
 }
 COSTLY = {  # where each is called from

@@ -78,6 +78,7 @@ SIDEWAYS = {  # applications that build on others
     ("deformation", "rotations"),
     ("fields", "graph"),
     ("geodesics", "graph"),
+    ("transport", "geodesics"),
     ("minimal_surface", "boundary_curve"),
     ("segmentation", "graph"),
     ("selection", "graph"),

@@ -1,0 +1,176 @@
+"""Along the surface from some points: which is nearest, a map around one, directions carried to all."""
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
+
+from ...core import PointCloudError, Transport, nearest_source
+from ..objects.attributes import CELL, DIRECTION, UV, tag_changed, write_attribute
+from ..objects.groups import SOURCE, chosen_members, is_chosen
+from ..objects.result import length_text
+from ..running import cache
+from ..running.application import ShownOperator, operator_reader
+from .select import selected
+
+OUTSIDE = -1.0  # place in the texture of points that the map does not reach: beyond its border
+
+
+def _sources(obj, group):
+    """Read the points of a group or, where there is none of the default's name, the selected ones, (n,) bool."""
+    return chosen_members(obj, group, "Sources") if is_chosen(obj, group, SOURCE) else selected(obj)
+
+
+def _transport(laplacian, progress):
+    return cache.result(laplacian, "transport", compute=lambda: Transport(laplacian, progress=progress))
+
+
+class MESHFREE_OT_nearest_source(ShownOperator, bpy.types.Operator):
+    """Divide the surface into cells: the points that are nearest, along the surface, to the same source"""
+
+    bl_idname = "meshfree.nearest_source"
+    bl_label = "Nearest Source"
+    writes = (CELL,)
+    asks = ("group", "show")
+
+    group: StringProperty(
+        name="Sources",
+        description="Vertex group with the points in the middle of cells; where there is none of that name, the points"
+        " selected in Edit Mode",
+        default=SOURCE,
+    )
+
+    def plan(self, context, obj):
+        sources = _sources(obj, self.group)
+        _, operator = operator_reader(context, obj)
+
+        def compute(progress):
+            laplacian = operator(progress)
+            return cache.result(
+                laplacian, "cells", sources, compute=lambda: nearest_source(laplacian, sources, progress=progress)
+            )
+
+        return compute
+
+    def write(self, context, obj, result):
+        write_attribute(obj.data, CELL, result)
+        tag_changed(obj.data)
+        missed, line = np.count_nonzero(result < 0), f"{obj.name}: {len(np.unique(result[result >= 0])):,} cells"
+        return [f"{missed:,} points of {obj.name} are reached by no source. Their cell is -1.", line][not missed :]
+
+
+class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
+    """Lay the surface around a point out flat as texture coordinates: a decal that follows the surface"""
+
+    bl_idname = "meshfree.unwrap"
+    bl_label = "Unwrap Around Point"
+    writes = (UV,)
+    asks = ("group", "radius", "angle", "show")
+    adjustable = ("radius", "angle", "show")
+
+    group: StringProperty(
+        name="Middle",
+        description="Vertex group around the middle of the texture, where the point nearest to the mean of its points"
+        " is; where there is none of that name, the points selected in Edit Mode",
+        default=SOURCE,
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="Distance along the surface from the middle of the texture to its border; 0 for all points",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+    angle: FloatProperty(
+        name="Angle", description="Turn of the texture around its middle", default=0.0, subtype="ANGLE"
+    )
+
+    def plan(self, context, obj):
+        sources = np.flatnonzero(_sources(obj, self.group))
+        reading, operator = operator_reader(context, obj)
+        places = reading.points[sources]
+        middle = int(sources[np.linalg.norm(places - places.mean(axis=0), axis=1).argmin()])
+        radius, turn = self.radius, np.exp(1j * self.angle)
+
+        def compute(progress):
+            laplacian = operator(progress)
+            if laplacian.component[middle] < 0:
+                raise PointCloudError(
+                    f'The middle is a point of "{obj.name}" that the operator left out, because it lies apart from the'
+                    " surface. Choose a point of the surface."
+                )
+            place = cache.result(
+                laplacian,
+                "map",
+                middle,
+                compute=lambda: _transport(laplacian, progress).logarithmic_map(middle, progress=progress),
+            )
+            reached = np.isfinite(place[:, 0])
+            place = place @ [1.0, 1.0j]
+            border = radius or np.abs(place[reached]).max()
+            texture = 0.5 + 0.5j + 0.5 * turn * place / border
+            return np.where(reached[:, None], np.column_stack([texture.real, texture.imag]), OUTSIDE), border
+
+        return compute
+
+    def write(self, context, obj, result):
+        texture, border = result
+        write_attribute(obj.data, UV, texture)
+        tag_changed(obj.data)
+        return [f"{obj.name}: texture coordinates up to {length_text(border)} from the middle"]
+
+
+class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
+    """Carry a direction at some points along the surface to all others, for hair, scratches or brush strokes"""
+
+    bl_idname = "meshfree.extend_direction"
+    bl_label = "Extend Direction"
+    writes = (DIRECTION,)
+    asks = ("group", "direction", "show")
+
+    group: StringProperty(
+        name="Sources",
+        description="Vertex group with the points that have the direction; where there is none of that name, the points"
+        " selected in Edit Mode",
+        default=SOURCE,
+    )
+    direction: FloatVectorProperty(
+        name="Direction",
+        description="Direction at these points, along the axes of the world; what leads out of the surface does not"
+        " count",
+        default=(0.0, 0.0, -1.0),
+        min=-1e6,
+        max=1e6,
+        subtype="XYZ",
+    )
+
+    def plan(self, context, obj):
+        sources = _sources(obj, self.group)
+        reading, operator = operator_reader(context, obj)
+        direction = np.array(self.direction, dtype=np.float64)
+
+        def compute(progress):
+            laplacian = operator(progress)
+            found = cache.result(
+                laplacian,
+                "directions",
+                sources,
+                direction,
+                compute=lambda: _transport(laplacian, progress).extend(sources, direction),
+            )
+            reached = found.any(axis=1)
+            result = np.zeros_like(found)
+            result[reached] = reading.local_directions(found[reached])
+            return result
+
+        return compute
+
+    def write(self, context, obj, result):
+        write_attribute(obj.data, DIRECTION, result)
+        tag_changed(obj.data)
+        missed, line = np.count_nonzero(~result.any(axis=1)), f"{obj.name}: directions on {len(result):,} points"
+        return [f"{missed:,} points of {obj.name} are reached by no source. They have no direction.", line][
+            not missed :
+        ]
+
+
+CLASSES = (MESHFREE_OT_nearest_source, MESHFREE_OT_unwrap, MESHFREE_OT_extend_direction)
