@@ -6,6 +6,7 @@ from .descriptors import heat_kernel_signature, signature_energies, signature_ti
 from .fields import harmonic_field, solve_poisson
 from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
 from .geodesics import Geodesics, geodesic_distance
+from .matching import MatchedModes, match_modes
 from .minimal_surface import MinimalSurface, minimal_surface
 from .segmentation import modes_needed, nodal_domains, segment
 from .selection import grow

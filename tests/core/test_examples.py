@@ -28,6 +28,7 @@ SHOWN = [
     "grow",
     "harmonic_field",
     "heat_kernel_signature",
+    "match_modes",
     "mean_curvature",
     "minimal_surface",
     "nodal_domains",
