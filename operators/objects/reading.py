@@ -13,7 +13,7 @@ from ...core.geometry.boundary import FEWEST
 from .attributes import own_positions, point_count
 from .counting import members
 from .groups import chosen_members
-from .modifiers import is_own, modifier_settings
+from .modifiers import is_own, is_sequence, modifier_settings
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 _MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
@@ -50,6 +50,11 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
     if obj.mode not in modes or edited:
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
     if not point_count(obj.data):
+        if any(map(is_sequence, obj.modifiers)):
+            return (
+                f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'
+                " collection in the Outliner, and select its objects"
+            )
         kind = "vertices" if obj.type == "MESH" else "points"
         if obj.meshfree.point_count:  # it had some: Convert takes what modifiers show, and ours shows points
             return (

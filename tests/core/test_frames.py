@@ -1,9 +1,11 @@
 """Numbered files of a folder."""
 
+from pathlib import Path
+
 import pytest
 
 from core import PointCloudError
-from core.files import numbered_files
+from core.files import numbered_files, order_frames
 
 
 def names(folder, *given):
@@ -35,3 +37,8 @@ def test_what_is_no_sequence_is_told(tmp_path, given, text):
 def test_a_missing_folder_is_told(tmp_path):
     with pytest.raises(PointCloudError, match="cannot be read"):
         numbered_files(tmp_path / "none")
+
+
+def test_a_chosen_file_without_a_number_is_told():
+    with pytest.raises(PointCloudError, match=r"b\.ply has no number"):
+        order_frames([Path("a_1.ply"), Path("b.ply")])
