@@ -18,7 +18,18 @@ def _modules():
     from .operators.files import command, exporting, importing
     from .operators.objects import counting, earlier, settings
     from .operators.running import cache, job
-    from .operators.tools import analyze, convert, curvature, fields, minimal, segment, smooth, spectrum, surface
+    from .operators.tools import (
+        analyze,
+        convert,
+        curvature,
+        fields,
+        minimal,
+        segment,
+        sequence,
+        smooth,
+        spectrum,
+        surface,
+    )
     from .operators.tools import select as selecting
     from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
     from .ui import deform as deform_panel
@@ -32,6 +43,7 @@ def _modules():
         analyze,
         surface,
         spectrum,
+        sequence,
         curvature,
         smooth,
         segment,

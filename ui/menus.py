@@ -5,7 +5,7 @@ import bpy
 from ..operators.files.importing import OWN
 
 _TOOLS = (
-    ("show_surface", "analyze", "spectrum", "colormap", "legend"),
+    ("show_surface", "analyze", "spectrum", "analyze_sequence", "colormap", "legend"),
     ("principal_curvatures", "roughness"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),

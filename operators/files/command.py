@@ -3,12 +3,11 @@
 import argparse
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
 
-from ...core import PointCloudError, match_modes
+from ...core import PointCloudError
 from ...core.files import numbered_files
 from ..objects import options
 from ..objects.attributes import point_count
@@ -20,6 +19,7 @@ from ..tools.analyze import WRITE_LIMIT, plan_analysis
 from ..tools.curvature import Curvatures, Roughness
 from ..tools.minimal import MinimalSurface
 from ..tools.segment import Segment, Signature
+from ..tools.sequence import continue_modes
 from ..tools.smooth import ModeShape, Smooth
 from . import objects as files
 
@@ -226,7 +226,8 @@ def _analyze(obj, arguments, output):
         analysis = plan_analysis(bpy.context, obj, arguments.modes, arguments.write_limit)(stages)
     matched = {}
     if arguments.sequence:
-        analysis, matched["overlaps"] = _continue(obj, analysis, arguments)
+        analysis, overlaps, arguments.earlier = continue_modes(analysis, files.file_points(obj), arguments.earlier)
+        matched["overlaps"] = overlaps.tolist()
     if sharing_objects(obj):  # by choice, or it would not be writable
         obj.data = obj.data.copy()
     write_result(obj, analysis, arguments.write_limit)
@@ -241,19 +242,6 @@ def _analyze(obj, arguments, output):
         "seconds": {name: round(seconds, 3) for name, seconds in analysis.seconds.items()},
         "notices": analysis.notices,
     }
-
-
-def _continue(obj, analysis, arguments):
-    """Return an analysis whose modes continue those of the frame before, and how well each does; the first as it is."""
-    points = files.file_points(obj)
-    count = analysis.spectrum.eigenvectors.shape[1]  # of a subset fewer may be carried to all points
-    spectrum = replace(analysis.spectrum, eigenvalues=analysis.spectrum.eigenvalues[:count])
-    overlaps = [1.0] * count
-    if arguments.earlier is not None:
-        matched = match_modes(spectrum, analysis.measures.areas, points, *arguments.earlier)
-        spectrum, overlaps = matched.spectrum, matched.overlaps.tolist()
-    arguments.earlier = spectrum, points
-    return replace(analysis, spectrum=spectrum), overlaps
 
 
 def _arrays(obj, analysis):

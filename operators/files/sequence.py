@@ -2,10 +2,10 @@
 
 import bpy
 
-from ..objects.modifiers import SEQUENCE_TAG, add_input, add_node, is_intact, new_group, set_input
+from ..objects.modifiers import COLLECTION, SEQUENCE_TAG, add_input, add_node, is_intact, new_group, set_input
 
 NAME = "Mesh-Free Sequence"
-COLLECTION, FIRST, STEP = "Frames", "First Frame", "Frame Step"  # inputs of the nodes
+FIRST, STEP = "First Frame", "Frame Step"  # inputs of the nodes, beside the collection
 
 
 def add_sequence(context, name: str, frames, first: int):

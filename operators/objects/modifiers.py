@@ -7,6 +7,7 @@ from ...core import PointCloudError
 DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
 DEFORM_TAG = "meshfree_deform"  # the same of our own deformation
 SEQUENCE_TAG = "meshfree_sequence"  # the same of what shows one object a frame
+COLLECTION = "Frames"  # input of that: the collection
 _INPUTS = "meshfree_inputs"  # custom property of the nodes: identifiers of the inputs by the names that we gave them
 _OF_WINDOW = {"is_active", "use_pin_to_last"}  # what of a modifier changes nothing
 

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import sphere_points
+from tests.blender.clouds import add_object, attribute, sphere_points
 
 COUNTS = (300, 260, 340)
+RANGE = ("color_map", "range_mode", "range_low", "range_high")
 
 
 def frame_points(number):
@@ -45,6 +46,10 @@ def seen(obj, frame):
 def check_frames(obj, numbers):
     for frame, number in numbers.items():
         assert_allclose(seen(obj, frame), frame_points(number), rtol=1e-6, atol=1e-6)
+
+
+def unit(vector):
+    return vector / np.linalg.norm(vector)
 
 
 def open_frames(obj):
@@ -117,6 +122,66 @@ def test_a_broken_sequence_leaves_nothing(folder, change, text):
 def test_a_missing_frame_is_told(folder):
     with pytest.raises(RuntimeError, match=r"There is no file .*scan_12"):
         run_import(folder, ("scan_11.npy", "scan_12.npy"))
+    assert not bpy.data.objects
+
+
+def test_one_button_analyzes_all_frames_in_one_range(folder):
+    obj = run_import(folder)
+    assert bpy.ops.meshfree.analyze_sequence(modes=4, shown_mode=2) == {"FINISHED"}
+    frames = [bpy.data.objects[f"scan_{number}"] for number in (9, 10, 11)]
+    assert {tuple(item.meshfree.path_resolve(name) for name in RANGE) for item in frames} == {
+        tuple(frames[0].meshfree.path_resolve(name) for name in RANGE)
+    }
+    settings = frames[0].meshfree
+    assert settings.range_mode == "LOCKED"
+    values = np.concatenate([attribute(item, "lb_eigenvector_002") for item in frames])
+    assert 0.5 * np.abs(values).max() < settings.range_high <= np.abs(values).max()
+    assert settings.range_low == -settings.range_high
+    for number, item in enumerate(frames):
+        assert item.meshfree.total_area == pytest.approx(4.0 * np.pi * (1.0 + number) ** 2, rel=0.03)
+    # Modes 2 to 4 of a sphere are coordinates in any basis; here in that of the first frame, whatever its points.
+    first, *others = [
+        np.stack([unit(attribute(item, f"lb_eigenvector_{mode:03d}") @ frame_points(number)) for mode in (2, 3, 4)])
+        for number, item in enumerate(frames)
+    ]
+    for other in others:
+        assert np.einsum("ij,ij->i", first, other).min() > 0.97
+    assert bpy.context.object == obj
+
+
+def test_a_frame_that_cannot_be_analyzed_leaves_all_as_they_were(folder):
+    np.save(folder / "scan_11.npy", np.zeros((4, 3)) + np.arange(4.0)[:, None])
+    run_import(folder)
+    with pytest.raises(RuntimeError, match="scan_11"):
+        bpy.ops.meshfree.analyze_sequence()
+    for item in bpy.data.objects:
+        assert not [layer.name for layer in item.data.attributes if layer.name.startswith("lb_")]
+        assert item.meshfree.fingerprint == ""
+
+
+def test_a_mode_that_is_not_computed_cannot_be_shown(folder):
+    run_import(folder)
+    with pytest.raises(RuntimeError, match="Mode 3 is to be shown of 2"):
+        bpy.ops.meshfree.analyze_sequence(modes=2, shown_mode=3)
+
+
+def test_without_a_sequence_the_button_says_so(extension):
+    add_object(sphere_points(300))
+    with pytest.raises(RuntimeError, match="No sequence is active"):
+        bpy.ops.meshfree.analyze_sequence()
+
+
+def test_undo_takes_import_and_analysis_back(folder):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="Before")
+    run_import(folder)
+    bpy.ops.ed.undo_push(message="Import")
+    bpy.ops.meshfree.analyze_sequence()
+    bpy.ops.ed.undo_push(message="Analyze")
+    bpy.ops.ed.undo()
+    assert bpy.data.objects["scan_9"].meshfree.fingerprint == ""
+    check_frames(bpy.data.objects["scan"], {1: 0, 2: 1, 3: 2})
+    bpy.ops.ed.undo()
     assert not bpy.data.objects
 
 
