@@ -61,7 +61,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             for sentence in (reason if obstacle(obj, ("EDIT",)) else _EDITING).split(". "):
                 column.label(text=sentence)
             if obj is not None and any(map(is_sequence, obj.modifiers)):
-                layout.operator("meshfree.analyze_sequence", icon="SEQUENCE")
+                layout.operator("meshfree.analyze_sequence", text="Analyze Sequence...", icon="SEQUENCE")
             elif context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return

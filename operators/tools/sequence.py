@@ -74,7 +74,11 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
         name="Modes", description="Compute this many vibration modes of each frame", default=0, min=0, soft_max=50
     )
     shown_mode: IntProperty(
-        name="Mode on Show", description="Show this mode in all frames; 0 shows the mean curvature", default=0, min=0
+        name="Mode on Show",
+        description="Show this mode in all frames; 0 shows the mean curvature",
+        default=0,
+        min=0,
+        soft_max=50,
     )
     show: BoolProperty(name="Show", description="Show the result as colors in one range for all frames", default=True)
 
