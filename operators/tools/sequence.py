@@ -12,7 +12,7 @@ from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import MEAN_CURVATURE, eigenvector_name
 from ..objects.handlers import tell
 from ..objects.modifiers import COLLECTION, get_input, is_sequence
-from ..objects.reading import obstacle, read_points
+from ..objects.reading import obstacle, read_points, sharing_objects
 from ..objects.result import analysis_names, area_text, check_writable, write_result
 from ..running.application import naming
 from ..running.job import JobOperator
@@ -101,7 +101,7 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
         names = analysis_names(self.modes)
         for obj in frames:
             with naming(obj.name):
-                check_writable(obj, names, False)
+                check_writable(obj, names, obj.meshfree.make_single_user)
                 points = read_points(context, obj).points + np.array(obj.matrix_world.translation)
                 plans.append((obj.name, points, plan_analysis(context, obj, self.modes, max(self.modes, WRITE_LIMIT))))
         return self.work(context, frames, lambda progress: _compute(plans, progress))
@@ -111,6 +111,8 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
         name = eigenvector_name(self.shown_mode) if self.shown_mode else MEAN_CURVATURE
         with all_or_nothing(objects):
             for obj, (analysis, _) in zip(objects, results, strict=True):
+                if sharing_objects(obj):  # by choice, or it would not be writable
+                    obj.data = obj.data.copy()
                 write_result(obj, analysis, max(self.modes, WRITE_LIMIT))
             if self.show:
                 tell("sequence_written", objects, name)
@@ -133,9 +135,10 @@ def _compute(plans, progress):
     results, earlier = [], None
     for number, (name, points, plan) in enumerate(plans):
 
-        def report(stage, fraction, number=number):
+        def report(_stage, fraction, number=number):
             progress(f"Frame {number + 1} of {len(plans)}", (number + fraction) / len(plans))
 
+        report("", 0.0)  # of a frame that is known from before there is no other
         with naming(name):
             analysis, overlaps = plan(report), np.empty(0)
             if analysis.spectrum is not None:

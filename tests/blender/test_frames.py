@@ -1,11 +1,13 @@
 """Numbered files as one object that changes by frame: in the viewport, in renders, after saving, and analyzed."""
 
+import importlib
+
 import bpy
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.clouds import add_object, attribute, everything, sphere_points
 
 COUNTS = (300, 260, 340)
 RANGE = ("color_map", "range_mode", "range_low", "range_high")
@@ -157,6 +159,56 @@ def test_a_frame_that_cannot_be_analyzed_leaves_all_as_they_were(folder):
     for item in bpy.data.objects:
         assert not [layer.name for layer in item.data.attributes if layer.name.startswith("lb_")]
         assert item.meshfree.fingerprint == ""
+
+
+def test_stopped_at_the_last_frame_nothing_is_written(folder, extension, core, monkeypatch):
+    run_import(folder)
+    stages = importlib.import_module(f"{extension.__name__}.operators.running.stages")
+    told, seen = stages.Stages.__call__, []
+
+    def tell(self, stage, fraction):
+        seen.append((stage, fraction))
+        if stage == "Frame 3 of 3":
+            raise core.Cancelled
+        told(self, stage, fraction)
+
+    monkeypatch.setattr(stages.Stages, "__call__", tell)
+    before = {item.name: everything(item) for item in bpy.data.objects}
+    with pytest.raises(RuntimeError):
+        bpy.ops.meshfree.analyze_sequence()
+    assert list(dict.fromkeys(stage for stage, _ in seen)) == ["Frame 1 of 3", "Frame 2 of 3", "Frame 3 of 3"]
+    assert seen == sorted(seen, key=lambda item: item[1])
+    assert {item.name: everything(item) for item in bpy.data.objects} == before
+
+
+def test_what_fails_at_the_last_frame_leaves_none_written(folder, extension, monkeypatch):
+    run_import(folder)
+    tool = importlib.import_module(f"{extension.__name__}.operators.tools.sequence")
+    write = tool.write_result
+
+    def fail_late(obj, *more):
+        if obj.name == "scan_11":
+            raise MemoryError
+        write(obj, *more)
+
+    monkeypatch.setattr(tool, "write_result", fail_late)
+    before = {item.name: everything(item) for item in bpy.data.objects}
+    with pytest.raises(RuntimeError, match="memory is used up"):
+        bpy.ops.meshfree.analyze_sequence()
+    assert {item.name: everything(item) for item in bpy.data.objects} == before
+
+
+def test_a_frame_that_shares_its_mesh_gets_its_own_by_choice(folder):
+    run_import(folder)
+    shared = bpy.data.objects["scan_10"]
+    twin = bpy.data.objects.new("Twin", shared.data)
+    bpy.context.scene.collection.objects.link(twin)
+    with pytest.raises(RuntimeError, match="Make Single User"):
+        bpy.ops.meshfree.analyze_sequence()
+    shared.meshfree.make_single_user = True
+    bpy.ops.meshfree.analyze_sequence()
+    assert "lb_area" in shared.data.attributes
+    assert "lb_area" not in twin.data.attributes
 
 
 def test_a_mode_that_is_not_computed_cannot_be_shown(folder):
