@@ -5,6 +5,8 @@ of them, named by the environment variable MESHFREE_SCANS.
 """
 
 import argparse
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 
 import bpy
@@ -16,7 +18,7 @@ import paper_pictures
 import scan_pictures
 import studio
 from coral import spread_directions
-from studio import row, single
+from studio import part, row, single
 
 OUTPUT = package.ROOT / "docs" / "pictures"
 CUT = 0.45  # height at which the shape is cut open for the picture of a boundary
@@ -144,6 +146,23 @@ def smooth(path):
     row(objects, path, legend=None)
 
 
+def sequence(path):
+    """Four frames of the shape as it grows upwards, of other points each, with one mode in one range."""
+    random = np.random.default_rng(3)
+    with TemporaryDirectory() as folder:
+        for number, height in enumerate((0.8, 1.0, 1.2, 1.4)):
+            points = random.permutation(demo.Coral().sample(demo.POINTS))[: demo.POINTS - 500 * number]
+            np.save(Path(folder) / f"coral_{number}.npy", points * (1.0, 1.0, height))
+        bpy.ops.meshfree.import_points(filepath=str(Path(folder) / "coral_0.npy"), sequence=True)
+    bpy.ops.meshfree.analyze_sequence(modes=6, shown_mode=3)
+    frames = part("operators.tools.sequence").frames_of(bpy.context.object)
+    bpy.data.objects.remove(bpy.context.object)
+    bpy.context.view_layer.layer_collection.children[0].exclude = False
+    for obj in frames:
+        studio.show(obj, "lb_eigenvector_003")
+    row(frames, path, legend=frames[0])
+
+
 def mode_shape(path):
     """A spherical harmonic as a displacement: found among the modes of a sphere, and exact.
 
@@ -250,6 +269,7 @@ PICTURES = {
     "mode": mode,
     "boundary": boundary,
     "smooth": smooth,
+    "sequence": sequence,
     "mode_shape": mode_shape,
     "segment": segment,
     "surface": surface,

@@ -4,7 +4,7 @@ import bpy
 
 from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import APPLICATIONS, DISC, RESULTS, eigenvector_name, mode_number, point_count
-from ..operators.objects.modifiers import is_own
+from ..operators.objects.modifiers import is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
 from ..operators.running.job import running
@@ -60,7 +60,9 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             column = layout.column(align=True)
             for sentence in (reason if obstacle(obj, ("EDIT",)) else _EDITING).split(". "):
                 column.label(text=sentence)
-            if context.mode == "OBJECT":
+            if obj is not None and any(map(is_sequence, obj.modifiers)):
+                layout.operator("meshfree.analyze_sequence", text="Analyze Sequence...", icon="SEQUENCE")
+            elif context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
         _draw_summary(layout, obj)

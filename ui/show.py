@@ -4,6 +4,7 @@ import math
 
 import bpy
 import gpu
+import numpy as np
 
 from ..operators.deform.binding import positions_now
 from ..operators.deform.nodes import find_deform
@@ -131,6 +132,20 @@ def show_groups(obj):
 def show_result(obj, name):
     """Show an attribute that was written just now; see `show_attribute`."""
     show_attribute(obj, name)
+    use_material_preview(bpy.context)
+
+
+def show_sequence(objects, name):
+    """Show an attribute of several objects by one colour map and in one range, which is locked, for all of them."""
+    first = objects[0].meshfree
+    values = np.concatenate([read_attribute(obj.data, name) for obj in objects])
+    mode = "AUTO" if first.range_mode == "LOCKED" else first.range_mode
+    color_map, low, high = fit_range(values, first.color_map, mode, first.coverage)
+    for obj in objects:
+        settings = obj.meshfree
+        settings.color_map, settings.range_mode = color_map, "LOCKED"
+        settings.range_low, settings.range_high = low, high
+        show_attribute(obj, name)
     use_material_preview(bpy.context)
 
 
@@ -266,6 +281,7 @@ _HANDLERS = {
     "surface_found": show_surface,
     "result_written": show_result,
     "mesh_made": show_alike,
+    "sequence_written": show_sequence,
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,
 }

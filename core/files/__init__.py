@@ -1,6 +1,7 @@
 """Point files to arrays in double precision and back: numpy only, so that scripts outside Blender can use it too."""
 
 from .formats import READABLE, WRITABLE, read_points, write_points
+from .frames import numbered_files, order_frames
 from .origin import choose_origin, is_coarse
 from .table import PointTable
 from .whole import replacing

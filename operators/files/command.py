@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from ...core import PointCloudError
+from ...core.files import numbered_files
 from ..objects import options
 from ..objects.attributes import point_count
 from ..objects.reading import obstacle, sharing_objects
@@ -18,6 +19,7 @@ from ..tools.analyze import WRITE_LIMIT, plan_analysis
 from ..tools.curvature import Curvatures, Roughness
 from ..tools.minimal import MinimalSurface
 from ..tools.segment import Segment, Signature
+from ..tools.sequence import continue_modes
 from ..tools.smooth import ModeShape, Smooth
 from . import objects as files
 
@@ -88,6 +90,12 @@ def _parse(argv):
     analyze.add_argument(
         "--write-limit", type=int, default=WRITE_LIMIT, metavar="N", help="modes written as attributes at most"
     )
+    analyze.add_argument(
+        "--sequence",
+        action="store_true",
+        help="the inputs are frames in their order, or folders of numbered ones: each mode continues one of the frame"
+        " before, with its sign, so that eigenvalues need not ascend; overlaps of the two are written, too",
+    )
     _add_files(analyze)
     parsers = {"analyze": analyze}
     for verb in VERBS:
@@ -107,14 +115,26 @@ def _parse(argv):
     chosen = parsers[arguments.command]
     if arguments.command == "analyze" and (arguments.modes < 0 or arguments.write_limit < 1):
         chosen.error("--modes takes a number of at least 0, --write-limit one of at least 1")
-    if arguments.out is not None and len(arguments.inputs) > 1:
-        chosen.error("--out takes one input; use --out-dir for many")
     if arguments.out is not None and arguments.out.suffix.lower() not in files.OUTPUTS:
         chosen.error(f"--out must end in {', '.join(files.OUTPUTS)}")
+    arguments.earlier = None  # points and modes of the frame before
+    if arguments.command == "analyze" and arguments.sequence:
+        if not arguments.modes:
+            chosen.error("--sequence matches modes: give --modes, too")
+        try:
+            arguments.inputs = [file for path in arguments.inputs for file in _frames(path)]
+        except PointCloudError as error:
+            chosen.error(str(error))
+    if arguments.out is not None and len(arguments.inputs) > 1:
+        chosen.error("--out takes one input; use --out-dir for many")
     outputs = [_output_path(path, arguments) for path in arguments.inputs]
     if arguments.out_dir is not None and len(set(outputs)) < len(outputs):
         chosen.error("some inputs have the same name and would overwrite each other in --out-dir")
     return arguments
+
+
+def _frames(path):
+    return numbered_files(path) if path.is_dir() else [path]
 
 
 def _kind(verb):
@@ -204,6 +224,10 @@ def _analyze(obj, arguments, output):
     check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
     with Stages(bpy.context.window_manager, _kind("analyze").name) as stages:
         analysis = plan_analysis(bpy.context, obj, arguments.modes, arguments.write_limit)(stages)
+    matched = {}
+    if arguments.sequence:
+        analysis, overlaps, arguments.earlier = continue_modes(analysis, files.file_points(obj), arguments.earlier)
+        matched["overlaps"] = overlaps.tolist()
     if sharing_objects(obj):  # by choice, or it would not be writable
         obj.data = obj.data.copy()
     write_result(obj, analysis, arguments.write_limit)
@@ -214,6 +238,7 @@ def _analyze(obj, arguments, output):
         "total_area": analysis.total_area,
         **analysis.counts,
         "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
+        **matched,
         "seconds": {name: round(seconds, 3) for name, seconds in analysis.seconds.items()},
         "notices": analysis.notices,
     }

@@ -10,12 +10,13 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProp
 from bpy_extras.io_utils import ImportHelper
 
 from ...core import PointCloudError
-from ...core.files import READABLE, read_points
+from ...core.files import READABLE, numbered_files, order_frames, read_points
 from ..objects.all_or_nothing import all_or_nothing
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
 from .objects import OFFSET, add_object, file_filter, known_offset, offset_of
+from .sequence import add_sequence
 
 _BLENDERS = {".ply", ".obj"}  # what Blender reads by itself, too
 OWN = tuple(kind for kind in READABLE if kind not in _BLENDERS)
@@ -35,7 +36,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-    asks = ("up", "kind", "attributes", "frame")
+    asks = ("up", "kind", "attributes", "sequence", "frame")
 
     filepath: StringProperty(
         name="File Path",
@@ -72,6 +73,13 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Import the other columns too: colors, normals, intensity and so on",
         default=True,
     )
+    sequence: BoolProperty(
+        name="Sequence",
+        description="Make one object of numbered files, which shows one of them at each frame of the scene; of one file"
+        " chosen, all in its folder",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
     frame: BoolProperty(
         name="Frame in View",
         description="Let the 3D views look at the imported points, unless a script imports them",
@@ -93,7 +101,10 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         self._framed = self._attended and self.frame
         names = [item.name for item in self.files if item.name]
         folder = Path(bpy.path.abspath(self.directory))
-        self._paths = paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
+        paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
+        if self.sequence:
+            paths = order_frames(paths) if len(paths) > 1 else numbered_files(paths[0].parent)
+        self._paths = paths
         return self.work(context, [], lambda progress: _read_all(paths, progress))
 
     def finish(self, context, objects, results):
@@ -130,6 +141,16 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             meshes = [obj.data for obj in context.selected_objects]
             bpy.ops.object.convert(target="POINTCLOUD")
             bpy.data.batch_remove(meshes)
+        if self.sequence:
+            self._join(context)
+
+    def _join(self, context):
+        """Let one object show those just imported, one at each frame from the scene's first one on."""
+        frames, first = context.selected_objects, context.scene.frame_start
+        sequence = add_sequence(context, self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence", frames, first)
+        sequence.select_set(True)
+        context.view_layer.objects.active = sequence
+        self.report({"INFO"}, f"{sequence.name}: frames {first} to {first + len(frames) - 1}")
 
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""

@@ -281,10 +281,15 @@ def analysis_arrays(place, laplacian, curvature, spectrum) -> dict:
     }
 
 
+def file_points(obj):
+    """Return the points of an object in the world and before the shift by an import, (n, 3) float64."""
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    return own_positions(obj.data).astype(np.float64) @ matrix.T + place_of(obj)
+
+
 def attribute_arrays(obj):
     """Return the points in the world, and what this extension wrote by its names without the lb_."""
-    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
-    arrays = {"points": own_positions(obj.data).astype(np.float64) @ matrix.T + place_of(obj)}
+    arrays = {"points": file_points(obj)}
     for attribute in obj.data.attributes:
         if attribute.name.startswith(PREFIX):
             arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)

@@ -11,6 +11,7 @@ _OWN = {
     "surface_found": [],  # (obj) of its discs, which are to be shown: ui/show.py
     "result_written": [],  # (obj, name of the attribute to show, empty for the one on show): ui/show.py
     "mesh_made": [],  # (obj, the new object of its mesh, which is to be shown like it): ui/show.py
+    "sequence_written": [],  # (objects, name of the attribute to show in one range): ui/show.py
     "views_changed": [],  # () what is drawn over them: ui/show.py
     "panels_changed": [],  # () what they tell of work that goes on: ui/show.py
     "deform_changed": [],  # (obj) by a setting: operators/deform/live.py

@@ -6,6 +6,8 @@ from ...core import PointCloudError
 
 DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
 DEFORM_TAG = "meshfree_deform"  # the same of our own deformation
+SEQUENCE_TAG = "meshfree_sequence"  # the same of what shows one object a frame
+COLLECTION = "Frames"  # input of that: the collection
 _INPUTS = "meshfree_inputs"  # custom property of the nodes: identifiers of the inputs by the names that we gave them
 _OF_WINDOW = {"is_active", "use_pin_to_last"}  # what of a modifier changes nothing
 
@@ -18,6 +20,11 @@ def is_display(modifier) -> bool:
 def is_deform(modifier) -> bool:
     """Whether a modifier is the extension's own deformation."""
     return _is_tagged(modifier, DEFORM_TAG)
+
+
+def is_sequence(modifier) -> bool:
+    """Whether a modifier shows one object of a collection at each frame."""
+    return _is_tagged(modifier, SEQUENCE_TAG)
 
 
 def is_own(modifier) -> bool:

@@ -13,7 +13,7 @@ from ...core.geometry.boundary import FEWEST
 from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_attribute
 from .counting import members
 from .groups import chosen_members
-from .modifiers import is_own, modifier_settings
+from .modifiers import is_own, is_sequence, modifier_settings
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 _MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
@@ -56,6 +56,11 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
         what = f"lost its {kind}" if lost else "corners of discs in place of its points"
         return f'"{obj.name}" has {what}. Undo, and instead of Object > Convert use Convert under Points and Groups'
     if not point_count(obj.data):
+        if any(map(is_sequence, obj.modifiers)):
+            return (
+                f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'
+                " collection in the Outliner, and select its objects"
+            )
         return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
 

@@ -4,6 +4,7 @@ import inspect
 import sys
 
 import bpy
+import numpy as np
 import pytest
 
 from tests.blender.clouds import add_group, add_object, differences, everything, grid_points, sphere_points
@@ -162,6 +163,13 @@ def test_nothing_is_left_of_an_import_that_fails(extension, tmp_path, kind):
     path = tmp_path / "points.xyz"
     path.write_text("".join(f"{x} {y} {z} 7\n" for x, y, z in sphere_points(50)))
     assert fail_everywhere(extension, handled, "import_points", filepath=str(path), kind=kind) > 2
+
+
+def test_nothing_is_left_of_a_sequence_whose_import_fails(extension, tmp_path):
+    for number in (1, 2):
+        np.save(tmp_path / f"points_{number}.npy", sphere_points(50))
+    path = str(tmp_path / "points_1.npy")
+    assert fail_everywhere(extension, handled, "import_points", filepath=path, sequence=True, step=3) > 2
 
 
 def shown():

@@ -453,3 +453,46 @@ class TestNothingBreaks:
                 run(*arguments)
         assert output.read_text() == "before"
         assert sorted(path.name for path in tmp_path.iterdir()) == ["in.obj", output.name]
+
+
+def write_frames(folder, lengths=(0.85, 1.0, 1.15)):
+    """A slowly growing ellipsoid whose longest axes change places, each frame of its own points, numbered 9, 10, 11."""
+    folder.mkdir()
+    for number, length in enumerate(lengths):
+        points = sphere_points(1000 + 50 * number) * [length, 1.0, 0.6]
+        np.save(folder / f"frame_{number + 9}.npy", points[np.random.default_rng(number).permutation(len(points))])
+    return folder
+
+
+def test_a_sequence_keeps_signs_and_order_of_modes(run, tmp_path):
+    frames, out = write_frames(tmp_path / "frames"), tmp_path / "out"
+    code, lines = run("analyze", "--sequence", frames, "--modes", 4, "--out-dir", out, "--format", "npz")
+    assert code == 0, lines
+    assert [line["file"] for line in lines] == [str(frames / f"frame_{number}.npy") for number in (9, 10, 11)]
+    assert min(min(line["overlaps"]) for line in lines) > 0.9
+    along = []
+    for line in lines:
+        arrays = np.load(line["output"])
+        projected = arrays["points"].T @ (arrays["areas"][:, None] * arrays["eigenvectors"])
+        along.append(
+            [(int(np.argmax(np.abs(mode))), float(np.sign(mode[np.argmax(np.abs(mode))]))) for mode in projected.T]
+        )
+        assert_allclose(arrays["eigenvalues"], line["eigenvalues"])
+    assert along[0][1:3] == along[1][1:3] == along[2][1:3]  # mode 0 is constant
+    assert lines[0]["eigenvalues"][1] < lines[0]["eigenvalues"][2]
+    assert lines[2]["eigenvalues"][1] > lines[2]["eigenvalues"][2]  # they have crossed
+
+
+def test_a_broken_frame_is_told_and_the_next_continues_the_one_before_it(run, tmp_path):
+    frames = write_frames(tmp_path / "frames", (1.2, 1.2, 1.2))
+    (frames / "frame_10.npy").write_bytes(b"nothing")
+    code, lines = run("analyze", "--sequence", frames, "--modes", 3)
+    assert code == 1
+    assert [("error" in line) for line in lines] == [False, True, False]
+    assert min(lines[2]["overlaps"]) > 0.9
+
+
+def test_a_sequence_without_modes_or_frames_is_wrong_usage(run, tmp_path):
+    assert run("analyze", "--sequence", write_frames(tmp_path / "frames"))[0] == 2
+    (tmp_path / "empty").mkdir()
+    assert run("analyze", "--sequence", tmp_path / "empty", "--modes", 3)[0] == 2

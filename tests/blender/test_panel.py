@@ -12,6 +12,7 @@ from tests.blender.clouds import add_object, grid_points, sphere_points
 OPERATORS = (
     "add_preset",
     "analyze",
+    "analyze_sequence",
     "apply_preset",
     "colormap",
     "compare",

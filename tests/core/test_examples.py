@@ -31,6 +31,7 @@ SHOWN = [
     "harmonic_field",
     "heat_kernel_signature",
     "logarithmic_map",
+    "match_modes",
     "mean_curvature",
     "mesh_surface",
     "minimal_surface",

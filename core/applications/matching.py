@@ -1,0 +1,155 @@
+"""Modes of two frames of a sequence: which is which, with which sign, and turned how where eigenvalues coincide."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
+
+from ..arguments import as_array, real
+from ..errors import InvalidPointsError, PointCloudError
+from ..geometry import check_points
+from ..operator import Spectrum
+
+
+@dataclass(frozen=True)
+class MatchedModes:
+    """Modes in the order, and with the signs, of those of the frame before.
+
+    Attributes
+    ----------
+    spectrum : Spectrum
+        Mode k continues mode k of the frame before, so that eigenvalues need not ascend. Eigenvectors are orthonormal
+        for the areas. Where some were turned, their eigenvalues are the Rayleigh quotients. No residuals.
+    overlaps : ndarray, (count,)
+        Cosine of the angle between each mode and the one that it continues, -1 to 1. Small where a mode has left the
+        computed ones, or the frames differ too much.
+    """
+
+    spectrum: Spectrum
+    overlaps: np.ndarray
+
+
+def match_modes(spectrum, areas, points, spectrum_before, points_before, *, tolerance=0.02):
+    """Let the modes of a frame continue those of the frame before.
+
+    Modes come with any sign, change places where eigenvalues cross, and are any basis of their space where eigenvalues
+    coincide. This gives them the order, signs and basis with which they overlap most with those of the frame before.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Of this frame, n points.
+    areas : array_like, (n,)
+        Of its points [L^2].
+    points : array_like, (n, 3)
+        Of this frame [L].
+    spectrum_before : Spectrum
+        Of the frame before, m points, of as many modes; as it was matched itself, in a sequence.
+    points_before : array_like, (m, 3)
+        Of the frame before [L], in any order.
+    tolerance : float
+        Eigenvalues within this share of each other count as one: points do not tell them apart.
+
+    Returns
+    -------
+    MatchedModes
+
+    Raises
+    ------
+    InvalidPointsError
+        Points that are no points, or sizes that do not fit each other.
+    PointCloudError
+        Other numbers of modes, or a tolerance that is not from 0 to below 1.
+
+    See Also
+    --------
+    LaplaceBeltrami.eigenpairs : The modes of a frame.
+
+    Notes
+    -----
+    Values are taken from the nearest point of the frame before: the surface should move by less between two frames than
+    the modes are wide. A mode of this frame is weighed against each one before by its squared overlap, summed over all
+    modes of the same eigenvalue, whose own basis thus does not matter; the assignment of the largest sum is taken [1]_,
+    and each such set is turned by the orthogonal Procrustes problem [2]_, which is the sign for a single mode.
+
+    References
+    ----------
+    .. [1] Crouse, "On implementing 2D rectangular assignment algorithms", IEEE Transactions on Aerospace and Electronic
+       Systems 52, 2016.
+    .. [2] Schoenemann, "A generalized solution of the orthogonal Procrustes problem", Psychometrika 31, 1966.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> before = laplacian.eigenpairs(4)
+    >>> after = core.Spectrum(before.eigenvalues, -before.eigenvectors)  # as another run may give them
+    >>> matched = core.match_modes(after, laplacian.areas, points, before, points)
+    >>> np.allclose(matched.spectrum.eigenvectors, before.eigenvectors)
+    True
+    """
+    points, points_before = check_points(points), check_points(points_before)
+    areas = as_array(areas, "Areas")
+    values, vectors = spectrum.eigenvalues, spectrum.eigenvectors
+    count = len(values)
+    if areas.shape != (len(points),) or vectors.shape != (len(points), count):
+        raise InvalidPointsError(
+            f"{len(points)} points have areas of the shape {areas.shape} and modes of the shape {vectors.shape}. Give"
+            " areas and modes of the same frame as the points."
+        )
+    if len(spectrum_before.eigenvectors) != len(points_before):
+        raise InvalidPointsError(
+            f"The {len(points_before)} points before have modes of {len(spectrum_before.eigenvectors)} points. Give"
+            " points and modes of the same frame."
+        )
+    if spectrum_before.eigenvectors.shape[1] != count:
+        raise PointCloudError(
+            f"The frame has {count} modes, the one before {spectrum_before.eigenvectors.shape[1]}. Compute as many."
+        )
+    if not 0.0 <= real(tolerance) < 1.0:
+        raise PointCloudError(f"The tolerance of eigenvalues is {tolerance!r}. Use a number from 0 to below 1.")
+
+    carried = spectrum_before.eigenvectors[cKDTree(points_before).query(points)[1]]
+    overlaps = _overlaps(vectors, areas, carried)
+    groups = _equal(values, tolerance)
+    weights = np.empty_like(overlaps)
+    for group in groups:
+        weights[group] = np.sum(overlaps[group] ** 2, axis=0)
+    continues = linear_sum_assignment(weights, maximize=True)[1]
+    turn = np.zeros((count, count))
+    for group in groups:
+        left, _, right = np.linalg.svd(overlaps[np.ix_(group, continues[group])])
+        turn[np.ix_(group, continues[group])] = left @ right
+    matched = vectors @ turn
+    return MatchedModes(Spectrum(values @ turn**2, matched), np.sum(turn * overlaps, axis=0))
+
+
+def _overlaps(vectors, areas, carried):
+    """Return the inner products of modes with those before, (count, count), by the length that these have here."""
+    weighted = areas[:, None] * carried
+    lengths = np.sqrt(np.sum(carried * weighted, axis=0))
+    return vectors.T @ weighted / np.where(lengths > 0.0, lengths, 1.0)
+
+
+def _equal(values, tolerance):
+    """Return sets of modes whose eigenvalues are as good as one, (g,) int each; they are cut at the widest gaps.
+
+    Zeros, of which each component has one, are told from others by the mean distance of eigenvalues.
+    """
+    order = np.argsort(values, kind="stable")
+    spacing = values[order[-1]] / len(values)
+    groups, rest = [], [order]
+    while rest:
+        group = rest.pop()
+        sizes = values[group]
+        if sizes[-1] - sizes[0] <= tolerance * max(sizes[-1], spacing):
+            groups.append(group)
+        else:
+            cut = np.argmax(np.diff(sizes)) + 1
+            rest += [group[cut:], group[:cut]]
+    return groups

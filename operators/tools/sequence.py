@@ -1,0 +1,150 @@
+"""Analysis of a sequence: all of its frames in one run, with modes that continue each other and one range of colors."""
+
+import re
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, IntProperty
+
+from ...core import PointCloudError, match_modes
+from ..objects.all_or_nothing import all_or_nothing
+from ..objects.attributes import MEAN_CURVATURE, eigenvector_name
+from ..objects.handlers import tell
+from ..objects.modifiers import COLLECTION, get_input, is_sequence
+from ..objects.reading import obstacle, read_points, sharing_objects
+from ..objects.result import analysis_names, area_text, check_writable, write_result
+from ..running.application import naming
+from ..running.job import JobOperator
+from ..running.ready import reporting
+from .analyze import WRITE_LIMIT, plan_analysis
+
+
+def frames_of(obj) -> list:
+    """Return the objects that a sequence shows, in their order: by name, numbers by their size."""
+    modifier = next((item for item in obj.modifiers if is_sequence(item)), None) if obj is not None else None
+    collection = modifier and get_input(modifier, COLLECTION)
+    if collection is None:
+        return []
+    return sorted(collection.objects, key=lambda item: _natural(item.name))
+
+
+def _natural(name):
+    pieces = re.split(r"(\d+)", name.lower(), flags=re.ASCII)
+    return [int(piece) if index % 2 else piece for index, piece in enumerate(pieces)]
+
+
+def continue_modes(analysis, points, earlier):
+    """Let the modes of an analysis continue those of the frame before.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        With modes.
+    points : ndarray, (n, 3)
+        All points of the object, in the world.
+    earlier : tuple of Spectrum and ndarray, or None
+        What this returned of the frame before; None for the first frame, which stays as it is.
+
+    Returns
+    -------
+    Analysis
+    ndarray, (count,)
+        How well each mode continues, see `match_modes`.
+    tuple
+        For the next frame.
+    """
+    spectrum = analysis.spectrum
+    count = spectrum.eigenvectors.shape[1]  # of a subset fewer may be carried to all points
+    spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
+    if earlier is not None:
+        matched = match_modes(spectrum, analysis.measures.areas, points, *earlier)
+        spectrum, overlaps = matched.spectrum, matched.overlaps
+    return replace(analysis, spectrum=spectrum), overlaps, (spectrum, points)
+
+
+class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
+    """Analyze all frames of a sequence, with modes that keep their order and signs, and show them in one range"""
+
+    bl_idname = "meshfree.analyze_sequence"
+    bl_label = "Analyze Sequence"
+    bl_options = {"REGISTER", "UNDO"}
+
+    modes: IntProperty(
+        name="Modes", description="Compute this many vibration modes of each frame", default=0, min=0, soft_max=50
+    )
+    shown_mode: IntProperty(
+        name="Mode on Show",
+        description="Show this mode in all frames; 0 shows the mean curvature",
+        default=0,
+        min=0,
+        soft_max=50,
+    )
+    show: BoolProperty(name="Show", description="Show the result as colors in one range for all frames", default=True)
+
+    @classmethod
+    def obstacle(cls, context):
+        if not frames_of(context.object):
+            return "No sequence is active. Import numbered files as a sequence, or select the object that shows them"
+        return next(filter(None, map(obstacle, frames_of(context.object))), "")
+
+    def invoke(self, context, event):
+        self._attended = True
+        return context.window_manager.invoke_props_dialog(self)
+
+    @reporting
+    def execute(self, context):
+        if self.shown_mode > self.modes:
+            raise PointCloudError(f"Mode {self.shown_mode} is to be shown of {self.modes}. Raise Modes to that.")
+        context.view_layer.update()
+        frames, plans = frames_of(context.object), []
+        names = analysis_names(self.modes)
+        for obj in frames:
+            with naming(obj.name):
+                check_writable(obj, names, obj.meshfree.make_single_user)
+                points = read_points(context, obj).points + np.array(obj.matrix_world.translation)
+                plans.append((obj.name, points, plan_analysis(context, obj, self.modes, max(self.modes, WRITE_LIMIT))))
+        return self.work(context, frames, lambda progress: _compute(plans, progress))
+
+    def finish(self, context, objects, results):
+        """Write all frames, show them, and tell of what is in doubt."""
+        name = eigenvector_name(self.shown_mode) if self.shown_mode else MEAN_CURVATURE
+        with all_or_nothing(objects):
+            for obj, (analysis, _) in zip(objects, results, strict=True):
+                if sharing_objects(obj):  # by choice, or it would not be writable
+                    obj.data = obj.data.copy()
+                write_result(obj, analysis, max(self.modes, WRITE_LIMIT))
+            if self.show:
+                tell("sequence_written", objects, name)
+        for obj, (analysis, overlaps) in zip(objects, results, strict=True):
+            for notice in analysis.notices:
+                self.report({"WARNING"}, f"{obj.name}: {notice}")
+            lost = np.flatnonzero(overlaps < 0.5) + 1
+            if len(lost):
+                shown = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")
+                self.report({"WARNING"}, f"{obj.name}: modes {shown} do not continue those of the frame before")
+        areas = [analysis.total_area for analysis, _ in results]
+        span = f"area {area_text(min(areas))} to {area_text(max(areas))}"
+        modes = f", {self.modes} modes" if self.modes else ""
+        self.report({"INFO"}, f"{len(objects)} frames, {span}{modes}")
+        return {"FINISHED"}
+
+
+def _compute(plans, progress):
+    """Analyze frames, given by name, points and plan, one after the other; return analyses and overlaps of modes."""
+    results, earlier = [], None
+    for number, (name, points, plan) in enumerate(plans):
+
+        def report(_stage, fraction, number=number):
+            progress(f"Frame {number + 1} of {len(plans)}", (number + fraction) / len(plans))
+
+        report("", 0.0)  # of a frame that is known from before there is no other
+        with naming(name):
+            analysis, overlaps = plan(report), np.empty(0)
+            if analysis.spectrum is not None:
+                analysis, overlaps, earlier = continue_modes(analysis, points, earlier)
+        results.append((replace(analysis, laplacian=None), overlaps))  # the largest part, which nothing is written of
+    return results
+
+
+CLASSES = (MESHFREE_OT_analyze_sequence,)
