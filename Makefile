@@ -8,16 +8,13 @@ BOOT := $(shell for python in "$(PYTHON)" python3.11 python3.13 python3 python "
 	"$$python" -c "import sys; sys.exit(sys.version_info < (3, 8))" >/dev/null 2>&1 && echo "$$python" && break; done)
 run = $(if $(BOOT),"$(BOOT)",$(error No Python is found: install Python 3.11 or 3.13, or name it by PYTHON=...)) -B scripts/
 
-.PHONY: help demo convert test test-all test-gui build validate audit lint benchmark pictures clean
+.PHONY: help demo test test-all test-gui build validate audit lint benchmark pictures clean
 
 help: ## Show this list (default)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: ## Analyze a sample point cloud, or SCAN=file.ply (UP=Z if its Z axis points upwards), and render it
 	@$(run)in_blender.py demo.py $(if $(SCAN),"$(SCAN)") $(if $(UP),--up $(UP))
-
-convert: ## Convert laser scans for Blender: LAS=scan.laz makes scan.ply
-	@$(run)environments.py laser -m scripts.las_to_ply $(if $(LAS),"$(LAS)",$(error Name the file: make convert LAS=scan.laz))
 
 test: ## Test core, and the extension in the newest Blender for this Python
 	@$(run)run_tests.py

@@ -48,7 +48,7 @@ def wheel_names(name):
     tags = {"linux-x64": "manylinux.*_x86_64", "windows-x64": "win_amd64"}
     tags.update({"macos-arm64": "macosx.*_arm64", "macos-x64": "macosx.*_x86_64"})
     wheels = [path.rpartition("/")[2] for path in read_manifest()["wheels"]]
-    return [wheel for wheel in wheels if re.search(f"-{tags[name]}\\.whl$", wheel)]
+    return [wheel for wheel in wheels if re.search(f"-({tags[name]}|any)\\.whl$", wheel)]
 
 
 def pinned_hashes():
@@ -68,12 +68,13 @@ def fetch(wheels, python):
         if not path.exists() or sha256(path) not in pinned_hashes():
             path.unlink(missing_ok=True)
             print(f"Fetching {wheel}", flush=True)
-            _, _, interpreter, abi, tags = path.stem.split("-")
+            project, version, interpreter, abi, tags = path.stem.split("-")
+            target = ["--implementation", "cp", "--python-version", interpreter[2:], "--abi", abi]
+            target += ["--platform", tags.partition(".")[0]]
             run(
                 [python, "-m", "pip", "download", "--quiet", "--no-input", "--disable-pip-version-check"]
-                + ["--require-hashes", "--only-binary=:all:", "--no-deps", "--dest", WHEELS, "--requirement", PINS]
-                + ["--implementation", "cp", "--python-version", interpreter[2:], "--abi", abi]
-                + ["--platform", tags.partition(".")[0]]
+                + ["--only-binary=:all:", "--no-deps", "--dest", WHEELS, f"{project}=={version}"]
+                + (target if abi != "none" else [])  # which fits all
             )
         if not path.exists() or sha256(path) not in pinned_hashes():
             sys.exit(f"{wheel} is not what wheels.txt pins; compare it with the wheels in blender_manifest.toml")

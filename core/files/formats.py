@@ -9,13 +9,13 @@ import numpy as np
 
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
 from .arrays import read_array
+from .las import read_las
 from .lines import brief
 from .ply import read_ply, write_ply
 from .table import PointTable, check_table
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
 
-_LASER = (".las", ".laz")
 # What the modules that readers use raise about broken files; RuntimeError of archives with a password.
 _FAULTS = (ValueError, OverflowError, EOFError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile)
 
@@ -28,6 +28,8 @@ _READERS = {
     ".txt": read_columns,
     ".npy": read_array,
     ".npz": read_array,
+    ".las": read_las,
+    ".laz": read_las,
 }
 READABLE = tuple(_READERS)
 WRITABLE = (".ply", ".xyz", ".csv")
@@ -50,11 +52,6 @@ def read_points(path) -> PointTable:
         There is no such file, or no points in it, or it is broken; the text says where.
     """
     suffix = path.suffix.lower()
-    if suffix in _LASER:
-        raise PointCloudError(
-            f"{path} is a LAS file, which cannot be read inside Blender. Convert it to PLY with coordinates in"
-            f" double precision first, for instance with this extension's source: make convert LAS={path.name}"
-        )
     if suffix not in _READERS:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
     if not os.path.isfile(path):  # that of pathlib fails at folders that may not be read

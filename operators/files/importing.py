@@ -17,8 +17,7 @@ from ..running.job import JobOperator
 from ..running.ready import reporting
 from .objects import OFFSET, add_object, file_filter, known_offset, offset_of
 
-LASER = (".las", ".laz")  # listed, so that the error can say what to do with them
-OWN = (".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", *LASER)  # Blender reads the others by itself, too
+OWN = tuple(suffix for suffix in READABLE if suffix not in (".ply", ".obj"))  # Blender reads those by itself, too
 
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
 if bpy.app.version >= (4, 5, 0):
@@ -30,7 +29,7 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
-    """Import the points of PLY, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as objects of loose vertices"""
+    """Import the points of LAS, LAZ, PLY, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as loose vertices"""
 
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
@@ -44,7 +43,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         subtype="FILE_PATH",
         options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
     )
-    filter_glob: file_filter(*READABLE, *LASER)
+    filter_glob: file_filter(*READABLE)
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Files",

@@ -32,6 +32,19 @@ def write_obj(path, points):
     path.write_text("".join(f"v {x:.3f} {y:.3f} {z:.3f}\n" for x, y, z in points))
 
 
+def write_las(path, points):
+    """By the laspy that the extension brings."""
+    import laspy
+
+    header = laspy.LasHeader(point_format=7, version="1.4")
+    header.offsets, header.scales = np.floor(points.min(axis=0)), np.full(3, 0.001)
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = points.T
+    las.intensity, las.classification = np.arange(len(points)), np.full(len(points), 6)
+    las.red = np.full(len(points), 65535)
+    las.write(str(path))
+
+
 WRITERS = {
     "a.ply": write_file,
     "a.obj": write_obj,
@@ -41,6 +54,8 @@ WRITERS = {
     "a.txt": lambda path, points: write_text(path, points, "\t"),
     "a.npy": np.save,
     "a.npz": lambda path, points: np.savez(path, points=points),
+    "a.las": write_las,
+    "a.laz": write_las,
 }
 
 
@@ -250,7 +265,7 @@ def test_import_needs_object_mode(tmp_path):
     ("name", "data", "text"),
     [
         ("missing.ply", None, "There is no file"),
-        ("a.laz", b"LASF", "make convert LAS=a.laz"),
+        ("a.laz", b"LASF", "is no LAS file: it does not begin with the header of one. Export it again"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n", "line 5: '' does not belong"),
         ("a.xyz", b"", "there are none"),
         ("a.csv", b"x,y,z\n", "there are none"),
@@ -383,6 +398,16 @@ class TestMenus:
         assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".las", ".laz"}
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_what_laser_scanners_measure_becomes_attributes(tmp_path, name):
+    write_las(tmp_path / name, SURVEY)
+    obj = run_import(tmp_path / name)
+    assert_array_equal(attribute(obj, "intensity"), np.arange(len(SURVEY)))
+    assert_array_equal(attribute(obj, "classification"), np.full(len(SURVEY), 6))
+    assert_array_equal(attribute(obj, "return_number"), np.zeros(len(SURVEY)))
+    assert obj.data.color_attributes["Color"].data[0].color_srgb[:] == pytest.approx((1.0, 0.0, 0.0, 1.0), abs=0.01)
 
 
 def test_values_beyond_single_precision(tmp_path):

@@ -1,5 +1,6 @@
-"""The zip: its content, its manifest, the bundled scipy, and that nothing stays behind when it is switched off."""
+"""The zip: its content, its manifest, the bundled wheels, and that nothing stays behind when it is switched off."""
 
+import json
 import re
 import subprocess
 import sys
@@ -50,7 +51,7 @@ def test_blender_validates_zip(archive):
 def test_every_bundled_wheel_has_a_pinned_hash(archive, packed, tmp_path):
     wheels = [name for name in packed.namelist() if name.endswith(".whl")]
     sums = {package.sha256(Path(packed.extract(name, tmp_path))) for name in wheels}
-    assert len(sums) == len(wheels) == 2
+    assert len(sums) == len(wheels) == 5
     assert sums <= package.pinned_hashes()
 
 
@@ -58,12 +59,14 @@ COVERED = {  # licenses of what a wheel brings, by the one that the manifest nam
     "BSD-3-Clause-Attribution": "SPDX:BSD-3-Clause",
     "GPL-3.0-with-GCC-exception": "SPDX:GPL-3.0-or-later",
     "LGPL-2.1-or-later": "SPDX:LGPL-2.1-or-later",
+    "Apache-2.0 WITH LLVM-exception": "SPDX:Apache-2.0",
 }
+BUILDING = {"unicode-ident"}  # what a wheel was built with, and does not hold
 
 
-def test_manifest_names_the_licenses_of_all_that_the_wheels_bring(packed, manifest, tmp_path):
+def test_manifest_names_the_licenses_of_all_that_scipy_brings(packed, manifest, tmp_path):
     for name in packed.namelist():
-        if name.endswith(".whl"):
+        if "/scipy-" in name:
             with zipfile.ZipFile(packed.extract(name, tmp_path)) as wheel:
                 (text,) = [wheel.read(item).decode() for item in wheel.namelist() if item.endswith("info/LICENSE.txt")]
                 (about,) = [wheel.read(item).decode() for item in wheel.namelist() if item.endswith("info/METADATA")]
@@ -74,12 +77,32 @@ def test_manifest_names_the_licenses_of_all_that_the_wheels_bring(packed, manife
             assert re.findall(r"^Requires-Dist: ([a-z_-]+)[^;]*$", about, re.MULTILINE) == ["numpy"]
 
 
-def test_every_platform_and_python_has_one_pinned_wheel(manifest):
-    names = [name for platform in manifest["platforms"] for name in package.wheel_names(platform)]
-    assert len(names) == len(set(names)) == len(manifest["wheels"]) == len(package.pinned_hashes()) == 7
+def test_manifest_names_the_licenses_of_what_reads_laser_scans(packed, manifest, tmp_path):
+    seen = []
+    for name in packed.namelist():
+        if "/laspy-" in name or "/lazrs-" in name:
+            with zipfile.ZipFile(packed.extract(name, tmp_path)) as wheel:
+                (about,) = [wheel.read(item).decode() for item in wheel.namelist() if item.endswith("info/METADATA")]
+                parts = [json.loads(wheel.read(item)) for item in wheel.namelist() if item.endswith(".cyclonedx.json")]
+                assert [item for item in wheel.namelist() if item.endswith("licenses/LICENSE.txt")]
+            assert re.findall(r"^Requires-Dist: ([a-z_-]+)[^;]*$", about, re.MULTILINE) in ([], ["numpy"])
+            seen += re.findall(r"^License-Expression: (.*)", about, re.MULTILINE)
+            for part in [other for sbom in parts for other in sbom["components"] if other["name"] not in BUILDING]:
+                (license,) = part["licenses"]
+                choices = license["expression"].split(" OR ")
+                assert {COVERED.get(choice, f"SPDX:{choice}") for choice in choices} & set(manifest["license"]), part
+    assert sorted(seen) == ["BSD-2-Clause", "MIT", "MIT"]
+    assert {f"SPDX:{license}" for license in seen} <= set(manifest["license"])
+
+
+def test_every_platform_and_python_has_its_pinned_wheels(manifest):
+    names = {name for platform in manifest["platforms"] for name in package.wheel_names(platform)}
+    assert len(names) == len(manifest["wheels"]) == len(package.pinned_hashes()) == 15
     for platform in manifest["platforms"]:
-        pythons = [name.split("-")[2] for name in package.wheel_names(platform)]
-        assert pythons == (["cp311"] if platform == "macos-x64" else ["cp311", "cp313"])
+        wheels = [name.split("-")[::2][:2] for name in package.wheel_names(platform)]
+        pythons = ["cp311"] if platform == "macos-x64" else ["cp311", "cp313"]
+        compiled = [[project, python] for project in ("scipy", "lazrs") for python in pythons]
+        assert sorted(wheels) == sorted([*compiled, ["laspy", "py3"]])
 
 
 def test_versions_agree(manifest):

@@ -7,6 +7,7 @@ import time
 import tracemalloc
 import zipfile
 
+import laspy
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -78,6 +79,15 @@ def make_archive(member, compression=zipfile.ZIP_DEFLATED, name="points.npy"):
     return file.getvalue()
 
 
+def make_las(packed, point_format=7):
+    las = laspy.LasData(laspy.LasHeader(point_format=point_format, version="1.4"))
+    las.x, las.y, las.z = POINTS.T
+    las.red = las.intensity = np.arange(30)
+    file = io.BytesIO()
+    las.write(file, do_compress=packed)
+    return file.getvalue()
+
+
 GOOD = {
     "ascii.ply": make_ply("ascii"),
     "little.ply": make_ply("little"),
@@ -92,6 +102,9 @@ GOOD = {
     "array.npy": make_array(),
     "plain.npz": make_archive(make_array(), zipfile.ZIP_STORED),
     "small.npz": make_archive(make_array()),
+    "plain.las": make_las(packed=False),
+    "old.laz": make_las(packed=True, point_format=2),
+    "layered.laz": make_las(packed=True),
 }
 
 
