@@ -11,6 +11,7 @@ from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
 from .arrays import read_array
 from .las import read_las
 from .lines import brief
+from .pcd import read_pcd
 from .ply import read_ply, write_ply
 from .table import PointTable, check_table
 from .text import read_columns, read_scan, read_vertices, write_columns
@@ -22,6 +23,7 @@ _FAULTS = (ValueError, OverflowError, EOFError, RuntimeError, struct.error, zlib
 _READERS = {
     ".ply": read_ply,
     ".obj": read_vertices,
+    ".pcd": read_pcd,
     ".xyz": read_columns,
     ".pts": read_scan,
     ".csv": read_columns,

@@ -45,6 +45,13 @@ def write_las(path, points):
     las.write(str(path))
 
 
+def write_pcd(path, points):
+    """In double precision, which binary files can hold."""
+    count = len(points)
+    head = f"VERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {count}\nHEIGHT 1\nPOINTS {count}\n"
+    path.write_bytes(f"{head}DATA binary\n".encode() + points.astype("<f8").tobytes())
+
+
 WRITERS = {
     "a.ply": write_file,
     "a.obj": write_obj,
@@ -54,6 +61,7 @@ WRITERS = {
     "a.txt": lambda path, points: write_text(path, points, "\t"),
     "a.npy": np.save,
     "a.npz": lambda path, points: np.savez(path, points=points),
+    "a.pcd": write_pcd,
     "a.las": write_las,
     "a.laz": write_las,
 }
@@ -395,7 +403,7 @@ class TestMenus:
         ours = handlers.pop("MESHFREE_FH_points")
         assert ours.bl_import_operator == "meshfree.import_points"
         extensions = set(ours.bl_file_extensions.split(";"))
-        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".las", ".laz"}
+        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".pcd", ".las", ".laz"}
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
 

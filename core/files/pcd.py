@@ -1,0 +1,190 @@
+"""PCD, the point files of the Point Cloud Library: text, binary, or packed by LZF."""
+
+import struct
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InvalidPointsError
+from .lines import brief
+from .rows import read_records, read_rows, too_short
+from .table import PointTable, from_columns
+
+_LONGEST = 10_000  # bytes of a line of the header; some have hundreds of fields
+_MOST_LINES = 100  # of the header
+_MOST_DIGITS = 15  # of a count
+_WIDEST = 10_000  # numbers of a point
+_TYPES = {f"{kind} {size}": f"{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)}
+_TYPES |= {"F 4": "f4", "F 8": "f8"}
+_COLORS = ("rgb", "rgba")  # fields that hold a color in the bytes of one number
+_MOST_REPEATED = 88  # times that LZF may make data longer: three bytes repeat 264 at most
+
+
+class _Field(NamedTuple):
+    name: str
+    code: str  # numpy's, without the byte order
+    count: int  # numbers of each point
+
+
+def read_pcd(path) -> PointTable:
+    """Read the points of a PCD file with all their fields of one number; those that the sensor missed are left out.
+
+    Raises
+    ------
+    InvalidPointsError
+        It is no PCD file, or broken; the text says where.
+    """
+    with open(path, "rb") as file:
+        fields, count, kind = _read_header(file, path)
+        columns = {"ascii": _read_text, "binary": _read_binary, "binary_compressed": _read_packed}[kind](
+            file, fields, count, path
+        )
+    left_out = [field.name for field in fields if field.count != 1 and field.name != "_"]
+    columns = {
+        field.name: column
+        for field, column in zip(fields, columns, strict=True)
+        if field.count == 1 and field.name != "_"  # which only fills records
+    }
+    for name in _COLORS:
+        if name in columns:
+            columns |= _split_color(columns.pop(name), alpha=name == "rgba")
+            break
+    table = from_columns(columns, path)
+    if left_out:
+        table.notices.append(f"{path.name}: left out {brief(', '.join(left_out))}, with several numbers a point.")
+    return _without_missed(table, path)
+
+
+def _read_header(file, path):
+    """Return the fields, the number of points and the kind of data; leave the file where the data begin."""
+    found = {}
+    for number in range(1, _MOST_LINES):
+        line = file.readline(_LONGEST).decode(errors="replace").strip()
+        key, *words = line.split() or ["#"]
+        match key:
+            case _ if key.startswith("#"):
+                pass
+            case "FIELDS" | "SIZE" | "TYPE" | "COUNT":
+                found[key] = words
+            case "WIDTH" | "HEIGHT" | "POINTS" if len(words) == 1 and _is_count(words[0]):
+                found[key] = int(words[0])
+            case "VERSION" | "VIEWPOINT":
+                pass
+            case "DATA" if words in (["ascii"], ["binary"], ["binary_compressed"]):
+                return *_read_fields(found, path), words[0]
+            case _:
+                raise InvalidPointsError(
+                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PCD file. Export it"
+                    " again."
+                )
+    raise InvalidPointsError(f"{path} has no header of a PCD file that ends with DATA. Export it again.")
+
+
+def _is_count(word):
+    return word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS
+
+
+def _read_fields(found, path):
+    """Return the fields and the number of points that the lines of a header tell."""
+    names, sizes, types = (found.get(key, []) for key in ("FIELDS", "SIZE", "TYPE"))
+    counts = found.get("COUNT", ["1"] * len(names))
+    count = found.get("POINTS", found.get("WIDTH", 0) * found.get("HEIGHT", 1))
+    codes = [_TYPES.get(f"{kind} {size}") for kind, size in zip(types, sizes, strict=False)]
+    if (
+        not len(names) == len(sizes) == len(types) == len(counts)
+        or None in codes
+        or not all(map(_is_count, counts))
+        or sum(map(int, counts)) > _WIDEST
+    ):
+        raise InvalidPointsError(
+            f"{path} has a header whose lines FIELDS, SIZE, TYPE and COUNT do not fit each other. Export it again."
+        )
+    return [_Field(name, code, int(number)) for name, code, number in zip(names, codes, counts, strict=True)], count
+
+
+def _read_text(file, fields, count, path):
+    types = [field.code for field in fields for _ in range(field.count)]
+    columns = read_rows(file, types, count, path)
+    firsts = np.cumsum([0] + [field.count for field in fields])
+    return [columns[first] if field.count == 1 else None for field, first in zip(fields, firsts, strict=False)]
+
+
+def _read_binary(file, fields, count, path):
+    record = np.dtype([(f"f{index}", f"<{field.code}", (field.count,)) for index, field in enumerate(fields)])
+    rows = read_records(file, file.tell(), record, count, path)
+    return [
+        rows[f"f{index}"][:, 0].astype(field.code) if field.count == 1 else None for index, field in enumerate(fields)
+    ]
+
+
+def _read_packed(file, fields, count, path):
+    """Read data packed as a whole: all values of the first field, then all of the next one."""
+    head = file.read(8)
+    packed, length = struct.unpack("<II", head) if len(head) == 8 else (0, 0)
+    begin, size = file.tell(), file.seek(0, 2)
+    sizes = [field.count * int(field.code[1:]) for field in fields]
+    if packed > size - begin or length > _MOST_REPEATED * packed or length != count * sum(sizes):
+        raise too_short(path, min(length, _MOST_REPEATED * max(size - begin, 0)) // max(sum(sizes), 1), count)
+    file.seek(begin)
+    data = _unpack(file.read(packed), length)
+    places = np.cumsum([0] + [count * size for size in sizes])
+    return [
+        np.frombuffer(data, f"<{field.code}", count, place).astype(field.code) if field.count == 1 else None
+        for field, place in zip(fields, places, strict=False)
+    ]
+
+
+def _unpack(data, length):
+    """Undo LZF: runs of bytes as they are, and repetitions of bytes before; only one after another can be undone."""
+    result = bytearray(length)
+    place = done = 0
+    try:
+        while place < len(data):
+            control = data[place]
+            place += 1
+            if control < 32:
+                run = control + 1
+                part = data[place : place + run]
+                place += run
+            else:
+                run = control >> 5
+                if run == 7:
+                    run += data[place]
+                    place += 1
+                run += 2
+                first = done - ((control & 31) << 8) - data[place] - 1
+                place += 1
+                if first < 0:
+                    raise ValueError("its packed data repeat what is not there")
+                part = result[first : min(first + run, done)]
+                if len(part) < run:  # it repeats itself, too
+                    part = (part * (run // len(part) + 1))[:run]
+            if len(part) != run or done + run > length:
+                raise ValueError("its packed data are longer than its header says, or cut off")
+            result[done : done + run] = part
+            done += run
+    except IndexError as error:
+        raise ValueError("its packed data are cut off") from error
+    if done != length:
+        raise ValueError("its packed data are shorter than its header says")
+    return result
+
+
+def _split_color(column, alpha):
+    """Return the columns of a color whose bytes are alpha, red, green and blue of a whole number, or of a float."""
+    bits = column.astype(np.float32).view(np.uint32) if column.dtype.kind == "f" else column.astype(np.uint32)
+    parts = {name: (bits >> shift).astype(np.uint8) for name, shift in (("red", 16), ("green", 8), ("blue", 0))}
+    opacity = (bits >> 24).astype(np.uint8)
+    return parts | ({"alpha": opacity} if alpha and opacity.any() else {})
+
+
+def _without_missed(table, path):
+    """Leave out the points without coordinates, by which sensors with a raster of rays mark those that hit nothing."""
+    missed = np.isnan(table.points).any(axis=1)
+    if missed.any():
+        kept = ~missed
+        table.points = table.points[kept]
+        table.attributes = {name: values[kept] for name, values in table.attributes.items()}
+        table.colors = None if table.colors is None else table.colors[kept]
+        table.notices.append(f"{path.name}: left out {missed.sum()} points that the sensor missed (NaN).")
+    return table
