@@ -105,19 +105,23 @@ def _check_packing(file, begin, size, header, path):
     if end == -1:  # of programs that cannot go back
         (end,) = read("<q", size - 8)
     _, chunks = read("<II", end)
-    if chunks * header.point_format.size > end - begin - 8:  # each begins with a whole point
+    if (chunks - 1) * header.point_format.size > end - begin - 8:  # each begins with a whole point, if it has any
         raise fault
     file.seek(begin)
-    place = begin + 8
+    place, left = begin + 8, header.point_count
     layers = sum(_ITEMS[number][1] if number in _ITEMS else length for number, length in items)
-    for _, length in lazrs.read_chunk_table(file, lazrs.LazVlr(found[0])):
+    for count, length in lazrs.read_chunk_table(file, lazrs.LazVlr(found[0])):
+        if left <= 0:
+            break  # writers may begin a chunk at the end that gets no points
         if not 0 <= length <= end - place:
             raise fault
         if kind == _LAYERED:
             head = header.point_format.size + 4 * (1 + layers)
-            if length < head or sum(read(f"<{layers}I", place + head - 4 * layers)) > length - head:
+            if length < head or sum(read(f"<{layers}I", place + head - 4 * layers)) != length - head:
                 raise fault
-        place += length
+        place, left = place + length, left - count
+    if left > 0:
+        raise fault
 
 
 def _read_items(data):

@@ -8,6 +8,7 @@ import tracemalloc
 from pathlib import Path
 
 import laspy
+import lazrs
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -74,6 +75,35 @@ def test_blocks_and_chunks_follow_each_other(tmp_path, name):
     assert_allclose(table.points, points, rtol=0.0, atol=1e-6)
     assert_array_equal(table.attributes["intensity"], np.arange(140_000) % 65536)
     assert_allclose(table.colors[[0, -1]], 2 * [[1.0, 0.0, 0.5, 1.0]], atol=1e-4)
+
+
+@pytest.mark.parametrize(("point_format", "version"), [(2, "1.2"), (7, "1.4")])
+def test_full_chunks(tmp_path, point_format, version):
+    points = write_las(tmp_path / "a.laz", point_format, version, count=100_000)
+    assert_allclose(read_points(tmp_path / "a.laz").points, points, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("point_format", "version"), [(2, "1.2"), (7, "1.4")])
+def test_chunks_of_different_sizes(tmp_path, point_format, version):
+    """As those of cloud optimized point clouds; the last one is empty."""
+    points = write_las(tmp_path / "a.las", point_format, version)
+    write_las(tmp_path / "a.laz", point_format, version)
+    with laspy.open(tmp_path / "a.las") as reader:
+        header = reader.header
+    rows = (tmp_path / "a.las").read_bytes()[header.offset_to_point_data :]
+    size = header.point_format.size
+    begin, at = begin_of(tmp_path / "a.laz"), items_of(tmp_path / "a.laz")
+    kind = lazrs.LazVlr.new_for_compression(point_format, header.point_format.num_extra_bytes, True)
+    head = bytearray((tmp_path / "a.laz").read_bytes()[:begin])
+    head[at : at + len(kind.record_data())] = kind.record_data()
+    with open(tmp_path / "a.laz", "wb") as file:
+        file.write(head)
+        packer = lazrs.LasZipCompressor(file, kind)
+        for first, last in ((0, 1), (1, 200), (200, COUNT)):
+            packer.compress_many(rows[first * size : last * size])
+            packer.finish_current_chunk()
+        packer.done()
+    assert_allclose(read_points(tmp_path / "a.laz").points, points, rtol=0.0, atol=1e-6)
 
 
 def test_what_a_file_is_called_does_not_matter(tmp_path):
