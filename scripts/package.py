@@ -68,14 +68,13 @@ def fetch(wheels, python):
         if not path.exists() or sha256(path) not in pinned_hashes():
             path.unlink(missing_ok=True)
             print(f"Fetching {wheel}", flush=True)
-            _, _, interpreter, abi, tags = path.stem.split("-")
-            wanted = ["--implementation", "cp", "--python-version", interpreter[2:], "--abi", abi]
-            wanted += ["--platform", tags.partition(".")[0]]
-            # Brings the wheels of all that is pinned; those for any platform are fetched as for this one.
+            project, version, interpreter, abi, tags = path.stem.split("-")
+            target = ["--implementation", "cp", "--python-version", interpreter[2:], "--abi", abi]
+            target += ["--platform", tags.partition(".")[0]]
             run(
                 [python, "-m", "pip", "download", "--quiet", "--no-input", "--disable-pip-version-check"]
-                + ["--require-hashes", "--only-binary=:all:", "--no-deps", "--dest", WHEELS, "--requirement", PINS]
-                + ([] if tags == "any" else wanted)
+                + ["--only-binary=:all:", "--no-deps", "--dest", WHEELS, f"{project}=={version}"]
+                + (target if abi != "none" else [])  # which fits all
             )
         if not path.exists() or sha256(path) not in pinned_hashes():
             sys.exit(f"{wheel} is not what wheels.txt pins; compare it with the wheels in blender_manifest.toml")
@@ -97,12 +96,12 @@ def stage(platforms):
             shutil.copy2(source, STAGE / name)
         else:
             sys.exit(f"{name} is missing, the package needs it")
-    needed = {wheel for name in platforms for wheel in wheel_names(name)}
-    for wheel in {wheel for name in read_manifest()["platforms"] for wheel in wheel_names(name)}:
-        if wheel in needed:
-            shutil.copy2(WHEELS / wheel, STAGE / "wheels")
-        else:
-            (STAGE / "wheels" / wheel).touch()
+    for name in read_manifest()["platforms"]:
+        for wheel in wheel_names(name):
+            if name in platforms:
+                shutil.copy2(WHEELS / wheel, STAGE / "wheels")
+            else:
+                (STAGE / "wheels" / wheel).touch()
 
 
 def tool(python, *arguments):

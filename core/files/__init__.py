@@ -1,4 +1,4 @@
-"""Point files to arrays in double precision and back: numpy only, so that scripts outside Blender can use it too."""
+"""Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
 from .formats import READABLE, WRITABLE, read_points, write_points
 from .frames import numbered_files, order_frames

@@ -23,6 +23,7 @@ _FAULTS = (ValueError, OverflowError, EOFError, RuntimeError, struct.error, zlib
 _READERS = {
     ".ply": read_ply,
     ".obj": read_vertices,
+    ".pcd": read_pcd,
     ".xyz": read_columns,
     ".pts": read_scan,
     ".csv": read_columns,
@@ -31,7 +32,6 @@ _READERS = {
     ".npz": read_array,
     ".las": read_las,
     ".laz": read_las,
-    ".pcd": read_pcd,
 }
 READABLE = tuple(_READERS)
 WRITABLE = (".ply", ".xyz", ".csv")

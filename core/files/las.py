@@ -1,17 +1,24 @@
-"""LAS and LAZ, the formats of laser scans: by laspy, and lazrs for what is compressed."""
+"""LAS and LAZ, the files of laser scanners: by laspy and lazrs, which nothing else needs."""
+
+import os
+import struct
 
 import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError
 from .table import PointTable
 
-_COLUMNS = ("intensity", "classification", "return_number")  # of every LAS file
+_COLUMNS = ("intensity", "classification", "return_number", "nir")  # that become attributes, where a file has them
 _COLORS = ("red", "green", "blue")
-_PACKED = 100  # bytes of points in one of a LAZ file at most; 5 to 20 are usual
-_HEAD = 105  # bytes of a header up to the kind of its points
-_RECORD = 54  # bytes of a variable length record at least
-_CHUNK = 20  # bytes of a chunk at least: its first point is not compressed
-_BLOCK = 1 << 18  # points read at one time
+_BLOCK = 2**16  # points that are read at once
+_SHORTEST = 227  # bytes of a header
+_RATIO = 100  # of unpacked to packed points, which have 3 to 20 ...
+_HARMLESS = 64e6  # ... or fewer bytes than this
+_DETAIL = 54  # bytes of a variable length record at least
+_CHUNKED, _LAYERED = 2, 3  # kinds of packing
+# Items of a packed point by number: bytes, and layers if packed in layers. Others are extra bytes, a layer for each.
+_ITEMS = {6: (20, 0), 7: (8, 0), 8: (6, 0), 9: (29, 0), 10: (30, 9), 11: (6, 1), 12: (8, 2), 13: (29, 1)}
+_EXTRA = (0, 14)
 
 
 def read_las(path) -> PointTable:
@@ -19,92 +26,142 @@ def read_las(path) -> PointTable:
 
     Raises
     ------
-    InvalidPointsError
-        It is no such file, or broken; the text says where.
     PointCloudError
-        laspy or lazrs is not there.
+        laspy or lazrs is missing, or the file is broken.
     """
     try:
-        import laspy  # only here: all else does without
+        import laspy
         import lazrs
     except ImportError as error:
         raise PointCloudError(
-            f"{path} is read by laspy and lazrs, which are not there ({error}). Install both, or convert it to PLY."
+            f"{path} cannot be read: {error.name} is missing. Install laspy and lazrs, or export the points as PLY."
         ) from error
     with open(path, "rb") as file:
-        size = _check_head(file, path)
+        _check_header(file, path)
         try:
-            return _read(laspy.open(file, closefd=False), size, path)
-        except (laspy.errors.LaspyException, lazrs.LazrsError, AttributeError, KeyError, TypeError) as error:
-            raise InvalidPointsError(f"{path} is a broken LAS file: {error}. Copy or export it again.") from error
-        except BaseException as error:
-            if type(error).__module__ != "pyo3_runtime":  # what lazrs raises where it finds no way on
-                raise
-            raise InvalidPointsError(f"{path} is a broken LAZ file: {error}. Copy or export it again.") from error
+            # Not in parallel: that takes memory for as many points as a file names in a chunk.
+            with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader:
+                _check_size(file, reader.header, path)
+                return _read(reader, path)
+        except (laspy.errors.LaspyException, lazrs.LazrsError) as error:
+            raise ValueError(f"{error}") from error  # `read_points` tells it as it tells numpy's
 
 
-def _check_head(file, path):
-    """Refuse a file that names more than can follow, before it is looked for; return the size of the file.
-
-    Lazrs would end the process where it is told to make room for more chunks than memory can hold.
-    """
-    head, size = file.read(_HEAD), file.seek(0, 2)
-    if not head.startswith(b"LASF"):
-        raise InvalidPointsError(f"{path} is no LAS file: it does not begin with LASF. Export it again.")
-    begin, records = _number(head, 96, 4), _number(head, 100, 4)
-    if len(head) < _HEAD or begin > size or records * _RECORD > size:
-        raise InvalidPointsError(f"{path} ends before its points begin. Copy it again.")
-    if head[104] & 0xC0:  # compressed
-        file.seek(begin)
-        table = _number(file.read(8), 0, 8)
-        if table > size:  # as it is told where a file was written without going back
-            file.seek(-8, 2)
-            table = _number(file.read(8), 0, 8)
-        file.seek(min(table, size))
-        if _number(file.read(8), 4, 4) * _CHUNK > size:
-            raise InvalidPointsError(f"{path} is too short for the chunks that it names. Copy it again.")
+def _check_header(file, path):
+    """Refuse what is no LAS file, or names more records than it has room for: laspy would look for them all."""
+    size = os.fstat(file.fileno()).st_size
+    data = file.read(_SHORTEST)
+    if len(data) < _SHORTEST or data[:4] != b"LASF":
+        raise InvalidPointsError(f"{path} is no LAS file: it does not begin with the header of one. Export it again.")
+    length, begin, details = struct.unpack_from("<HII", data, 94)
+    if length + details * _DETAIL > begin or begin > size:
+        raise InvalidPointsError(
+            f"{path} has no room for what its header names: {details} records before byte {begin:,} of {size:,}. Copy"
+            " it again."
+        )
     file.seek(0)
-    return size
 
 
-def _number(data, begin, width):
-    return int.from_bytes(data[begin : begin + width], "little")
+def _check_size(file, header, path):
+    """Refuse a file that is too short for its points, before there is memory for them."""
+    begin, size = header.offset_to_point_data, os.fstat(file.fileno()).st_size
+    needed = header.point_count * header.point_format.size
+    if needed > (max(_RATIO * size, _HARMLESS) if header.are_points_compressed else size - begin):
+        raise InvalidPointsError(
+            f"{path} is too short for the {header.point_count:,} points that its header names. Copy it again."
+        )
+    if header.are_points_compressed and header.point_count:
+        _check_packing(file, begin, size, header, path)
+        file.seek(begin)
 
 
-def _read(reader, size, path):
+def _check_packing(file, begin, size, header, path):
+    """Refuse packed points whose parts are longer than the file.
+
+    lazrs takes memory for whatever a file names, and ends the whole program where there is too little.
+    """
+    import lazrs
+
+    found = [detail.record_data for detail in header.vlrs.get("LasZipVlr")]
+    kind, items = (0, []) if not found else _read_items(found[0])
+    wanted = [size for number, size in items if number in _ITEMS and _ITEMS[number][0] != size]
+    if (
+        kind not in (_CHUNKED, _LAYERED)
+        or wanted
+        or sum(size for _, size in items) != header.point_format.size
+        or any(number not in _ITEMS and number not in _EXTRA for number, _ in items)
+    ):
+        raise InvalidPointsError(f"{path} is packed in a way that is not known, or broken. Save it again as LAS.")
+    fault = InvalidPointsError(f"{path} is broken: its packed points are not where it says. Copy or export it again.")
+
+    def read(code, place):
+        length = struct.calcsize(code)
+        if not begin <= place <= size - length:
+            raise fault
+        file.seek(place)
+        return struct.unpack(code, file.read(length))
+
+    (end,) = read("<q", begin)
+    if end == -1:  # of programs that cannot go back
+        (end,) = read("<q", size - 8)
+    _, chunks = read("<II", end)
+    if (chunks - 1) * header.point_format.size > end - begin - 8:  # each begins with a whole point, if it has any
+        raise fault
+    file.seek(begin)
+    place, left = begin + 8, header.point_count
+    layers = sum(_ITEMS[number][1] if number in _ITEMS else length for number, length in items)
+    for count, length in lazrs.read_chunk_table(file, lazrs.LazVlr(found[0])):
+        if left <= 0:
+            break  # writers may begin a chunk at the end that gets no points
+        if not 0 <= length <= end - place:
+            raise fault
+        if kind == _LAYERED:
+            head = header.point_format.size + 4 * (1 + layers)
+            if length < head or sum(read(f"<{layers}I", place + head - 4 * layers)) != length - head:
+                raise fault
+        place, left = place + length, left - count
+    if left > 0:
+        raise fault
+
+
+def _read_items(data):
+    """Return the kind of packing, and number and bytes of each item of a point."""
+    (kind,), (count,) = struct.unpack_from("<H", data), struct.unpack_from("<H", data, 32)
+    return kind, [struct.unpack_from("<HH", data, 34 + 6 * index) for index in range(count)]
+
+
+def _read(reader, path):
     header = reader.header
-    kind, count = header.point_format, header.point_count
-    held = _PACKED * size if header.are_points_compressed else size - header.offset_to_point_data
-    if count * kind.size > held:  # before there is memory for so many
-        raise InvalidPointsError(f"{path} is too short for the {count:,} points that its header names. Copy it again.")
-    names = [name for name in (*_COLUMNS, *kind.extra_dimension_names) if _is_kept(kind.dimension_by_name(name))]
-    colored = set(_COLORS) <= set(kind.dimension_names)
+    count, known = header.point_count, set(header.point_format.dimension_names)
+    extra = list(header.point_format.extra_dimension_names)
     table = PointTable(np.empty((count, 3)))
-    colors = np.empty((count, 3), np.uint16) if colored else None
+    colors = np.empty((count, 3), np.uint16) if known.issuperset(_COLORS) else None
     done = 0
     for block in reader.chunk_iterator(_BLOCK):
         rows = slice(done, done + len(block))
-        for axis, name in enumerate("xyz"):
-            table.points[rows, axis] = block[name]
-        for name in names:
+        for axis, name in enumerate("XYZ"):
+            table.points[rows, axis] = block[name] * header.scales[axis] + header.offsets[axis]
+        if colors is not None:
+            for axis, name in enumerate(_COLORS):
+                colors[rows, axis] = block[name]
+        for name in [*_COLUMNS, *extra]:
+            if name not in known:
+                continue
             values = np.asarray(block[name])
-            if name not in table.attributes:
-                table.attributes[name] = np.empty((count, *values.shape[1:]), values.dtype)
-            table.attributes[name][rows] = values
-        if colored:
-            colors[rows] = np.stack([block[name] for name in _COLORS], axis=1)
+            if values.shape[1:] in ((), (3,)):
+                label = " ".join(name.split()) or "extra"
+                if label not in table.attributes:
+                    table.attributes[label] = np.empty((count, *values.shape[1:]), values.dtype)
+                table.attributes[label][rows] = values
+            elif done == 0:
+                table.notices.append(f"{path.name}: left out {name}, which has {values.shape[1]} numbers a point.")
         done = rows.stop
     if done < count:
         raise InvalidPointsError(
             f"{path} ends after {done} of the {count} points that its header names. Copy it again."
         )
-    if colored and count:
+    if colors is not None and colors.any():  # all black are those of scanners without a camera
         full = 255.0 if colors.max() <= 255 else 65535.0  # some programs use the low byte alone
         table.colors = np.ones((count, 4), np.float32)
-        table.colors[:, :3] = colors / np.float32(full)
+        np.divide(colors, np.float32(full), out=table.colors[:, :3], casting="same_kind")
     return table
-
-
-def _is_kept(dimension):
-    """Whether a column holds a number or a vector."""
-    return dimension.num_elements in {1, 3}

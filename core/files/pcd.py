@@ -1,24 +1,33 @@
-"""PCD, the format of the Point Cloud Library: in text, binary or compressed."""
+"""PCD, the point files of the Point Cloud Library: text, binary, or packed by LZF."""
 
-import os
-from itertools import chain
+import struct
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidPointsError
-from .lines import brief, read_blocks
+from .lines import brief
+from .rows import read_records, read_rows, too_short
 from .table import PointTable, from_columns
 
-_KINDS = {"F": "f", "I": "i", "U": "u"}
-_SIZES = {"f": (4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
-_LINES = "VERSION", "FIELDS", "COLUMNS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA"
-_LONGEST = 4000  # characters of a line of the header, and lines
-_PACKED = ("rgb", "rgba")  # fields that hold a color in the bits of one number
-_EXPANDED = 264  # bytes that two or three compressed ones stand for at most
+_LONGEST = 10_000  # bytes of a line of the header; some have hundreds of fields
+_MOST_LINES = 100  # of the header
+_MOST_DIGITS = 15  # of a count
+_WIDEST = 10_000  # numbers of a point
+_TYPES = {f"{kind} {size}": f"{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)}
+_TYPES |= {"F 4": "f4", "F 8": "f8"}
+_COLORS = ("rgb", "rgba")  # fields that hold a color in the bytes of one number
+_MOST_REPEATED = 88  # times that LZF may make data longer: three bytes repeat 264 at most
+
+
+class _Field(NamedTuple):
+    name: str
+    code: str  # numpy's, without the byte order
+    count: int  # numbers of each point
 
 
 def read_pcd(path) -> PointTable:
-    """Read the points of a PCD file with all their fields; those without a place, as of depth cameras, are left out.
+    """Read the points of a PCD file with all their fields of one number; those that the sensor missed are left out.
 
     Raises
     ------
@@ -26,158 +35,156 @@ def read_pcd(path) -> PointTable:
         It is no PCD file, or broken; the text says where.
     """
     with open(path, "rb") as file:
-        header = _read_header(file, path)
-        names, record, count = _layout(header, path)
-        match header["DATA"]:
-            case ["ascii"]:
-                columns = _read_text(file, record, count, path)
-            case ["binary"]:
-                columns = _read_binary(file, record, count, path)
-            case ["binary_compressed"]:
-                columns = _read_compressed(file, record, count, path)
-            case kind:
-                raise InvalidPointsError(f"{path} holds {brief(' '.join(kind))} data. Save it as ascii or binary.")
-    named = {}
-    for name, column in zip(names, columns, strict=True):
-        if name in _PACKED and column.dtype.itemsize == 4:
-            bits = column.view(np.uint32)
-            named.update((color, (bits >> shift & 255).astype("u1")) for color, shift in _shifts(name))
-        elif name != "_":  # fills a gap
-            named[name] = column
-    table = from_columns(named, path)
-    return _with_places(table, path)
-
-
-def _shifts(name):
-    """Return the colors in a packed one, and where their bits begin."""
-    return (("red", 16), ("green", 8), ("blue", 0), *((("alpha", 24),) if name == "rgba" else ()))
-
-
-def _with_places(table, path):
-    """Leave out the points whose coordinates are NaN: pixels of a depth camera that saw nothing."""
-    there = ~np.isnan(table.points).any(axis=1)
-    if there.all() or not there.any():
-        return table
-    attributes = {name: values[there] for name, values in table.attributes.items()}
-    colors = None if table.colors is None else table.colors[there]
-    told = f"{path.name}: left out {np.count_nonzero(~there):,} points without a place, as cameras write them."
-    return PointTable(table.points[there], attributes, colors, table.single, [*table.notices, told])
+        fields, count, kind = _read_header(file, path)
+        columns = {"ascii": _read_text, "binary": _read_binary, "binary_compressed": _read_packed}[kind](
+            file, fields, count, path
+        )
+    left_out = [field.name for field in fields if field.count != 1 and field.name != "_"]
+    columns = {
+        field.name: column
+        for field, column in zip(fields, columns, strict=True)
+        if field.count == 1 and field.name != "_"  # which only fills records
+    }
+    for name in _COLORS:
+        if name in columns:
+            columns |= _split_color(columns.pop(name), alpha=name == "rgba")
+            break
+    table = from_columns(columns, path)
+    if left_out:
+        table.notices.append(f"{path.name}: left out {brief(', '.join(left_out))}, with several numbers a point.")
+    return _without_missed(table, path)
 
 
 def _read_header(file, path):
-    """Return the words of each line by its first one; leave the file where the data begin."""
-    header = {}
-    for _ in range(_LONGEST):
-        words = file.readline(_LONGEST).decode("ascii", errors="replace").split()
-        if not words or words[0].startswith("#"):
-            continue
-        if words[0].upper() not in _LINES:
-            break
-        header[words[0].upper()] = words[1:]
-        if "DATA" in header:
-            return header
-    raise InvalidPointsError(f"{path} is no PCD file: its header does not end with a line DATA. Export it again.")
+    """Return the fields, the number of points and the kind of data; leave the file where the data begin."""
+    found = {}
+    for number in range(1, _MOST_LINES):
+        line = file.readline(_LONGEST).decode(errors="replace").strip()
+        key, *words = line.split() or ["#"]
+        match key:
+            case _ if key.startswith("#"):
+                pass
+            case "FIELDS" | "SIZE" | "TYPE" | "COUNT":
+                found[key] = words
+            case "WIDTH" | "HEIGHT" | "POINTS" if len(words) == 1 and _is_count(words[0]):
+                found[key] = int(words[0])
+            case "VERSION" | "VIEWPOINT":
+                pass
+            case "DATA" if words in (["ascii"], ["binary"], ["binary_compressed"]):
+                return *_read_fields(found, path), words[0]
+            case _:
+                raise InvalidPointsError(
+                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PCD file. Export it"
+                    " again."
+                )
+    raise InvalidPointsError(f"{path} has no header of a PCD file that ends with DATA. Export it again.")
 
 
-def _layout(header, path):
-    """Return the name of each number of a point, the numbers as a numpy type, and how many points there are."""
-    try:
-        fields = header.get("FIELDS") or header["COLUMNS"]
-        kinds = [_KINDS[kind] for kind in header["TYPE"]]
-        sizes = [int(size) for size in header["SIZE"]]
-        repeats = [int(times) for times in header.get("COUNT", ["1"] * len(fields))]
-        width, height = (int(header.get(key, ["1"])[0]) for key in ("WIDTH", "HEIGHT"))
-        count = int(header["POINTS"][0]) if "POINTS" in header else width * height
-    except (KeyError, IndexError, ValueError) as error:
-        raise InvalidPointsError(f"{path} has a header that is incomplete: {error}. Export it again.") from error
-    sound = len(fields) == len(kinds) == len(sizes) == len(repeats) <= _LONGEST and count >= 0
-    if not sound or any(size not in _SIZES[kind] for kind, size in zip(kinds, sizes, strict=True)):
-        raise InvalidPointsError(f"{path} has a header whose FIELDS, SIZE, TYPE and COUNT do not fit. Export it again.")
-    if min(repeats, default=1) < 1 or sum(repeats) > _LONGEST:
-        raise InvalidPointsError(f"{path} has fields of too many or no numbers. Export it again.")
-    names, codes = [], []
-    for name, kind, size, times in zip(fields, kinds, sizes, repeats, strict=True):
-        names += [name] if times == 1 else [f"{name}_{number}" if name != "_" else "_" for number in range(times)]
-        codes += [f"<{kind}{size}"] * times
-    return names, np.dtype([(f"f{index}", code) for index, code in enumerate(codes)]), count
+def _is_count(word):
+    return word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS
 
 
-def _read_text(file, record, count, path):
-    lines = filter(bytes.strip, chain.from_iterable(read_blocks(file, path)))
-    first = next(lines, None)
-    values = np.empty((0, len(record)))
-    if first is not None:
-        values = np.loadtxt(chain([first], lines), ndmin=2, comments=None, encoding="ascii")
-    if values.shape[1] != len(record):
+def _read_fields(found, path):
+    """Return the fields and the number of points that the lines of a header tell."""
+    names, sizes, types = (found.get(key, []) for key in ("FIELDS", "SIZE", "TYPE"))
+    counts = found.get("COUNT", ["1"] * len(names))
+    count = found.get("POINTS", found.get("WIDTH", 0) * found.get("HEIGHT", 1))
+    codes = [_TYPES.get(f"{kind} {size}") for kind, size in zip(types, sizes, strict=False)]
+    if (
+        not len(names) == len(sizes) == len(types) == len(counts)
+        or None in codes
+        or not all(map(_is_count, counts))
+        or sum(map(int, counts)) > _WIDEST
+    ):
         raise InvalidPointsError(
-            f"{path} has {values.shape[1]} numbers in a line where its header names {len(record)}. Export it again."
+            f"{path} has a header whose lines FIELDS, SIZE, TYPE and COUNT do not fit each other. Export it again."
         )
-    _check_count(len(values), count, path)
-    return [_typed(values[:count, index], record[index]) for index in range(len(record))]
+    return [_Field(name, code, int(number)) for name, code, number in zip(names, codes, counts, strict=True)], count
 
 
-def _typed(column, kind):
-    """Give numbers of text the type that the header names, where it holds them; floats stay as fine as they are."""
-    if kind.kind == "f":
-        return column.astype("f4") if kind.itemsize == 4 else column
-    limits = np.iinfo(kind)
-    return column.astype(kind) if limits.min <= column.min() and column.max() <= limits.max else column
+def _read_text(file, fields, count, path):
+    types = [field.code for field in fields for _ in range(field.count)]
+    columns = read_rows(file, types, count, path)
+    firsts = np.cumsum([0] + [field.count for field in fields])
+    return [columns[first] if field.count == 1 else None for field, first in zip(fields, firsts, strict=False)]
 
 
-def _read_binary(file, record, count, path):
-    _check_count((os.fstat(file.fileno()).st_size - file.tell()) // record.itemsize, count, path)
-    rows = np.fromfile(file, record, count)
-    return [rows[name].copy() for name in record.names]
+def _read_binary(file, fields, count, path):
+    record = np.dtype([(f"f{index}", f"<{field.code}", (field.count,)) for index, field in enumerate(fields)])
+    rows = read_records(file, file.tell(), record, count, path)
+    return [
+        rows[f"f{index}"][:, 0].astype(field.code) if field.count == 1 else None for index, field in enumerate(fields)
+    ]
 
 
-def _read_compressed(file, record, count, path):
-    """Read what is compressed column by column."""
-    packed, size = (int(number) for number in np.frombuffer(file.read(8).ljust(8, b"\0"), "<u4"))
-    if size != count * record.itemsize or size > _EXPANDED * packed:
-        raise InvalidPointsError(f"{path} does not hold the {count} points that its header names. Copy it again.")
-    data = file.read(packed)
-    if len(data) < packed:
-        raise InvalidPointsError(f"{path} ends before its points do. Copy it again.")
-    expanded = _expand(data, size)
-    if len(expanded) != size:
-        raise InvalidPointsError(f"{path} is broken: its compressed points have no end. Copy it again.")
-    columns, begin = [], 0
-    for name in record.names:
-        column = np.frombuffer(expanded, record[name], count, begin)
-        columns.append(column)
-        begin += column.nbytes
-    return columns
+def _read_packed(file, fields, count, path):
+    """Read data packed as a whole: all values of the first field, then all of the next one."""
+    head = file.read(8)
+    packed, length = struct.unpack("<II", head) if len(head) == 8 else (0, 0)
+    begin, size = file.tell(), file.seek(0, 2)
+    sizes = [field.count * int(field.code[1:]) for field in fields]
+    if packed > size - begin or length > _MOST_REPEATED * packed or length != count * sum(sizes):
+        raise too_short(path, min(length, _MOST_REPEATED * max(size - begin, 0)) // max(sum(sizes), 1), count)
+    file.seek(begin)
+    data = _unpack(file.read(packed), length)
+    places = np.cumsum([0] + [count * size for size in sizes])
+    return [
+        np.frombuffer(data, f"<{field.code}", count, place).astype(field.code) if field.count == 1 else None
+        for field, place in zip(fields, places, strict=False)
+    ]
 
 
-def _expand(data, size):
-    """Undo the compression of LZF: pieces to copy as they are, and pieces that were there before; no more than a size.
-
-    The first byte of a piece tells which of both it is, and how long.
-    """
-    result, place = bytearray(), 0
-    while place < len(data) and len(result) <= size:
-        control = data[place]
-        place += 1
-        if control < 32:
-            result += data[place : place + control + 1]
-            place += control + 1
-            continue
-        length = control >> 5
-        if length == 7:
-            length += data[place] if place < len(data) else 0
+def _unpack(data, length):
+    """Undo LZF: runs of bytes as they are, and repetitions of bytes before; only one after another can be undone."""
+    result = bytearray(length)
+    place = done = 0
+    try:
+        while place < len(data):
+            control = data[place]
             place += 1
-        back = ((control & 31) << 8) + (data[place] if place < len(data) else 0) + 1
-        place += 1
-        length += 2
-        if back > len(result):
-            break
-        piece = result[len(result) - back : len(result) - back + length]
-        result += (piece * (length // len(piece) + 1))[:length]  # a piece may go on into itself
+            if control < 32:
+                run = control + 1
+                part = data[place : place + run]
+                place += run
+            else:
+                run = control >> 5
+                if run == 7:
+                    run += data[place]
+                    place += 1
+                run += 2
+                first = done - ((control & 31) << 8) - data[place] - 1
+                place += 1
+                if first < 0:
+                    raise ValueError("its packed data repeat what is not there")
+                part = result[first : min(first + run, done)]
+                if len(part) < run:  # it repeats itself, too
+                    part = (part * (run // len(part) + 1))[:run]
+            if len(part) != run or done + run > length:
+                raise ValueError("its packed data are longer than its header says, or cut off")
+            result[done : done + run] = part
+            done += run
+    except IndexError as error:
+        raise ValueError("its packed data are cut off") from error
+    if done != length:
+        raise ValueError("its packed data are shorter than its header says")
     return result
 
 
-def _check_count(found, count, path):
-    if found < count:
-        raise InvalidPointsError(
-            f"{path} ends after {found} of the {count} points that its header names. Copy or save it again."
-        )
+def _split_color(column, alpha):
+    """Return the columns of a color whose bytes are alpha, red, green and blue of a whole number, or of a float."""
+    bits = column.astype(np.float32).view(np.uint32) if column.dtype.kind == "f" else column.astype(np.uint32)
+    parts = {name: (bits >> shift).astype(np.uint8) for name, shift in (("red", 16), ("green", 8), ("blue", 0))}
+    opacity = (bits >> 24).astype(np.uint8)
+    return parts | ({"alpha": opacity} if alpha and opacity.any() else {})
+
+
+def _without_missed(table, path):
+    """Leave out the points without coordinates, by which sensors with a raster of rays mark those that hit nothing."""
+    missed = np.isnan(table.points).any(axis=1)
+    if missed.any():
+        kept = ~missed
+        table.points = table.points[kept]
+        table.attributes = {name: values[kept] for name, values in table.attributes.items()}
+        table.colors = None if table.colors is None else table.colors[kept]
+        table.notices.append(f"{path.name}: left out {missed.sum()} points that the sensor missed (NaN).")
+    return table

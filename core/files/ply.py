@@ -1,13 +1,12 @@
 """PLY, the Stanford polygon format: the vertices and their properties, in text or binary."""
 
-import os
-from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidPointsError
-from .lines import brief, is_number, read_blocks
+from .lines import brief
+from .rows import read_records, read_rows
 from .table import PointTable, from_columns, to_columns
 
 _CODES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
@@ -49,8 +48,11 @@ def read_ply(path) -> PointTable:
                     f"{path} has lists in its element {brief(element.name)}, before or among its points. Save it again"
                     " with plain vertices first."
                 )
-        read = _read_text if order is None else _read_binary
-        columns = read(file, order, before, vertex, path)
+        if order is None:
+            skipped = sum(element.count for element in before)
+            columns = read_rows(file, vertex.types, vertex.count, path, skipped)
+        else:
+            columns = _read_binary(file, order, before, vertex, path)
     table = from_columns(dict(zip(vertex.names, columns, strict=True)), path)
     table.notices += [
         f"{path.name}: left out {element.count} {brief(element.name)} elements. Only points are read."
@@ -98,71 +100,8 @@ def _read_binary(file, order, before, vertex, path):
         for element in (*before, vertex)
     )
     begin = file.tell() + sum(element.count * kind.itemsize for element, kind in zip(before, skipped, strict=True))
-    found = max(os.fstat(file.fileno()).st_size - begin, 0) // max(record.itemsize, 1)
-    if found < vertex.count:  # before there is memory for so many
-        raise _too_short(path, found, vertex.count)
-    file.seek(begin)
-    rows = np.fromfile(file, record, vertex.count)
+    rows = read_records(file, begin, record, vertex.count, path)
     return [rows[f"f{index}"].astype(code) for index, code in enumerate(vertex.types)]
-
-
-def _read_text(file, order, before, vertex, path):
-    begin, width = file.tell(), len(vertex.names)
-
-    def rows():
-        """Return the lines of the points from the first on; there may be fewer than the header names."""
-        file.seek(begin)
-        first = sum(element.count for element in before)
-        filled = filter(bytes.strip, chain.from_iterable(read_blocks(file, path)))
-        return islice(filled, first, first + vertex.count)
-
-    lines = rows()
-    line = next(lines, None)
-    if line is None:
-        values = np.empty((0, width))
-    else:
-        try:
-            values = np.loadtxt(chain([line], lines), ndmin=2, comments=None, encoding="ascii")
-        except ValueError:
-            _refuse_row(rows(), width, path)
-            raise
-    if values.shape[1] != width:
-        _refuse_row(rows(), width, path)
-    if len(values) < vertex.count:
-        raise _too_short(path, len(values), vertex.count)
-    return [_typed(column, code) for column, code in zip(values.T, vertex.types, strict=True)]
-
-
-def _typed(column, code):
-    """Give numbers of text the type that the header names, unless that would lose what the text holds.
-
-    It may hold more digits than the float of the header, and numbers that are no whole ones, or too large.
-    """
-    if code[0] != "f":
-        limits = np.iinfo(code)
-        if limits.min <= column.min() and column.max() <= limits.max:  # neither is NaN
-            return column.astype(code)
-    return column.astype("f8")
-
-
-def _too_short(path, found, count):
-    return InvalidPointsError(
-        f"{path} ends after {found} of the {count} points that its header names. Copy or save it again."
-    )
-
-
-def _refuse_row(lines, width, path):
-    """Say which of some lines does not hold so many numbers."""
-    for number, line in enumerate(lines, start=1):
-        words = line.decode("ascii", errors="replace").split()
-        odd = next((word for word in words if not is_number(word)), None)
-        if len(words) != width:
-            wrong = f"{len(words)} numbers where the header names {width} properties"
-        elif odd is not None:
-            wrong = f"could not convert string to float: {brief(odd)!r}"
-        else:
-            continue
-        raise InvalidPointsError(f"{path}, point {number}: {wrong}. Correct the file.")
 
 
 def write_ply(path, table, double=True):

@@ -18,8 +18,7 @@ from ..running.ready import reporting
 from .objects import OFFSET, add_object, file_filter, known_offset, offset_of
 from .sequence import add_sequence
 
-_BLENDERS = {".ply", ".obj"}  # what Blender reads by itself, too
-OWN = tuple(kind for kind in READABLE if kind not in _BLENDERS)
+OWN = tuple(suffix for suffix in READABLE if suffix not in (".ply", ".obj"))  # Blender reads those by itself, too
 
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
 if bpy.app.version >= (4, 5, 0):
@@ -31,7 +30,7 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
-    """Import the points of PLY, OBJ, LAS, LAZ, PCD, XYZ, PTS, CSV and text files, or numpy arrays, as loose vertices"""
+    """Import the points of LAS, LAZ, PLY, PCD, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as vertices"""
 
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"

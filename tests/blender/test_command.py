@@ -260,7 +260,7 @@ def test_unreadable_files(run, tmp_path):
     assert code == 1
     assert all(line["error"] for line in lines)
     assert len(lines) == 5
-    assert "is no LAS file" in lines[-1]["error"]
+    assert "scan.laz is no LAS file" in lines[-1]["error"]
 
 
 def test_input_is_never_overwritten(run, tmp_path):

@@ -32,6 +32,26 @@ def write_obj(path, points):
     path.write_text("".join(f"v {x:.3f} {y:.3f} {z:.3f}\n" for x, y, z in points))
 
 
+def write_las(path, points):
+    """By the laspy that the extension brings."""
+    import laspy
+
+    header = laspy.LasHeader(point_format=7, version="1.4")
+    header.offsets, header.scales = np.floor(points.min(axis=0)), np.full(3, 0.001)
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = points.T
+    las.intensity, las.classification = np.arange(len(points)), np.full(len(points), 6)
+    las.red = np.full(len(points), 65535)
+    las.write(str(path))
+
+
+def write_pcd(path, points):
+    """In double precision, which binary files can hold."""
+    count = len(points)
+    head = f"VERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {count}\nHEIGHT 1\nPOINTS {count}\n"
+    path.write_bytes(f"{head}DATA binary\n".encode() + points.astype("<f8").tobytes())
+
+
 WRITERS = {
     "a.ply": write_file,
     "a.obj": write_obj,
@@ -41,6 +61,9 @@ WRITERS = {
     "a.txt": lambda path, points: write_text(path, points, "\t"),
     "a.npy": np.save,
     "a.npz": lambda path, points: np.savez(path, points=points),
+    "a.pcd": write_pcd,
+    "a.las": write_las,
+    "a.laz": write_las,
 }
 
 
@@ -268,7 +291,7 @@ def test_laser_scans_are_imported(extension, tmp_path, name):
     ("name", "data", "text"),
     [
         ("missing.ply", None, "There is no file"),
-        ("a.laz", b"LASF", "ends before its points begin"),
+        ("a.laz", b"LASF", "is no LAS file: it does not begin with the header of one. Export it again"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n", "line 5: '' does not belong"),
         ("a.xyz", b"", "there are none"),
         ("a.csv", b"x,y,z\n", "there are none"),
@@ -398,9 +421,19 @@ class TestMenus:
         ours = handlers.pop("MESHFREE_FH_points")
         assert ours.bl_import_operator == "meshfree.import_points"
         extensions = set(ours.bl_file_extensions.split(";"))
-        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".las", ".laz", ".pcd"}
+        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".pcd", ".las", ".laz"}
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_what_laser_scanners_measure_becomes_attributes(tmp_path, name):
+    write_las(tmp_path / name, SURVEY)
+    obj = run_import(tmp_path / name)
+    assert_array_equal(attribute(obj, "intensity"), np.arange(len(SURVEY)))
+    assert_array_equal(attribute(obj, "classification"), np.full(len(SURVEY), 6))
+    assert_array_equal(attribute(obj, "return_number"), np.zeros(len(SURVEY)))
+    assert obj.data.color_attributes["Color"].data[0].color_srgb[:] == pytest.approx((1.0, 0.0, 0.0, 1.0), abs=0.01)
 
 
 def test_values_beyond_single_precision(tmp_path):

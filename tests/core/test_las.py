@@ -1,112 +1,246 @@
-"""LAS and LAZ files: coordinates in double precision, and what else scanners write."""
+"""LAS and LAZ files give what laspy wrote, and those that lie about themselves are refused at once."""
 
+import builtins
+import struct
+import subprocess
 import sys
+import tracemalloc
+from pathlib import Path
 
 import laspy
+import lazrs
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from core import PointCloudError
-from core.files import read_points
+from core.files import read_points, write_points
 
-POINTS = np.round(np.random.default_rng(0).uniform(0.0, 100.0, (500, 3)), 3) + [446_000.0, 4_000_000.0, 120.0]
+ROOT = Path(__file__).parents[2]
+COUNT = 500
+FORMATS = [(0, "1.2"), (1, "1.2"), (2, "1.2"), (3, "1.2"), (6, "1.4"), (7, "1.4"), (8, "1.4")]
+COLORED = {2, 3, 5, 7, 8, 10}
+FAR = np.array([446_000.0, 4_000_000.0, 120.0])
 
 
-def write_las(path, points=POINTS, kind=2, version="1.2", full=65535):
-    header = laspy.LasHeader(point_format=kind, version=version)
-    header.offsets, header.scales = np.floor(POINTS.min(axis=0)), np.full(3, 0.001)
-    header.add_extra_dim(laspy.ExtraBytesParams("height", np.float32))
-    header.add_extra_dim(laspy.ExtraBytesParams("way", "3f8"))
-    header.add_extra_dim(laspy.ExtraBytesParams("pair", "2u1"))
+def write_las(path, point_format=2, version="1.2", count=COUNT, colors=(65535, 0, 32768), extra=(), packed=None):
+    """Write a scan and return its coordinates."""
+    points = FAR + np.round(np.random.default_rng(0).uniform(0.0, 100.0, (count, 3)), 3)
+    header = laspy.LasHeader(point_format=point_format, version=version)
+    header.offsets, header.scales = FAR, np.full(3, 0.001)
+    for name, kind in (("height", np.float32), *extra):
+        header.add_extra_dim(laspy.ExtraBytesParams(name, kind))
     las = laspy.LasData(header)
     las.x, las.y, las.z = points.T
-    las.intensity = np.arange(len(points))
-    las.classification = np.full(len(points), 2)
-    if "red" in las.point_format.dimension_names:
-        las.red, las.green, las.blue = np.tile([[full], [0], [(full + 1) // 2]], len(points))
-    las.height = np.linspace(0.0, 1.0, len(points))
-    las.way = 2.0 * points
-    las.write(str(path))
+    las.intensity = np.arange(count) % 65536
+    las.classification = np.arange(count) % 20
+    las.return_number = 1 + np.arange(count) % 5
+    if point_format in COLORED:
+        las.red, las.green, las.blue = np.tile(np.reshape(colors, (3, 1)), count)
+    if point_format in (8, 10):
+        las.nir = np.arange(count) % 7
+    las.height = np.linspace(0.0, 1.0, count)
+    las.write(str(path), do_compress=path.suffix == ".laz" if packed is None else packed)
+    return points
 
 
-@pytest.mark.parametrize("suffix", [".las", ".laz"])
-@pytest.mark.parametrize(
-    ("kind", "version"), [(0, "1.2"), (1, "1.2"), (2, "1.2"), (3, "1.2"), (6, "1.4"), (7, "1.4"), (8, "1.4")]
-)
-def test_coordinates_and_columns_survive(tmp_path, suffix, kind, version):
-    path = tmp_path / f"a{suffix}"
-    write_las(path, kind=kind, version=version)
-    table = read_points(path)
-    assert_allclose(table.points, POINTS, rtol=0.0, atol=1e-6)
-    assert not table.single
-    assert_array_equal(table.attributes["intensity"], np.arange(500))
-    assert_array_equal(table.attributes["classification"], np.full(500, 2))
-    assert_allclose(table.attributes["height"], np.linspace(0.0, 1.0, 500), atol=1e-6)
-    assert_allclose(table.attributes["way"], 2.0 * POINTS)
-    assert "pair" not in table.attributes
-    if kind in (2, 3, 7, 8):
-        assert_allclose(table.colors, np.tile([1.0, 0.0, 0.5, 1.0], (500, 1)), atol=0.01)
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+@pytest.mark.parametrize(("point_format", "version"), FORMATS)
+def test_what_laspy_writes_is_read(tmp_path, name, point_format, version):
+    points = write_las(tmp_path / name, point_format, version)
+    with laspy.open(tmp_path / name) as reader:
+        assert reader.header.are_points_compressed == (name == "a.laz")
+    table = read_points(tmp_path / name)
+    assert_allclose(table.points, points, rtol=0.0, atol=1e-6)
+    expected = ["intensity", "classification", "return_number", *(["nir"] if point_format == 8 else []), "height"]
+    assert list(table.attributes) == expected
+    assert_array_equal(table.attributes["intensity"], np.arange(COUNT))
+    assert_array_equal(table.attributes["classification"], np.arange(COUNT) % 20)
+    assert_array_equal(table.attributes["return_number"], 1 + np.arange(COUNT) % 5)
+    assert_array_equal(table.attributes["height"], np.linspace(0.0, 1.0, COUNT, dtype=np.float32))
+    if point_format == 8:
+        assert_array_equal(table.attributes["nir"], np.arange(COUNT) % 7)
+    if point_format in COLORED:
+        assert_allclose(table.colors, np.tile([1.0, 0.0, 32768 / 65535, 1.0], (COUNT, 1)), atol=1e-6)
     else:
         assert table.colors is None
-
-
-def test_colors_of_eight_bits(tmp_path):
-    write_las(tmp_path / "a.las", full=255)
-    assert_allclose(read_points(tmp_path / "a.las").colors[0], [1.0, 0.0, 0.5, 1.0], atol=0.01)
+    assert (table.single, table.notices) == (False, [])
 
 
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
-def test_more_points_than_one_block(monkeypatch, tmp_path, name):
-    write_las(tmp_path / name)
-    monkeypatch.setattr("core.files.las._BLOCK", 64)
+def test_blocks_and_chunks_follow_each_other(tmp_path, name):
+    """Points are read 65,536 at once, and packed 50,000 in a chunk."""
+    points = write_las(tmp_path / name, 7, "1.4", count=140_000)
     table = read_points(tmp_path / name)
-    assert_allclose(table.points, POINTS, rtol=0.0, atol=1e-6)
-    assert_array_equal(table.attributes["intensity"], np.arange(500))
+    assert_allclose(table.points, points, rtol=0.0, atol=1e-6)
+    assert_array_equal(table.attributes["intensity"], np.arange(140_000) % 65536)
+    assert_allclose(table.colors[[0, -1]], 2 * [[1.0, 0.0, 0.5, 1.0]], atol=1e-4)
 
 
-@pytest.mark.parametrize("name", ["a.las", "a.laz"])
-def test_a_header_that_names_too_many_points(tmp_path, name):
-    """They are refused before there is memory for them."""
-    write_las(tmp_path / name)
-    data = bytearray((tmp_path / name).read_bytes())
-    data[107:111] = b"\xff\xff\xff\x7f"  # their number
-    (tmp_path / name).write_bytes(data)
-    with pytest.raises(PointCloudError, match="too short for the 2,147,483,647 points .* Copy it again"):
-        read_points(tmp_path / name)
+@pytest.mark.parametrize(("point_format", "version"), [(2, "1.2"), (7, "1.4")])
+def test_full_chunks(tmp_path, point_format, version):
+    points = write_las(tmp_path / "a.laz", point_format, version, count=100_000)
+    assert_allclose(read_points(tmp_path / "a.laz").points, points, rtol=0.0, atol=1e-6)
 
 
-def test_no_points(tmp_path):
-    write_las(tmp_path / "a.laz", POINTS[:0])
-    with pytest.raises(PointCloudError, match="no points"):
-        read_points(tmp_path / "a.laz")
+@pytest.mark.parametrize(("point_format", "version"), [(2, "1.2"), (7, "1.4")])
+def test_chunks_of_different_sizes(tmp_path, point_format, version):
+    """As those of cloud optimized point clouds; the last one is empty."""
+    points = write_las(tmp_path / "a.las", point_format, version)
+    write_las(tmp_path / "a.laz", point_format, version)
+    with laspy.open(tmp_path / "a.las") as reader:
+        header = reader.header
+    rows = (tmp_path / "a.las").read_bytes()[header.offset_to_point_data :]
+    size = header.point_format.size
+    begin, at = begin_of(tmp_path / "a.laz"), items_of(tmp_path / "a.laz")
+    kind = lazrs.LazVlr.new_for_compression(point_format, header.point_format.num_extra_bytes, True)
+    head = bytearray((tmp_path / "a.laz").read_bytes()[:begin])
+    head[at : at + len(kind.record_data())] = kind.record_data()
+    with open(tmp_path / "a.laz", "wb") as file:
+        file.write(head)
+        packer = lazrs.LasZipCompressor(file, kind)
+        for first, last in ((0, 1), (1, 200), (200, COUNT)):
+            packer.compress_many(rows[first * size : last * size])
+            packer.finish_current_chunk()
+        packer.done()
+    assert_allclose(read_points(tmp_path / "a.laz").points, points, rtol=0.0, atol=1e-6)
 
 
-def test_without_laspy(monkeypatch, tmp_path):
+def test_what_a_file_is_called_does_not_matter(tmp_path):
+    points = write_las(tmp_path / "a.las", 6, "1.4", packed=True)
+    assert_allclose(read_points(tmp_path / "a.las").points, points, rtol=0.0, atol=1e-6)
+
+
+def test_colors_of_the_low_byte_alone(tmp_path):
+    write_las(tmp_path / "a.las", colors=(255, 0, 51))
+    assert_allclose(read_points(tmp_path / "a.las").colors[0], [1.0, 0.0, 0.2, 1.0], atol=1e-6)
+
+
+def test_colors_of_a_scanner_without_a_camera_are_none(tmp_path):
+    write_las(tmp_path / "a.las", colors=(0, 0, 0))
+    assert read_points(tmp_path / "a.las").colors is None
+
+
+def test_columns_that_a_maker_added(tmp_path):
+    write_las(tmp_path / "a.laz", extra=[("wave", "3f8"), ("four", "4u1"), ("two\nlines", "u2")])
+    table = read_points(tmp_path / "a.laz")
+    assert table.attributes["wave"].shape == (COUNT, 3)
+    assert table.attributes["two lines"].dtype == np.uint16
+    assert table.notices == ["a.laz: left out four, which has 4 numbers a point."]
+
+
+def test_a_scan_becomes_a_ply_with_all_digits(tmp_path):
+    points = write_las(tmp_path / "a.laz")
+    write_points(tmp_path / "a.ply", read_points(tmp_path / "a.laz"))
+    table = read_points(tmp_path / "a.ply")
+    assert_allclose(table.points, points, rtol=0.0, atol=1e-6)
+    assert_array_equal(table.attributes["intensity"], np.arange(COUNT))
+
+
+@pytest.mark.parametrize(("point_format", "version"), [(0, "1.2"), (3, "1.2"), (7, "1.4")])
+def test_memory_is_that_of_the_result(tmp_path, point_format, version):
+    """At most four times the file, as laspy itself would need to read it at once and to scale it."""
+    write_las(tmp_path / "a.las", point_format, version, count=500_000)
+    read_points(tmp_path / "a.las")
+    tracemalloc.start()
+    try:
+        read_points(tmp_path / "a.las")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 4 * (tmp_path / "a.las").stat().st_size
+
+
+def test_laspy_is_missing(tmp_path, monkeypatch):
+    real = builtins.__import__
+
+    def fail(name, *arguments, **options):
+        if name == "lazrs":
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        return real(name, *arguments, **options)
+
     write_las(tmp_path / "a.las")
-    monkeypatch.setitem(sys.modules, "lazrs", None)
-    with pytest.raises(PointCloudError, match="read by laspy and lazrs, which are not there .* Install both"):
+    monkeypatch.setattr(builtins, "__import__", fail)
+    with pytest.raises(PointCloudError, match="lazrs is missing. Install laspy and lazrs, or export the points as PLY"):
         read_points(tmp_path / "a.las")
 
 
-def test_more_chunks_than_the_file_can_hold(tmp_path):
-    """Lazrs would end the process."""
+def test_laspy_is_imported_for_las_only():
+    code = "import sys, core, core.files; sys.exit('laspy' in sys.modules or 'lazrs' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def begin_of(path):
+    return struct.unpack_from("<I", path.read_bytes(), 96)[0]
+
+
+def table_of(path):
+    return struct.unpack_from("<q", path.read_bytes(), begin_of(path))[0]
+
+
+def items_of(path):
+    """Return where the description of packed points lies."""
+    return path.read_bytes().index(b"laszip encoded\0") + 16 + 2 + 2 + 32
+
+
+BROKEN = {  # what is written where in a LAZ file of format 7, and what the error says
+    "points": (lambda path: 247, "<Q", 2**40, "too short for the 1,099,511,627,776 points .* Copy it again"),
+    "records": (lambda path: 100, "<I", 2**32 - 1, "no room for what its header names: 4294967295 records"),
+    "begin": (lambda path: 96, "<I", 2**32 - 1, "no room for what its header names"),
+    "header": (lambda path: 94, "<H", 65535, "no room for what its header names"),
+    "table far": (begin_of, "<q", 2**62, "packed points are not where it says"),
+    "table before": (begin_of, "<q", -2, "packed points are not where it says"),
+    "chunks": (lambda path: table_of(path) + 4, "<I", 2**32 - 1, "packed points are not where it says"),
+    "layer": (lambda path: begin_of(path) + 8 + 40 + 4, "<I", 2**32 - 1, "packed points are not where it says"),
+    "kind": (items_of, "<H", 1, "packed in a way that is not known"),
+    "item": (lambda path: items_of(path) + 36, "<H", 65535, "packed in a way that is not known"),
+    "item kind": (lambda path: items_of(path) + 34, "<H", 99, "packed in a way that is not known"),
+    "items": (lambda path: items_of(path) + 32, "<H", 65535, "is broken"),
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_files_that_lie(tmp_path, what):
+    """Of each of these lazrs or laspy would take gigabytes or minutes, or end the program."""
+    find, code, value, text = BROKEN[what]
     path = tmp_path / "a.laz"
-    write_las(path)
+    write_las(path, 7, "1.4")
+    assert read_points(path).colors is not None
     data = bytearray(path.read_bytes())
-    begin = int.from_bytes(data[96:100], "little")
-    table = int.from_bytes(data[begin : begin + 8], "little")
-    data[table + 4 : table + 8] = b"\xff" * 4
+    struct.pack_into(code, data, find(path), value)
     path.write_bytes(data)
-    with pytest.raises(PointCloudError, match="too short for the chunks"):
-        read_points(path)
+    tracemalloc.start()
+    try:
+        with pytest.raises(PointCloudError, match=text):
+            read_points(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 2e6
 
 
-def test_what_lazrs_does_not_expect(tmp_path):
-    path = tmp_path / "a.laz"
-    write_las(path)
-    data = path.read_bytes()
-    items = data.index(b"laszip encoded") + 52 + 32  # how many parts a point has, in the record of that name
-    path.write_bytes(data[:items] + bytes(2) + data[items + 2 :])
-    with pytest.raises(PointCloudError, match="is a broken LA. file"):
-        read_points(path)
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99])
+def test_files_that_are_cut_off(tmp_path, name, share):
+    write_las(tmp_path / name)
+    data = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(data[: int(share * len(data))])
+    with pytest.raises(PointCloudError, match="Export it again|Copy it again|Copy or export it again"):
+        read_points(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_files_without_points(tmp_path, name):
+    write_las(tmp_path / name, count=0)
+    with pytest.raises(PointCloudError, match="has no points"):
+        read_points(tmp_path / name)
+
+
+def test_a_small_file_of_many_equal_points(tmp_path):
+    """They are packed better than a hundred to one."""
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    las = laspy.LasData(header)
+    las.x = las.y = las.z = np.zeros(200_000)
+    las.write(str(tmp_path / "a.laz"))
+    assert (tmp_path / "a.laz").stat().st_size < 60_000
+    assert len(read_points(tmp_path / "a.laz").points) == 200_000

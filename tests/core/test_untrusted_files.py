@@ -79,18 +79,28 @@ def make_archive(member, compression=zipfile.ZIP_DEFLATED, name="points.npy"):
     return file.getvalue()
 
 
-def make_las(compressed=False):
-    las = laspy.create(point_format=3, file_version="1.2")
-    las.header.scales = np.full(3, 0.001)
+def make_las(packed, point_format=7):
+    las = laspy.LasData(laspy.LasHeader(point_format=point_format, version="1.4"))
     las.x, las.y, las.z = POINTS.T
+    las.red = las.intensity = np.arange(30)
     file = io.BytesIO()
-    las.write(file, do_compress=compressed)
+    las.write(file, do_compress=packed)
     return file.getvalue()
 
 
-def make_pcd(data):
-    head = "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 30\nHEIGHT 1\nPOINTS 30\n" + f"DATA {data}\n"
-    return head.encode() + (make_rows("{} {} {}").encode() if data == "ascii" else POINTS.tobytes())
+def make_pcd(kind):
+    head = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 8 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 30\nHEIGHT 1\n"
+    head = f"{head}VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 30\nDATA {kind}\n".encode()
+    if kind == "ascii":
+        return head + make_rows("{} {} {}", " 16711680").encode()
+    columns = [column.astype(code) for column, code in zip(POINTS.T, ("f4", "f8", "f4"), strict=True)]
+    columns.append(np.full(30, 0xFF00FF, "u4"))
+    if kind == "binary":
+        return head + b"".join(value.tobytes() for row in zip(*columns, strict=True) for value in row)
+    data = b"".join(column.tobytes() for column in columns[:3]) + bytes(4)  # the colors repeat those four bytes
+    runs = b"".join(bytes([len(data[i : i + 32]) - 1]) + data[i : i + 32] for i in range(0, len(data), 32))
+    runs += b"\xe0" + bytes([30 * 4 - 4 - 9]) + b"\x03"
+    return head + len(runs).to_bytes(4, "little") + (30 * 20).to_bytes(4, "little") + runs
 
 
 GOOD = {
@@ -107,10 +117,12 @@ GOOD = {
     "array.npy": make_array(),
     "plain.npz": make_archive(make_array(), zipfile.ZIP_STORED),
     "small.npz": make_archive(make_array()),
-    "scan.las": make_las(),
-    "scan.laz": make_las(compressed=True),
-    "text.pcd": make_pcd("ascii"),
-    "camera.pcd": make_pcd("binary"),
+    "ascii.pcd": make_pcd("ascii"),
+    "binary.pcd": make_pcd("binary"),
+    "packed.pcd": make_pcd("binary_compressed"),
+    "plain.las": make_las(packed=False),
+    "old.laz": make_las(packed=True, point_format=2),
+    "layered.laz": make_las(packed=True),
 }
 
 
@@ -231,6 +243,11 @@ def claim(member, offset, value):
     return bytes(data)
 
 
+def patch_las(data, place, value, length=8):
+    """Return a file with another number in its header."""
+    return data[:place] + value.to_bytes(length, "little") + data[place + length :]
+
+
 LITTLE = "binary_little_endian"
 HUGE = 2 * ("element camera 999999999999999\n" + 400 * "property double a\n")
 
@@ -313,6 +330,11 @@ LARGE = {
     "last.pts": lambda: b"30001\n" + 30_000 * ROWS,
     "last.obj": lambda: 30_000 * (b"v " + ROWS) + b"v 1 2 x\n",
     **{f"noise{suffix}": lambda: NOISE for suffix in READABLE},
+    "claim.pcd": lambda: make_pcd("binary").replace(b"POINTS 30", b"POINTS 99999999999") + NOISE,
+    "packed.pcd": lambda: make_pcd("binary_compressed").replace(b"POINTS 30", b"POINTS 214748364") + NOISE,
+    "claim.las": lambda: patch_las(make_las(packed=False), 247, 10**12) + NOISE,
+    "claim.laz": lambda: patch_las(make_las(packed=True), 247, 10**12) + NOISE,
+    "records.las": lambda: patch_las(make_las(packed=False), 100, 2**32 - 1, 4) + NOISE,
     "zip.npz": lambda: b"PK\3\4" + NOISE,
     "nul.obj": lambda: b"v 1 2 3" + bytes(1_000_000),
 }
