@@ -53,7 +53,10 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
     kind = "vertices" if obj.type == "MESH" else "points"
     lost = obj.meshfree.point_count and not point_count(obj.data)
     if lost or CORNER in obj.data.attributes:
-        return f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under Points and Groups'
+        return (
+            f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under'
+            " Points and Groups"
+        )
     if not point_count(obj.data):
         if any(map(is_sequence, obj.modifiers)):
             return (
