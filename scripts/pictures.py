@@ -196,6 +196,17 @@ def distance(path):
     single(obj, "lb_distance", path)
 
 
+def signed_distance(path):
+    """Distance from a circle around the shape, by sides."""
+    obj = coral()
+    bpy.ops.curve.primitive_bezier_circle_add(radius=1.5)
+    curve = bpy.context.object
+    bpy.context.view_layer.objects.active = obj
+    obj.meshfree.iso_lines = LINES
+    bpy.ops.meshfree.signed_distance(curve=curve.name)
+    single(obj, "lb_signed_distance", path)
+
+
 def nearest_source(path):
     """Cells around sixty points that lie apart."""
     obj = coral()
@@ -280,6 +291,7 @@ PICTURES = {
     "orient": orient,
     "signature": signature,
     "distance": distance,
+    "signed_distance": signed_distance,
     "nearest_source": nearest_source,
     "unwrap": unwrap,
     "extend_direction": extend_direction,

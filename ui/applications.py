@@ -17,6 +17,7 @@ class MESHFREE_PT_measure(ReadyPanel, bpy.types.Panel):
         column.operator("meshfree.roughness", text="Roughness...")
         column = self.layout.column(align=True)
         column.operator("meshfree.geodesic_distance", text="Geodesic Distance...")
+        column.operator("meshfree.signed_distance", text="Signed Distance...")
         column.operator("meshfree.harmonic_field", text="Harmonic Field...")
         column = self.layout.column(align=True)
         column.operator("meshfree.nearest_source", text="Nearest Source...")

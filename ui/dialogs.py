@@ -12,7 +12,7 @@ def draw_setting(layout, settings, name: str, obj):
     """Draw a setting; one that names a group or an attribute of an object with a list of those."""
     if name.endswith("group"):
         search_group(layout, settings, name, obj)
-    elif name == "viewpoint":
+    elif name in {"viewpoint", "curve"}:
         layout.prop_search(settings, name, bpy.data, "objects")
     elif name == "source":
         layout.prop_search(settings, name, obj.data, "attributes")

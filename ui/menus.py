@@ -11,7 +11,7 @@ _TOOLS = (
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
     ("geodesic_distance", "harmonic_field"),
-    ("nearest_source", "unwrap", "extend_direction"),
+    ("signed_distance", "nearest_source", "unwrap", "extend_direction"),
     ("deform_bind", "deform_update", "deform_reset", "deform_apply", "deform_to_shape_key", "deform_unbind"),
     ("deform_bake", "deform_free"),
     ("minimal_surface",),

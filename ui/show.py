@@ -8,7 +8,7 @@ import numpy as np
 
 from ..operators.deform.binding import positions_now
 from ..operators.deform.nodes import find_deform
-from ..operators.objects.attributes import DEVIATION, DISC, MEAN_CURVATURE, read_attribute
+from ..operators.objects.attributes import DEVIATION, DISC, MEAN_CURVATURE, SIGNED_DISTANCE, read_attribute
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
@@ -214,7 +214,7 @@ def _color(obj, name, values):
     else:
         locked = settings.range_low, settings.range_high
         chosen = [settings.color_map, settings.range_mode]
-        if name == DEVIATION:  # zero is what it is all about, even where all of it has one sign
+        if name in (DEVIATION, SIGNED_DISTANCE):  # zero is what it is all about, even where all of it has one sign
             chosen = [
                 way if way != "AUTO" else zero for way, zero in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
             ]

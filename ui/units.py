@@ -11,6 +11,7 @@ from ..operators.objects.attributes import (
     GAUSSIAN_CURVATURE,
     MEAN_CURVATURE,
     ROUGHNESS,
+    SIGNED_DISTANCE,
 )
 
 EIGENVALUE_POWER = -2
@@ -18,7 +19,7 @@ _POWERS = {  # of a length
     AREA: 2,
     GAUSSIAN_CURVATURE: -2,
     **dict.fromkeys((MEAN_CURVATURE, CURVATURE_1, CURVATURE_2, CURVEDNESS), -1),
-    **dict.fromkeys((DISTANCE, DISPLACEMENT, ROUGHNESS, DEVIATION), 1),
+    **dict.fromkeys((DISTANCE, SIGNED_DISTANCE, DISPLACEMENT, ROUGHNESS, DEVIATION), 1),
 }
 _METERS = {
     "KILOMETERS": ("km", 1000.0),

@@ -1,11 +1,12 @@
-"""Along the surface from some points: which is nearest, a map around one, directions carried to all."""
+"""Along the surface from some points or a curve: cells, a map, directions carried to all, distance with a side."""
 
 import bpy
 import numpy as np
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
+from scipy.spatial import cKDTree
 
-from ...core import PointCloudError, Transport, nearest_source
-from ..objects.attributes import CELL, DIRECTION, UV, tag_changed, write_attribute
+from ...core import PointCloudError, Transport, nearest_source, signed_distance
+from ..objects.attributes import CELL, DIRECTION, SIGNED_DISTANCE, UV, tag_changed, write_attribute
 from ..objects.groups import SOURCE, chosen_members, is_chosen
 from ..objects.result import length_text
 from ..running import cache
@@ -173,4 +174,80 @@ class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
         ]
 
 
-CLASSES = (MESHFREE_OT_nearest_source, MESHFREE_OT_unwrap, MESHFREE_OT_extend_direction)
+class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
+    """Measure the distance along the surface from a curve on it: above zero on its left, below zero on its right"""
+
+    bl_idname = "meshfree.signed_distance"
+    bl_label = "Signed Distance"
+    writes = (SIGNED_DISTANCE,)
+    asks = ("curve", "show")
+
+    curve: StringProperty(
+        name="Curve",
+        description="Curve object on the surface; each of its points stands for the nearest one of the cloud",
+    )
+
+    def plan(self, context, obj):
+        places, closed = _read_curve(context, self.curve)
+        reading, operator = operator_reader(context, obj)
+        places = places - np.array(obj.matrix_world.translation)  # points are read without it
+
+        def compute(progress):
+            laplacian = operator(progress)
+            known = np.flatnonzero(laplacian.component >= 0)
+            nearest = known[cKDTree(reading.points[known]).query(places)[1]]
+            _, first = np.unique(nearest, return_index=True)
+            way = nearest[np.sort(first)]
+            if len(way) < 2:
+                raise PointCloudError("All of the curve lies at one point of the cloud. Draw it along the surface.")
+            return cache.result(
+                laplacian,
+                "sides of a curve",
+                way,
+                closed,
+                compute=lambda: signed_distance(laplacian, way, closed and len(way) > 2, progress=progress),
+            )
+
+        return compute
+
+    def write(self, context, obj, result):
+        reached = np.isfinite(result)
+        write_attribute(obj.data, SIGNED_DISTANCE, np.where(reached, result, 0.0))
+        tag_changed(obj.data)
+        low, high = (length_text(value) for value in (result[reached].min(), result[reached].max()))
+        missed, line = np.count_nonzero(~reached), f"{obj.name}: {low} on the right to {high} on the left"
+        return [f"{missed:,} points of {obj.name} are not reached from the curve. Their distance is 0.", line][
+            not missed :
+        ]
+
+
+def _read_curve(context, name):
+    """Read the points of a curve object in the world, (k, 3), and whether its last one is joined with the first."""
+    curve = context.scene.objects.get(name)
+    if curve is None or curve.type != "CURVE":
+        raise PointCloudError(
+            f'There is no curve "{name}" in this scene. Choose a curve object that lies on the surface.'
+        )
+    evaluated = curve.evaluated_get(context.evaluated_depsgraph_get())
+    try:
+        mesh = evaluated.to_mesh()
+        places = np.empty((len(mesh.vertices), 3), np.float32)
+        mesh.vertices.foreach_get("co", places.reshape(-1))
+        thick = len(mesh.polygons) > 0
+    finally:
+        evaluated.to_mesh_clear()
+    if len(curve.data.splines) != 1 or len(places) < 2 or thick:
+        raise PointCloudError(
+            f'"{name}" is not one line: it has {len(curve.data.splines)} splines, or a bevel. Take a curve of one'
+            " spline, without a bevel or an extrusion."
+        )
+    matrix = np.array(curve.matrix_world)
+    return places @ matrix[:3, :3].T + matrix[:3, 3], curve.data.splines[0].use_cyclic_u
+
+
+CLASSES = (
+    MESHFREE_OT_nearest_source,
+    MESHFREE_OT_unwrap,
+    MESHFREE_OT_extend_direction,
+    MESHFREE_OT_signed_distance,
+)

@@ -126,3 +126,63 @@ class TestExtendDirection:
         with pytest.raises(RuntimeError, match="stand at a right angle to the surface"):
             run("extend_direction")
         assert everything(strip) == before
+
+
+def add_curve(places, cyclic=False, kind="POLY"):
+    data = bpy.data.curves.new("Line", "CURVE")
+    data.dimensions = "3D"
+    spline = data.splines.new(kind)
+    spline.points.add(len(places) - 1)
+    spline.points.foreach_set("co", np.column_stack([places, np.ones(len(places))]).ravel())
+    spline.use_cyclic_u = cyclic
+    curve = bpy.data.objects.new("Line", data)
+    bpy.context.scene.collection.objects.link(curve)
+    return curve
+
+
+class TestSignedDistance:
+    def test_beside_a_straight_line(self, strip):
+        strip.location = 5.0, 0.0, 2.0
+        strip.scale = 2.0, 2.0, 2.0
+        curve = add_curve([[0.0, 2.0, 0.0], [12.0, 2.0, 0.0]])
+        curve.location = 5.0, 0.0, 2.0
+        bpy.context.view_layer.update()
+        assert run("signed_distance", curve="Line") == {"FINISHED"}
+        found, height = attribute(strip, "lb_signed_distance"), 2.0 * local_points(strip)[:, 1] - 2.0
+        up = attribute(strip, "lb_disc")[0, 2]
+        line = 2.0 * local_points(strip)[int(np.argmin(np.abs(found)))][1] - 2.0  # the nearest row of points
+        assert_allclose(found * np.sign(up), height - line, atol=0.04)
+
+    def test_around_the_equator(self):
+        obj = add_object(sphere_points(3000))
+        turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+        add_curve(np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1), cyclic=True)
+        run("signed_distance", curve="Line")
+        assert_allclose(attribute(obj, "lb_signed_distance"), np.arcsin(local_points(obj)[:, 2]), atol=0.06)
+
+    @pytest.mark.parametrize(
+        ("make", "text"),
+        [
+            (lambda: None, 'There is no curve "Line"'),
+            (lambda: add_object(sphere_points(), "Line"), 'There is no curve "Line"'),
+            (lambda: add_curve([[0.0, 0.0, 0.0]] * 3), "at one point of the cloud"),
+            (lambda: setattr(add_curve([[0, 0, 0], [1, 1, 0]]).data, "bevel_depth", 0.1), "or a bevel"),
+            (lambda: add_curve([[0, 0, 0], [1, 1, 0]]).data.splines.new("POLY"), "2 splines"),
+        ],
+    )
+    def test_what_is_no_line_on_the_surface(self, strip, make, text):
+        make()
+        bpy.context.view_layer.objects.active = strip
+        strip.select_set(True)
+        bpy.context.view_layer.update()
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match=text):
+            run("signed_distance", curve="Line")
+        assert everything(strip) == before
+
+    def test_other_components_are_told(self, two, capfd):
+        turn = np.linspace(0.0, 2.0 * np.pi, 20, endpoint=False)
+        add_curve(np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1), cyclic=True)
+        assert run("signed_distance", curve="Line") == {"FINISHED"}
+        assert (attribute(two, "lb_signed_distance")[900:] == 0.0).all()
+        assert "300 points of Cloud are not reached from the curve" in capfd.readouterr().out

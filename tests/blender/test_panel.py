@@ -53,6 +53,7 @@ OPERATORS = (
     "separate_by_segment",
     "show_surface",
     "signature",
+    "signed_distance",
     "smooth",
     "spectrum",
     "stop",
@@ -74,6 +75,7 @@ DIALOGS = (  # operators that ask before they work, in a layout of ours
     "roughness",
     "segment",
     "signature",
+    "signed_distance",
     "smooth",
     "unwrap",
 )
