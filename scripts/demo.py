@@ -45,7 +45,7 @@ def demonstrate(scan, up):
     with studio.silence():
         obj = studio.make_object(shape.sample(POINTS), "Coral") if scan is None else load_scan(scan, up)
     print(f"points       {len(obj.data.vertices):,}", flush=True)
-    timed("analyze", bpy.ops.meshfree.analyze, show=False)
+    timed("analyze", bpy.ops.meshfree.analyze)
     timed("spectrum", bpy.ops.meshfree.spectrum, count=MODES, show=False)
     area = obj.meshfree.total_area
     exact = f" (exact: {shape.area():.6g})" if scan is None else ""

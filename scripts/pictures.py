@@ -38,7 +38,7 @@ def result(attribute):
 
     def take(path):
         obj = coral()
-        bpy.ops.meshfree.analyze(show=False)
+        bpy.ops.meshfree.analyze()
         single(obj, attribute, path)
 
     return take
@@ -58,7 +58,7 @@ def surface(path):
 def mesh(path):
     """Points, and the mesh of their surface in the same colors."""
     points = coral()
-    bpy.ops.meshfree.analyze(show=False)
+    bpy.ops.meshfree.analyze()
     studio.show(points, "lb_mean_curvature", radius=0.3)
     bpy.ops.meshfree.mesh_surface()
     points.hide_set(False)
@@ -84,7 +84,7 @@ def compare(path):
 def shape_index(path):
     """The shape index: caps, ridges, saddles, valleys and cups."""
     obj = coral()
-    bpy.ops.meshfree.principal_curvatures(show=False)
+    bpy.ops.meshfree.principal_curvatures()
     single(obj, "lb_shape_index", path)
 
 
@@ -94,7 +94,7 @@ def roughness(path):
     rough = np.abs(points[:, 2]) < 0.3
     points[rough] += 0.3 * SPACING * places.standard_normal((np.count_nonzero(rough), 3))
     obj = studio.make_object(points, "Coral")
-    bpy.ops.meshfree.roughness(show=False)
+    bpy.ops.meshfree.roughness()
     single(obj, "lb_roughness", path)
 
 
@@ -110,7 +110,7 @@ def orient(path):
     before, after = studio.make_object(points, "Before"), studio.make_object(points, "After")
     for obj, kind in ((before, "OUTSIDE"), (after, "WINDING")):
         studio.activate(obj)
-        bpy.ops.meshfree.orient_normals(method=kind, show=False)
+        bpy.ops.meshfree.orient_normals(method=kind)
         normals = np.empty(3 * len(points), np.float32)
         obj.data.attributes["lb_normal"].data.foreach_get("vector", normals)
         outer = np.where(np.cos(across) > 0.0, 1.0, -1.0) * np.einsum("ij,ij->i", normals.reshape(-1, 3), out)
@@ -125,7 +125,7 @@ def orient(path):
 def mode(path):
     """One vibration mode."""
     obj = coral()
-    bpy.ops.meshfree.spectrum(count=20, show=False)
+    bpy.ops.meshfree.spectrum(count=20)
     single(obj, "lb_eigenvector_020", path)
 
 
@@ -133,7 +133,7 @@ def boundary(path):
     """The boundary of the shape cut open."""
     points = demo.Coral().sample(demo.POINTS)
     obj = studio.make_object(points[points[:, 2] < CUT], "Coral")
-    bpy.ops.meshfree.analyze(show=False)
+    bpy.ops.meshfree.analyze()
     single(obj, "lb_boundary", path)
 
 

@@ -15,6 +15,7 @@ ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the materi
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
 BACK = "Back Side"  # another: how dark what is seen from behind is
 _SIDES = 8  # of a disc
+_SLOPE = 0.25  # by which discs fall off from their points, so that each place shows the point nearest to it
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
@@ -107,10 +108,17 @@ def _thinned(group, given, parts):
 
 
 def _shaped(group, given, points, size):
-    """Add the nodes that make points into discs where that is asked for; return what is drawn."""
-    circle = add_node(group, "GeometryNodeMeshCircle", 6, -700, fill_type="NGON")
-    circle.inputs["Vertices"].default_value = _SIDES
-    circle.inputs["Radius"].default_value = 1.0 / math.cos(math.pi / _SIDES)  # no less than a disc
+    """Add the nodes that make points into discs where that is asked for; return what is drawn.
+
+    Flat discs stick out of each other where the surface bends outwards, like scales; cones as flat as these do not.
+    """
+    cone = add_node(group, "GeometryNodeMeshCone", 5, -700, fill_type="NONE")
+    cone.inputs["Vertices"].default_value = _SIDES
+    cone.inputs["Radius Top"].default_value = 0.0
+    cone.inputs["Radius Bottom"].default_value = 1.0 / math.cos(math.pi / _SIDES)  # no less than a disc
+    cone.inputs["Depth"].default_value = _SLOPE
+    lowered = add_node(group, "GeometryNodeTransform", 6, -700)
+    lowered.inputs["Translation"].default_value = 0.0, 0.0, -_SLOPE
     disc = add_node(group, "GeometryNodeInputNamedAttribute", 5, -500, data_type="FLOAT_VECTOR")
     disc.inputs["Name"].default_value = DISC
     turned = add_node(group, "FunctionNodeAlignRotationToVector", 6, -500, axis="Z")
@@ -127,7 +135,8 @@ def _shaped(group, given, points, size):
         (disc.outputs["Attribute"], turned.inputs["Vector"]),
         (disc.outputs["Attribute"], length.inputs[0]),
         (points, placed.inputs["Points"]),
-        (circle.outputs["Mesh"], placed.inputs["Instance"]),
+        (cone.outputs["Mesh"], lowered.inputs["Geometry"]),
+        (lowered.outputs["Geometry"], placed.inputs["Instance"]),
         (turned.outputs["Rotation"], placed.inputs["Rotation"]),
         (scale, placed.inputs["Scale"]),
         (placed.outputs["Instances"], realized.inputs["Geometry"]),
@@ -291,6 +300,7 @@ def _shine(tree, color, groups, hidden=None):
     color = _mix(tree, column + 2, behind, color, _BEYOND)
     column += 3
     diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", column, 100)
+    _light_discs(tree, column - 3, diffuse)
     emission = add_node(tree, "ShaderNodeEmission", column, -100)
     mixed = add_node(tree, "ShaderNodeMixShader", column + 1, 0)
     mixed.inputs[0].default_value = 0.6
@@ -306,6 +316,33 @@ def _shine(tree, color, groups, hidden=None):
         tree.links.new(shown.outputs[0], mixed.inputs[1])
         tree.links.new(nothing.outputs[0], mixed.inputs[2])
     tree.links.new(mixed.outputs[0], output.inputs["Surface"])
+
+
+def _light_discs(tree, column, diffuse):
+    """Light a disc by the normal of its point, as if it were flat, on the side that is seen; all else as it is."""
+    disc = add_node(tree, "ShaderNodeAttribute", column, 500, attribute_name=DISC)
+    seen = add_node(tree, "ShaderNodeNewGeometry", column, 800)
+    turned = add_node(tree, "ShaderNodeVectorTransform", column + 1, 500, vector_type="VECTOR")
+    turned.convert_from, turned.convert_to = "OBJECT", "WORLD"
+    facing = add_node(tree, "ShaderNodeVectorMath", column + 1, 800, operation="DOT_PRODUCT")
+    side = _math(tree, column + 2, 800, "MULTIPLY", _math(tree, column + 1, 1000, "SIGN", facing.outputs["Value"]), 1e6)
+    scaled = add_node(tree, "ShaderNodeVectorMath", column + 2, 500, operation="SCALE")
+    summed = add_node(
+        tree, "ShaderNodeVectorMath", column + 2, 300, operation="ADD"
+    )  # its own one alone without a disc
+    unit = add_node(tree, "ShaderNodeVectorMath", column + 3, 300, operation="NORMALIZE")
+    for source, target in (
+        (disc.outputs["Vector"], turned.inputs["Vector"]),
+        (turned.outputs["Vector"], facing.inputs[0]),
+        (seen.outputs["Incoming"], facing.inputs[1]),
+        (turned.outputs["Vector"], scaled.inputs[0]),
+        (side, scaled.inputs["Scale"]),
+        (scaled.outputs[0], summed.inputs[0]),
+        (seen.outputs["Normal"], summed.inputs[1]),
+        (summed.outputs[0], unit.inputs[0]),
+        (unit.outputs[0], diffuse.inputs["Normal"]),
+    ):
+        tree.links.new(source, target)
 
 
 def _math(tree, column, y, operation, first, second=0.0, name=""):

@@ -157,10 +157,12 @@ class Transport:
         index = as_indices(sources, len(self.frames), "sources")
         if not len(index):
             raise InvalidPointsError("There are no points with directions. Choose at least one point.")
-        directions = as_doubles(as_array(directions, "Directions"))
-        if directions.shape not in ((3,), (len(index), 3)) or not np.isfinite(directions).all():
+        directions = as_array(directions, "Directions")
+        numbers = directions.dtype.kind in "iuf"
+        directions = as_doubles(directions) if numbers else directions
+        if not numbers or directions.shape not in ((3,), (len(index), 3)) or not np.isfinite(directions).all():
             raise InvalidPointsError(
-                f"The directions have the shape {directions.shape}, or are not finite. Give three finite numbers for"
+                f"The directions have the shape {directions.shape}, or are not finite numbers. Give three of these for"
                 f" each of {len(index)} points."
             )
         given = np.einsum("ij,ij->i", np.broadcast_to(directions, (len(index), 3)), self.frames[index])
@@ -220,7 +222,10 @@ class Transport:
             The solver did not converge.
         """
         laplacian, frames = self._laplacian, self.frames
-        [source] = as_indices(np.atleast_1d(source), len(frames), "sources")
+        chosen = as_indices(np.atleast_1d(as_array(source, "Sources")), len(frames), "sources")
+        if len(chosen) != 1:
+            raise InvalidPointsError(f"There are {len(chosen)} sources. Name the one point in the middle of the map.")
+        source = int(chosen[0])
         axis = self.extend([source], frames[source].real if direction is None else direction)
         distance = Geodesics(laplacian, progress=progress).distance([source], progress=progress)
         reached = np.isfinite(distance)

@@ -393,6 +393,17 @@ def calls():
     yield core.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
     yield core.geodesic_distance, on, {"sources": [0]}
     yield core.Geodesics(laplacian).distance, {}, {"sources": [0]}
+    yield core.nearest_source, on, {"sources": [0, 150]}
+    yield core.signed_distance, on, {"curve": [100, 101, 102], "closed": True}
+    yield core.logarithmic_map, on, {"source": 0}
+    yield core.transport, on, {"sources": [0], "directions": [[1.0, 0.0, 0.0]]}
+    yield core.orient_normals, {}, {"points": points, "normals": points, "method": "outside"}
+    frame = {"spectrum": spectrum, "spectrum_before": spectrum}
+    yield (
+        core.match_modes,
+        frame,
+        {"areas": laplacian.areas, "points": points, "points_before": points, "tolerance": 0.02},
+    )
     yield core.grow, on, {"chosen": [0], "distance": 0.3}
     yield (
         core.Deformer,
