@@ -110,7 +110,7 @@ def orient(path):
     before, after = studio.make_object(points, "Before"), studio.make_object(points, "After")
     for obj, kind in ((before, "OUTSIDE"), (after, "WINDING")):
         studio.activate(obj)
-        bpy.ops.meshfree.orient_normals(method=kind)
+        bpy.ops.meshfree.orient_normals(method=kind, show=False)  # by dots: so noisy discs stick out at the gaps
         normals = np.empty(3 * len(points), np.float32)
         obj.data.attributes["lb_normal"].data.foreach_get("vector", normals)
         outer = np.where(np.cos(across) > 0.0, 1.0, -1.0) * np.einsum("ij,ij->i", normals.reshape(-1, 3), out)
