@@ -320,7 +320,7 @@ def _shine(tree, color, groups, hidden=None):
 
 def _light_discs(tree, column, diffuse):
     """Light a disc by the normal of its point, as if it were flat, on the side that is seen; all else as it is."""
-    disc = add_node(tree, "ShaderNodeAttribute", column, 500, attribute_name=DISC)
+    disc = add_node(tree, "ShaderNodeAttribute", column, 500, attribute_name=DISC, name="Disc")
     seen = add_node(tree, "ShaderNodeNewGeometry", column, 800)
     turned = add_node(tree, "ShaderNodeVectorTransform", column + 1, 500, vector_type="VECTOR")
     turned.convert_from, turned.convert_to = "OBJECT", "WORLD"
