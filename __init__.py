@@ -71,9 +71,9 @@ def _modules():
         range_selection,
         presets,
         panel,
+        points,
         applications,
         deform_panel,
-        points,
         menus,
         overlay,
     )

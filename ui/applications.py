@@ -66,7 +66,7 @@ class MESHFREE_PT_minimal(ReadyPanel, bpy.types.Panel):
 
     bl_label = "Minimal Surface"
     bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 1  # below what is done every day
+    bl_order = 2  # below what is done every day
 
     def draw(self, context):
         self.layout.operator("meshfree.minimal_surface", text="Minimal Surface...")

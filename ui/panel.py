@@ -133,7 +133,7 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
 
     bl_label = "Settings"
     bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 2  # the last ones
+    bl_order = 3  # the last ones
 
     def draw(self, context):
         layout = self.layout
@@ -164,7 +164,7 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
 
     bl_label = "Spectrum"
     bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 1  # below what is done every day
+    bl_order = 2  # below what is done every day
 
     def draw(self, context):
         layout = self.layout
@@ -198,6 +198,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
     """What is shown as colors on the points"""
 
     bl_label = "Display"
+    bl_order = 1  # open and long: below the tools, which are closed
 
     @classmethod
     def poll(cls, context):

@@ -37,7 +37,6 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
     bl_label = "Points and Groups"
     bl_parent_id = "MESHFREE_PT_main"
     bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 1  # below what is done every day
 
     @classmethod
     def poll(cls, context):
