@@ -119,7 +119,7 @@ class TestTwoWindows:
 
     @pytest.mark.parametrize("order", ["opened before", "opened while it works"])
     def test_escape_in_the_other_window(self, gui, order):
-        add_sphere(gui, 20000, 0.005)
+        add_sphere(gui, 60000, 0.005)  # which takes longer than a window to open
         if order == "opened before":
             gui.open_second()
             start(gui, "Smooth Points")
