@@ -7,18 +7,13 @@ from scipy.spatial import cKDTree
 
 from ...core import PointCloudError, Transport, nearest_source, signed_distance
 from ..objects.attributes import CELL, DIRECTION, SIGNED_DISTANCE, UV, tag_changed, write_attribute
-from ..objects.groups import SOURCE, chosen_members, is_chosen
+from ..objects.groups import SOURCE
 from ..objects.result import length_text
 from ..running import cache
 from ..running.application import ShownOperator, operator_reader
-from .select import selected
+from .select import read_sources
 
 OUTSIDE = -1.0  # place in the texture of points that the map does not reach: beyond its border
-
-
-def _sources(obj, group):
-    """Read the points of a group or, where there is none of the default's name, the selected ones, (n,) bool."""
-    return chosen_members(obj, group, "Sources") if is_chosen(obj, group, SOURCE) else selected(obj)
 
 
 def _transport(laplacian, progress):
@@ -41,7 +36,7 @@ class MESHFREE_OT_nearest_source(ShownOperator, bpy.types.Operator):
     )
 
     def plan(self, context, obj):
-        sources = _sources(obj, self.group)
+        sources = read_sources(obj, self.group)
         _, operator = operator_reader(context, obj)
 
         def compute(progress):
@@ -56,7 +51,8 @@ class MESHFREE_OT_nearest_source(ShownOperator, bpy.types.Operator):
         write_attribute(obj.data, CELL, result)
         tag_changed(obj.data)
         missed, line = np.count_nonzero(result < 0), f"{obj.name}: {len(np.unique(result[result >= 0])):,} cells"
-        return [f"{missed:,} points of {obj.name} are reached by no source. Their cell is -1.", line][not missed :]
+        far = f"{missed:,} points of {obj.name} are reached by no source. Their cell is -1."
+        return [far, line] if missed else [line]
 
 
 class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
@@ -86,7 +82,7 @@ class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
     )
 
     def plan(self, context, obj):
-        sources = np.flatnonzero(_sources(obj, self.group))
+        sources = np.flatnonzero(read_sources(obj, self.group))
         reading, operator = operator_reader(context, obj)
         places = reading.points[sources]
         middle = int(sources[np.linalg.norm(places - places.mean(axis=0), axis=1).argmin()])
@@ -145,7 +141,7 @@ class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
     )
 
     def plan(self, context, obj):
-        sources = _sources(obj, self.group)
+        sources = read_sources(obj, self.group)
         reading, operator = operator_reader(context, obj)
         direction = np.array(self.direction, dtype=np.float64)
 
@@ -169,9 +165,8 @@ class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
         write_attribute(obj.data, DIRECTION, result)
         tag_changed(obj.data)
         missed, line = np.count_nonzero(~result.any(axis=1)), f"{obj.name}: directions on {len(result):,} points"
-        return [f"{missed:,} points of {obj.name} are reached by no source. They have no direction.", line][
-            not missed :
-        ]
+        far = f"{missed:,} points of {obj.name} are reached by no source. They have no direction."
+        return [far, line] if missed else [line]
 
 
 class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
@@ -216,9 +211,8 @@ class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
         tag_changed(obj.data)
         low, high = (length_text(value) for value in (result[reached].min(), result[reached].max()))
         missed, line = np.count_nonzero(~reached), f"{obj.name}: {low} on the right to {high} on the left"
-        return [f"{missed:,} points of {obj.name} are not reached from the curve. Their distance is 0.", line][
-            not missed :
-        ]
+        far = f"{missed:,} points of {obj.name} are not reached from the curve. Their distance is 0."
+        return [far, line] if missed else [line]
 
 
 def _read_curve(context, name):

@@ -6,11 +6,11 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ...core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
 from ..objects.attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
-from ..objects.groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind, is_chosen
+from ..objects.groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind
 from ..objects.result import length_text
 from ..running import cache
 from ..running.application import ShownOperator, operator_reader
-from .select import selected
+from .select import read_sources
 
 UNREACHED = -1.0  # distance of points that no source reaches
 
@@ -129,10 +129,7 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
     )
 
     def plan(self, context, obj):
-        if is_chosen(obj, self.group, SOURCE):
-            sources = chosen_members(obj, self.group, "Sources")
-        else:
-            sources = selected(obj)
+        sources = read_sources(obj, self.group)
         if sources.all():
             raise PointCloudError(
                 f'All points of "{obj.name}" are sources, so that all distances are 0. Select fewer of them in'

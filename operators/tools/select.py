@@ -10,7 +10,7 @@ from ...core import PointCloudError, grow
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.counting import renew_counts
-from ..objects.groups import HANDLE, assign, check_assignable, chosen_members, role_group
+from ..objects.groups import HANDLE, SOURCE, assign, check_assignable, chosen_members, is_chosen, role_group
 from ..objects.handlers import tell
 from ..objects.reading import obstacle, sharing_objects
 from ..running.application import compute_all, naming, operator_reader
@@ -125,6 +125,11 @@ def selected(obj):
     if not chosen.any():
         raise PointCloudError(f'No points of "{obj.name}" are selected. Select some in Edit Mode.')
     return chosen
+
+
+def read_sources(obj, group):
+    """Read the points of a group or, where there is none of the default's name, the selected ones, (n,) bool."""
+    return chosen_members(obj, group, "Sources") if is_chosen(obj, group, SOURCE) else selected(obj)
 
 
 def select(context, obj, chosen) -> str:
