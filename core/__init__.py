@@ -88,6 +88,7 @@ from .operator import (
 )
 from .options import LaplacianOptions
 from .paper import Stability, check_stability
+from .splats import Splats, read_splats, write_splats
 
 __all__ = [
     "AreaError",
@@ -111,6 +112,7 @@ __all__ = [
     "Prolongation",
     "SolverError",
     "Spectrum",
+    "Splats",
     "Stability",
     "SurfaceMesh",
     "TooFewPointsError",
@@ -144,6 +146,7 @@ __all__ = [
     "orient_normals",
     "points_that_fit",
     "principal_curvatures",
+    "read_splats",
     "roughness",
     "segment",
     "signature_energies",
@@ -158,4 +161,5 @@ __all__ = [
     "transport",
     "values_on_mesh",
     "wave_kernel_signature",
+    "write_splats",
 ]

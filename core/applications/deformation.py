@@ -8,7 +8,7 @@ from ..blocks import blocks
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_indices
 from ..operator import dissect, factorize, narrow_laplacian, sparsify
-from .rotations import nearest_rotations
+from ..rotations import nearest_rotations
 
 NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
 STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15

@@ -1,7 +1,8 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
-from .formats import READABLE, WRITABLE, read_points, write_points
+from .formats import READABLE, WRITABLE, read_points, reading, write_points
 from .frames import numbered_files, order_frames
 from .origin import choose_origin, is_coarse
-from .table import PointTable
+from .ply import PlyVertices, read_vertex_columns, write_vertex_columns
+from .table import PointTable, check_places
 from .whole import replacing

@@ -4,6 +4,7 @@ import os
 import struct
 import zipfile
 import zlib
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from .las import read_las
 from .lines import brief
 from .pcd import read_pcd
 from .ply import read_ply, write_ply
-from .table import PointTable, check_table
+from .table import PointTable, check_places
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
 
@@ -56,11 +57,35 @@ def read_points(path) -> PointTable:
     suffix = path.suffix.lower()
     if suffix not in _READERS:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
+    with reading(path):
+        table = _READERS[suffix](path)
+    step = float(np.spacing(np.float32(check_places(table.points, path))))
+    if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
+        table.notices.append(
+            f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in"
+            " double precision, or with a shift."
+        )
+    return table
+
+
+@contextmanager
+def reading(path):
+    """Turn what may go wrong while a file is read into errors that tell its name and what to do.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+
+    Raises
+    ------
+    PointCloudError
+        There is no such file, or it is broken.
+    """
     if not os.path.isfile(path):  # that of pathlib fails at folders that may not be read
         raise PointCloudError(f"There is no file {path}. Check its name and folder.")
     try:
         with np.errstate(invalid="ignore", over="ignore"):  # in numbers that are refused, or kept as infinite
-            table = _READERS[suffix](path)
+            yield
     except PointCloudError:
         raise
     except OSError as error:
@@ -73,13 +98,6 @@ def read_points(path) -> PointTable:
         raise InvalidPointsError(
             f"{path} is broken: {brief(str(error).strip('.'))}. Copy or export it again."
         ) from error
-    step = float(np.spacing(np.float32(check_table(table, path))))
-    if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
-        table.notices.append(
-            f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in"
-            " double precision, or with a shift."
-        )
-    return table
 
 
 def write_points(path, table, double=True):

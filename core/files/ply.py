@@ -25,6 +25,27 @@ class _Element(NamedTuple):
     types: list  # numpy's codes; None for a list
 
 
+class PlyVertices(NamedTuple):
+    """The vertices of a PLY file as they stand there.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray, (n,)
+        By the names of the properties, in the types of the file.
+    order : str or None
+        "<" or ">", the order of bytes; None for text.
+    comments : list of str
+        Lines of the header that say nothing about the data.
+    notices : list of str
+        What was left out.
+    """
+
+    columns: dict
+    order: str | None
+    comments: list
+    notices: list
+
+
 def read_ply(path) -> PointTable:
     """Read the vertices of a PLY file with all their properties.
 
@@ -33,8 +54,16 @@ def read_ply(path) -> PointTable:
     InvalidPointsError
         It is no PLY file, or broken; the text says where.
     """
+    vertices = read_vertex_columns(path)
+    table = from_columns(vertices.columns, path)
+    table.notices += vertices.notices
+    return table
+
+
+def read_vertex_columns(path) -> PlyVertices:
+    """Read the vertices of a PLY file as they stand there; errors as of `read_ply`."""
     with open(path, "rb") as file:
-        order, elements = _read_header(file, path)
+        order, elements, comments = _read_header(file, path)
         names = [element.name for element in elements]
         if "vertex" not in names:
             raise InvalidPointsError(
@@ -53,31 +82,30 @@ def read_ply(path) -> PointTable:
             columns = read_rows(file, vertex.types, vertex.count, path, skipped)
         else:
             columns = _read_binary(file, order, before, vertex, path)
-    table = from_columns(dict(zip(vertex.names, columns, strict=True)), path)
-    table.notices += [
+    notices = [
         f"{path.name}: left out {element.count} {brief(element.name)} elements. Only points are read."
         for element in elements
         if element is not vertex and element.count
     ]
-    return table
+    return PlyVertices(dict(zip(vertex.names, columns, strict=True)), order, comments, notices)
 
 
 def _read_header(file, path):
-    """Return the byte order, None for text, and the elements; leave the file where the data begin."""
+    """Return the byte order, None for text, the elements and comments; leave the file where the data begin."""
     if file.readline(_LONGEST).strip() != b"ply":
         raise InvalidPointsError(f"{path} is no PLY file: its first line is not 'ply'. Export it again.")
-    order, elements = "", []
+    order, elements, comments = "", [], []
     for number in range(2, _LONGEST):
         line = file.readline(_LONGEST).decode(errors="replace").strip()
         match line.split():
             case ["end_header"]:
                 if order == "":
                     raise InvalidPointsError(f"{path} does not say whether it is text or binary. Export it again.")
-                return order, elements
+                return order, elements, comments
             case ["format", kind, *_] if kind in _ORDERS:
                 order = _ORDERS[kind]
             case ["comment" | "obj_info", *_]:
-                pass
+                comments.append(line)
             case ["element", name, count] if count.isdecimal() and len(count) <= _MOST_DIGITS:
                 elements.append(_Element(name, int(count), [], []))
             case ["property", "list", length, item, name] if elements and length in _TYPES and item in _TYPES:
@@ -117,16 +145,32 @@ def write_ply(path, table, double=True):
     columns = to_columns(table)
     if not double:
         columns.update((axis, columns[axis].astype(np.float32)) for axis in "xyz")
+    write_vertex_columns(path, columns)
+
+
+def write_vertex_columns(path, columns, order="<", comments=()):
+    """Write a binary PLY file.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    columns : dict of str to ndarray, (n,)
+    order : {"<", ">"}
+        Of the bytes.
+    comments : sequence of str
+        Lines of the header.
+    """
     columns = {name: values.view(np.uint8) if values.dtype == bool else values for name, values in columns.items()}
     types = {name: _code(values) for name, values in columns.items()}
-    rows = np.empty(len(table.points), [(name, f"<{code}") for name, code in types.items()])
+    count = len(next(iter(columns.values())))
+    rows = np.empty(count, [(name, order + code) for name, code in types.items()])
     for name, values in columns.items():
         rows[name] = values
-    properties = "".join(f"property {_NAMES[code]} {name.replace(' ', '_')}\n" for name, code in types.items())
+    kind = next(name for name, known in _ORDERS.items() if known == order)
+    lines = ["ply", f"format {kind} 1.0", *comments, f"element vertex {count}"]
+    lines += [f"property {_NAMES[code]} {name.replace(' ', '_')}" for name, code in types.items()]
     with open(path, "wb") as file:
-        file.write(
-            f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n".encode()
-        )
+        file.write("\n".join([*lines, "end_header\n"]).encode())
         rows.tofile(file)
 
 

@@ -122,17 +122,17 @@ def _free_name(name, columns):
     return next(free for free in chain([name], numbered) if free not in columns)
 
 
-def check_table(table, path) -> float:
+def check_places(points, path) -> float:
     """Refuse a file without points, or with coordinates that are no places, and return the largest coordinate."""
-    if len(table.points) == 0:
+    if len(points) == 0:
         raise TooFewPointsError(f"{path} has no points. Give a file with points.")
-    largest = float(np.abs(table.points).max())
+    largest = float(np.abs(points).max())
     if largest <= _FARTHEST:
         return largest
-    bad, what = np.flatnonzero(~np.isfinite(table.points).all(axis=1)), "not finite (NaN or infinity)"
+    bad, what = np.flatnonzero(~np.isfinite(points).all(axis=1)), "not finite (NaN or infinity)"
     if len(bad) == 0:
-        bad, what = np.flatnonzero((np.abs(table.points) > _FARTHEST).any(axis=1)), f"beyond {_FARTHEST:g}"
+        bad, what = np.flatnonzero((np.abs(points) > _FARTHEST).any(axis=1)), f"beyond {_FARTHEST:g}"
     raise InvalidPointsError(
-        f"{path}: {len(bad)} of {len(table.points)} points have coordinates that are {what}, the first of them is"
+        f"{path}: {len(bad)} of {len(points)} points have coordinates that are {what}, the first of them is"
         f" point {bad[0] + 1}. Delete these points from the file."
     )

@@ -65,17 +65,17 @@ def test_operators_draw_nothing_and_call_no_operator(call):
     assert [file.name for file in files if re.search(call, file.read_text(encoding="utf-8"))] == []
 
 
-GROUND = {"arguments", "blocks", "dense", "kernel", "memory", "options", "errors"}
+GROUND = {"arguments", "blocks", "dense", "kernel", "memory", "options", "rotations", "errors"}
 BELOW = {  # what each wing of core may use
     "geometry": GROUND,
     "operator": GROUND | {"geometry"},
     "applications": GROUND | {"geometry", "operator"},
     "paper": GROUND | {"geometry", "operator"},
     "files": GROUND,
+    "splats": GROUND | {"files"},
 }
 SIDEWAYS = {  # applications that build on others
     ("coarse_deformation", "deformation"),
-    ("deformation", "rotations"),
     ("fields", "graph"),
     ("geodesics", "graph"),
     ("transport", "geodesics"),

@@ -1,0 +1,138 @@
+"""Gaussian splats as arrays."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..arguments import as_array
+from ..errors import InvalidPointsError
+from ..rotations import nearest_rotations
+from .ellipsoids import mapped, matrices_of
+from .harmonics import COUNTS, turned
+
+
+@dataclass(frozen=True)
+class Splats:
+    """Gaussian splats: points with an ellipsoid each, and a colour that depends on the direction of view.
+
+    Attributes
+    ----------
+    positions : ndarray, (n, 3)
+        Centres [L].
+    scales : ndarray, (n, 3)
+        Half axes of the ellipsoids at one standard deviation [L].
+    rotations : ndarray, (n, 4)
+        Unit quaternions w x y z that turn the axes of coordinates to those of the ellipsoids.
+    opacities : ndarray, (n,)
+        In the centre, from 0 to 1.
+    colors : ndarray, (n, 3)
+        Coefficients of the constant harmonic: red, green and blue are 0.5 + 0.2821 times these.
+    harmonics : ndarray, (n, k, 3)
+        Coefficients of the harmonics of degree 1 on; k is 0, 3, 8, 15 or 24 for the highest degree 0 to 4.
+    notices : list of str
+        What of a file was left out.
+    file : SplatFile or None
+        What a file held, so that what is not changed is written as it was.
+
+    Raises
+    ------
+    InvalidPointsError
+        Arrays of wrong shapes, or no real numbers.
+
+    See Also
+    --------
+    read_splats, write_splats : Files of splats.
+    deformation_gradients : What a moved surface does to the splats on it.
+
+    References
+    ----------
+    Kerbl, Kopanas, Leimkuehler, Drettakis. 3D Gaussian Splatting for Real-Time Radiance Field Rendering. ACM Trans.
+    Graph. 42, 2023.
+    """
+
+    positions: np.ndarray
+    scales: np.ndarray
+    rotations: np.ndarray
+    opacities: np.ndarray
+    colors: np.ndarray
+    harmonics: np.ndarray
+    notices: list = field(default_factory=list)
+    file: object = None
+
+    def __post_init__(self):
+        count = len(as_array(self.positions, "Positions")) if np.ndim(self.positions) else -1
+        rest = np.shape(as_array(self.harmonics, "Harmonics"))
+        shapes = {
+            "positions": (count, 3),
+            "scales": (count, 3),
+            "rotations": (count, 4),
+            "opacities": (count,),
+            "colors": (count, 3),
+            "harmonics": (count, rest[1] if len(rest) == 3 and rest[1] in COUNTS else 0, 3),
+        }
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, _numbers(getattr(self, name), shape, name))
+
+    def __len__(self):
+        return len(self.positions)
+
+    @property
+    def covariances(self):
+        """R S^2 R^T of each splat, (n, 3, 3) [L^2]."""
+        axes = matrices_of(self.rotations) * self.scales.T
+        return np.einsum("abn,cbn->nac", axes, axes)
+
+    def deformed(self, positions, gradients):
+        """Return these splats carried along by a deformation.
+
+        Parameters
+        ----------
+        positions : array_like, (n, 3)
+            Where they are after it [L].
+        gradients : array_like, (n, 3, 3)
+            How it maps small steps around each of them: F, of `deformation_gradients` or any other.
+
+        Returns
+        -------
+        Splats
+            With the covariances F R S^2 R^T F^T. Harmonics turn by the rotation next to F, mirrored where F mirrors.
+
+        Raises
+        ------
+        InvalidPointsError
+            Arrays of wrong shapes, or with numbers that are not finite.
+        """
+        places = _numbers(positions, self.positions.shape, "positions")
+        maps = _numbers(gradients, (len(self), 3, 3), "gradients")
+        bad = int(np.count_nonzero(~(np.isfinite(places).all(axis=1) & np.isfinite(maps).all(axis=(1, 2)))))
+        if bad:
+            raise InvalidPointsError(
+                f"{bad} of {len(self)} splats get positions or gradients that are not finite (NaN or infinity). Give a"
+                " place and a map for each."
+            )
+        scales, rotations = mapped(self.scales, self.rotations, maps)
+        return replace(
+            self,
+            positions=places,
+            scales=scales,
+            rotations=rotations,
+            harmonics=turned(self.harmonics, orthogonal_parts(maps)) if self.harmonics.shape[1] else self.harmonics,
+        )
+
+
+def orthogonal_parts(gradients):
+    """Return the orthogonal matrices nearest to maps, (n, 3, 3): rotations, mirrored where the maps mirror."""
+    sign = np.where(np.linalg.det(gradients) < 0.0, -1.0, 1.0)
+    parts = nearest_rotations(np.ascontiguousarray(np.moveaxis(gradients * sign[:, None, None], 0, 2)))
+    return np.moveaxis(parts * sign, 2, 0)
+
+
+def _numbers(given, shape, name):
+    """Return an argument as an array of floating-point numbers of a shape."""
+    array = as_array(given, name.capitalize())
+    if array.shape != shape or array.dtype.kind not in "iuf":
+        raise InvalidPointsError(
+            f"The {name} have the shape {array.shape} and type {array.dtype}, not {shape} real numbers. Give one row"
+            " per splat, and 0, 3, 8, 15 or 24 harmonics."
+        )
+    return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
