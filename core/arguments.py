@@ -6,6 +6,8 @@ import numpy as np
 
 from .errors import InvalidPointsError, PointCloudError
 
+_HUGE = 1e100  # of a coordinate, so that no product overflows
+
 
 def real(given):
     """Return a real number as a float; NaN, which no comparison lets pass, for what is none."""
@@ -61,3 +63,20 @@ def as_doubles(array, copy=True):
     """Return an array of real numbers in double precision; those beyond its range become infinite."""
     with np.errstate(over="ignore"):
         return array.astype(np.float64, copy=copy)
+
+
+def check_positions(positions, count, name, singular):
+    """Return positions, (count, 3), in double precision."""
+    given = as_array(positions, name.capitalize())
+    if given.shape != (count, 3) or given.dtype.kind not in "iuf":
+        raise InvalidPointsError(
+            f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers."
+            f" Give x, y, z for each {singular}."
+        )
+    bad = int(np.count_nonzero(~(np.abs(given) < _HUGE).all(axis=1)))
+    if bad:
+        raise InvalidPointsError(
+            f"{bad} of {count} {name} are not finite (NaN or infinity), or beyond {_HUGE:g}. Give a place for"
+            f" each {singular}."
+        )
+    return given.astype(np.float64)

@@ -7,6 +7,7 @@ from .deviation import Deviation, surface_deviation
 from .fields import harmonic_field, solve_poisson
 from .filters import band, boost, chebyshev_filter, exponential, fairing, spectral_filter
 from .geodesics import Geodesics, geodesic_distance, nearest_source, signed_distance
+from .gradients import deformation_gradients
 from .matching import MatchedModes, match_modes
 from .meshing import SurfaceMesh, mesh_surface, values_on_mesh
 from .minimal_surface import MinimalSurface, minimal_surface

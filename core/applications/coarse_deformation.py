@@ -4,7 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..arguments import check_switches, real
+from ..arguments import check_positions, check_switches, real
 from ..errors import PointCloudError
 from ..geometry import move_apart, nearest_in_blocks, thin
 from ..operator import narrow_laplacian
@@ -14,8 +14,8 @@ from .deformation import (
     STEPS,
     Deformer,
     check_constraints,
-    check_positions,
     components_held,
+    followers,
     notices_of_components,
 )
 
@@ -124,7 +124,7 @@ class CoarseDeformer:
         self._placed = np.flatnonzero(np.isinf(weights) | (component[held] < 0))
         self._held = held
         moving = np.flatnonzero(np.isin(component, components))
-        self._moving = moving
+        self._moving, self._carried_points = moving, moving
         if not len(moving):
             return
 
@@ -154,7 +154,7 @@ class CoarseDeformer:
             neighbors=neighbors,
             progress=lambda stage, share: report(stage, 0.6 + 0.2 * share),
         )
-        self._carry(laplacian, lambda share: report("Points", 0.8 + 0.2 * share))
+        self._carry(laplacian, followers(laplacian, held), lambda share: report("Points", 0.8 + 0.2 * share))
 
     def _gathered(self, laplacian, coarse, own, weights):
         """Return the weights of constrained coarse points, each with the pull of the soft constraints next to it.
@@ -171,14 +171,19 @@ class CoarseDeformer:
             gathered = np.where(np.isinf(gathered), np.inf, pull)
         return gathered
 
-    def _carry(self, laplacian, report):
-        """Prepare the weights with which the motions of coarse points carry the others."""
+    def _carry(self, laplacian, followers, report):
+        """Prepare the weights with which the motions of coarse points carry the others, and points of no surface."""
         sources = self._coarse.moving
         apart = move_apart(laplacian.points, np.maximum(laplacian.component, 0))
         weights = _linear_weights(apart[self._rows[sources]], apart[self._moving], report)
-        self._weights = weights
+        row = np.full(len(self.points), -1)
+        row[self._moving] = np.arange(len(self._moving))
+        lone, leader = followers[0], row[followers[1]]
+        lone, leader = lone[leader >= 0], leader[leader >= 0]
+        weights = sparse.vstack([weights, weights[leader]], format="csr")
+        self._weights, self._carried_points = weights, np.concatenate([self._moving, lone])
         self._center = self.points[self._moving].mean(axis=0)
-        self._rest = self.points[self._moving] - self._center
+        self._rest = self.points[self._carried_points] - self._center
         self._offset = self._rest - weights @ (self.points[self._rows[sources]] - self._center)
 
     def solve(self, handle_positions, *, steps=STEPS, rtol=RTOL, start=None, progress=None):
@@ -195,12 +200,23 @@ class CoarseDeformer:
                 start = check_positions(start, len(self.points), "starting points", "point")[self._rows]
             placed = self._coarse.solve(target[self._pulled], steps=steps, rtol=rtol, start=start, progress=progress)
             self.steps, self.converged = self._coarse.steps, self._coarse.converged
-            result[self._moving] = self._carried(placed)
+            result[self._carried_points] = self._carried(placed)
         result[self._held[self._placed]] = target[self._placed]
         return result
 
+    def gradients(self, points):
+        """Find what a deformation does to small steps around each point, as `Deformer.gradients`, from some points."""
+        if self.exact is not None:
+            return self.exact.gradients(points)
+        result = np.tile(np.eye(3), (len(self.points), 1, 1))
+        if len(self._moving):
+            points = check_positions(points, len(self.points), "points after the deformation", "point")
+            found = self._coarse.gradients(points[self._rows])[self._coarse.moving]
+            result[self._carried_points] = (self._weights @ found.reshape(-1, 9)).reshape(-1, 3, 3)
+        return result
+
     def _carried(self, placed):
-        """Return where the moving points are carried to by coarse points that were placed, (k, 3)."""
+        """Return where the points that are carried go with coarse points that were placed, (k, 3)."""
         sources = self._coarse.moving
         now = placed[sources] - self._center
         if not self.rotation_aware:

@@ -2,18 +2,19 @@
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
-from ..arguments import as_array, as_doubles, check_switches, real, whole
+from ..arguments import as_array, as_doubles, check_positions, check_switches, real, whole
 from ..blocks import blocks
-from ..errors import InvalidPointsError, PointCloudError
+from ..errors import PointCloudError
 from ..geometry import as_indices
 from ..operator import dissect, factorize, narrow_laplacian, sparsify
 from ..rotations import nearest_rotations
+from .gradients import DeformationGradients
 
 NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
 STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
 RTOL = 1e-5
-_HUGE = 1e100  # of a coordinate, so that no product overflows
 _BLOCK = 1 << 14  # rows
 _MEMORY = 5  # steps that the acceleration looks back on
 
@@ -124,6 +125,7 @@ class Deformer:
         self.notices += [notice for notice in narrow.notices if notice not in laplacian.notices]
         held_components = components_held(narrow.component, held[weights > 0.0])
         self.notices += notices_of_components(narrow.component, held_components)
+        self._narrow, self._gradients = narrow, None
         self._moving = np.flatnonzero(np.isin(narrow.component, held_components))
         self._component = np.searchsorted(held_components, narrow.component[self._moving])
         self._components = len(held_components)
@@ -136,6 +138,8 @@ class Deformer:
         row = np.full(n, -1)
         row[moving] = np.arange(len(moving))
         self._row = row[self._held]
+        self._lone, leaders = followers(narrow, held)
+        self._leader = row[leaders]  # -1 where the surface next to them stays
         if not len(moving):
             return
         # The centre of each component at rest, so that sums of products do not lose digits far from the origin.
@@ -194,7 +198,8 @@ class Deformer:
         Returns
         -------
         ndarray, (n, 3)
-            The deformed points [L]. Those that nothing holds are where they were.
+            The deformed points [L]. Those that nothing holds are where they were, and those of no surface go with the
+            point of a surface that is next to them.
 
         Raises
         ------
@@ -245,7 +250,36 @@ class Deformer:
                 begin = mixing.mix(begin, now)
         self.steps, self.converged = step, converged  # at once, for solves may run in several threads
         result[self._moving] = now
+        self._let_follow(result)
         return result
+
+    def _let_follow(self, points):
+        """Move points of no surface as the point of the surface next to them, in place."""
+        led = self._leader >= 0
+        if not led.any():
+            return
+        lone, leader = self._lone[led], self._leader[led]
+        first = self._moving[leader]
+        step = self.points[lone] - self.points[first]
+        if self.rotation_aware:
+            step = np.einsum("abn,nb->na", self._rotations(points[self._moving])[:, :, leader], step)
+        points[lone] = points[first] + step
+
+    def gradients(self, points):
+        """Find what a deformation does to small steps around each point; see `deformation_gradients`.
+
+        Parameters
+        ----------
+        points : array_like, (n, 3)
+            All points after it [L], such as `solve` returns.
+
+        Returns
+        -------
+        ndarray, (n, 3, 3)
+        """
+        if self._gradients is None:
+            self._gradients = DeformationGradients(self._narrow)
+        return self._gradients.at(points)
 
     @property
     def moving(self):
@@ -294,6 +328,15 @@ class Deformer:
         return np.einsum("nab,nb->na", turn[self._component], vectors)
 
 
+def followers(laplacian, held):
+    """Return the points of no surface that no constraint holds, and for each the point of a surface next to it."""
+    alone = laplacian.component < 0
+    lone, own = np.setdiff1d(np.flatnonzero(alone), held), np.flatnonzero(~alone)
+    if not len(lone) or not len(own):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    return lone, own[cKDTree(laplacian.points[own]).query(laplacian.points[lone])[1]]
+
+
 def components_held(component, held):
     """Return the components that some of these points are in, ascending; others stay where they are."""
     known = np.unique(component[held])
@@ -306,7 +349,9 @@ def notices_of_components(component, held):
     lone = int(np.count_nonzero(component < 0))
     free = (component >= 0) & ~np.isin(component, held)
     if lone:
-        notices.append(f"{lone} points belong to no surface. They stay where they are, unless they are handles.")
+        notices.append(
+            f"{lone} points belong to no surface. Unless they are handles, they go with the point next to them."
+        )
     if free.any():
         notices.append(
             f"{len(np.unique(component[free]))} components with {np.count_nonzero(free)} points have neither handles"
@@ -380,23 +425,6 @@ def check_steps(steps, rtol):
             " of at least 0."
         )
     return most, share
-
-
-def check_positions(positions, count, name, singular):
-    """Return positions, (count, 3), in double precision."""
-    given = as_array(positions, name.capitalize())
-    if given.shape != (count, 3) or given.dtype.kind not in "iuf":
-        raise InvalidPointsError(
-            f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers."
-            f" Give x, y, z for each {singular}."
-        )
-    bad = int(np.count_nonzero(~(np.abs(given) < _HUGE).all(axis=1)))
-    if bad:
-        raise InvalidPointsError(
-            f"{bad} of {count} {name} are not finite (NaN or infinity), or beyond {_HUGE:g}. Give a place for"
-            f" each {singular}."
-        )
-    return given.astype(np.float64)
 
 
 def _energy(stiffness, inverse, report):

@@ -6,14 +6,23 @@ from bpy.props import IntProperty
 
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import DISPLACEMENT, point_count, read_attribute, write_attribute
+from ..objects.attributes import (
+    DISPLACEMENT,
+    SPLAT_ROTATION,
+    SPLAT_SCALE,
+    point_count,
+    read_attribute,
+    write_attribute,
+)
 from ..objects.reading import find_object
+from ..objects.splats import ROTATION, SCALE, has_splats
 from ..running.job import Job, JobOperator, SteppedJob, all_steps
 from ..running.ready import reporting
 from ..running.stages import Stages
 from . import live
 from .binding import POSE, stale_reason, write_displacement
-from .nodes import find_deform, is_baked, show_baked
+from .nodes import BAKED_ROTATION, BAKED_SCALE, find_deform, is_baked, show_baked
+from .splats import carried_names
 from .tools import BoundOperator, check_fresh, delete_bake
 
 _LAST = 1048574  # frame of Blender
@@ -73,7 +82,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         return (yield from self._frames(progress))
 
     def _frames(self, progress):
-        """Read the displacements of all frames, one at each step; return them as a list."""
+        """Read the attributes of all frames, one at each step; return them as a list of what `_read_frame` gives."""
         frames = []
         for number in range(self.first, self.last + 1):
             progress("Frames", len(frames) / (self.last + 1 - self.first))
@@ -90,7 +99,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
             reason = stale_reason(obj, glance=True, trusting=True)
             if reason:
                 raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
-            frames.append(read_attribute(obj.data, DISPLACEMENT))
+            frames.append(_read_frame(obj.data))
             yield
         return frames
 
@@ -104,13 +113,24 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         with all_or_nothing(objects):
             mesh = bpy.data.meshes.new(f"{obj.name} Bake")
             mesh.vertices.add(point_count(obj.data))
-            for number, displacement in enumerate(results):
-                write_attribute(mesh, str(number), displacement, "FLOAT_VECTOR")
+            for number, frame in enumerate(results):
+                for suffix, (values, data_type) in frame.items():
+                    write_attribute(mesh, f"{number}{suffix}", values, data_type)
             cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
             show_baked(find_deform(obj), cache, self.first, len(results))
-        size = np.prod([len(results), *results[0].shape]) * 4 / 2**20
+        size = len(results) * sum(values.nbytes for values, _ in results[0].values()) / 2**20
         self.report({"INFO"}, f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file")
         return {"FINISHED"}
+
+
+def _read_frame(data):
+    """Return what is shown of a frame, with types, by what follows the number in the names of its attributes."""
+    frame = {"": (read_attribute(data, DISPLACEMENT), "FLOAT_VECTOR")}
+    if has_splats(data):
+        scale, rotation = (SPLAT_SCALE, SPLAT_ROTATION) if SPLAT_SCALE in data.attributes else (SCALE, ROTATION)
+        frame[BAKED_SCALE] = read_attribute(data, scale), "FLOAT_VECTOR"
+        frame[BAKED_ROTATION] = read_attribute(data, rotation), "QUATERNION"
+    return frame
 
 
 class _Kept:
@@ -121,6 +141,7 @@ class _Kept:
         self._time = scene.frame_current, scene.frame_subframe
         self._places = self._expected = self._now()
         self._displacement = read_attribute(obj.data, DISPLACEMENT)
+        self._splats = {name: read_attribute(obj.data, name) for name in carried_names(obj.data)}
         self._pose = obj.data[POSE].to_list()
 
     def find(self):
@@ -171,6 +192,8 @@ class _Kept:
                     setattr(thing, name, value)
         settled, *pose = self._pose
         write_displacement(obj, self._displacement, np.array(pose), bool(settled))
+        for name, values in self._splats.items():
+            write_attribute(obj.data, name, values)
 
 
 class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):

@@ -28,6 +28,7 @@ from ..objects.handlers import tell
 from ..objects.options import settings_values
 from ..objects.reading import TYPES, fingerprint, sharing_objects
 from .nodes import find_deform, is_baked
+from .splats import carried_names, write_carried
 
 WRITES = DISPLACEMENT, REST
 POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
@@ -340,7 +341,7 @@ def forget(obj):
     settings = obj.meshfree.deform
     settings.is_bound = False
     settings.handle_items.clear()
-    for name in WRITES:
+    for name in (*WRITES, *carried_names(obj.data)):
         if obj.data.attributes.get(name) is not None:
             obj.data.attributes.remove(obj.data.attributes[name])
     obj.data.pop(POSE, None)
@@ -390,8 +391,8 @@ def same_pose(one, other) -> bool:
     )
 
 
-def write_displacement(obj, displacement, pose, settled: bool):
-    """Write displacements in local space, (n, 3), in Edit Mode too, and what they were computed for."""
+def write_displacement(obj, displacement, pose, settled: bool, splats=None):
+    """Write displacements in local space, (n, 3), in Edit Mode too, splats carried along, and what both are for."""
     data = obj.data
     if in_edit_mesh(obj):
         edited = bmesh.from_edit_mesh(data)
@@ -401,5 +402,6 @@ def write_displacement(obj, displacement, pose, settled: bool):
         bmesh.update_edit_mesh(data, loop_triangles=False, destructive=False)
     else:
         write_attribute(data, DISPLACEMENT, displacement)
+        write_carried(data, splats)
         tag_changed(data)
     data[POSE] = [float(settled), *pose.tolist()]

@@ -10,18 +10,20 @@ once.
 import threading
 from collections.abc import Callable
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from time import perf_counter
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import Cancelled, CoarseDeformer, Deformer
+from ...core import Cancelled, CoarseDeformer, Deformer, Splats
 from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import laplacian_options
 from ..objects.reading import boundary_points
+from ..objects.splats import has_splats, read_splats
 from ..running import cache
 from ..running.job import STOPPED, Job, running
 from ..running.ready import TROUBLES, told
@@ -48,6 +50,8 @@ class Live:
         From a progress callback to the `Deformer` for settled ones.
     exact : Deformer or None
         That, once it was needed.
+    splats : Splats or None
+        Those at rest in local space, where the points are splats.
     last : dict of int to ndarray
         The last result by the object's session_uid: copies of an object have one binding.
     """
@@ -58,6 +62,7 @@ class Live:
     follower: CoarseDeformer
     make_exact: Callable
     exact: Deformer | None
+    splats: Splats | None = None
     last: dict = field(default_factory=dict)
 
     def prepare(self, progress):
@@ -65,6 +70,24 @@ class Live:
         if self.exact is None:
             self.exact = self.make_exact(progress)
         return self
+
+
+class Moved(NamedTuple):
+    """Where handles have moved a bound object.
+
+    Attributes
+    ----------
+    points : ndarray, (n, 3)
+        As `Live.matrix` places them.
+    displacement : ndarray, (n, 3)
+        In local space.
+    splats : Splats or None
+        In local space, where the points are splats that are not at rest; without harmonics if the result is quick.
+    """
+
+    points: np.ndarray
+    displacement: np.ndarray
+    splats: Splats | None
 
 
 @dataclass
@@ -147,6 +170,7 @@ def plan_factors(obj, rest, matrix, constraints):
     settings = obj.meshfree.deform
     weights = settings.weight * constraints.strength if settings.soft else None
     options, boundary, aware = laplacian_options(obj.meshfree), boundary_points(obj), settings.rotation_aware
+    splats = read_splats(obj.data) if has_splats(obj.data) else None
 
     def make_by(kind, progress):
         laplacian = cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress).laplacian
@@ -161,7 +185,7 @@ def plan_factors(obj, rest, matrix, constraints):
 
     def make(progress):
         follower = make_by(CoarseDeformer, progress)
-        return Live(constraints, rest, matrix, follower, partial(make_by, Deformer), follower.exact)
+        return Live(constraints, rest, matrix, follower, partial(make_by, Deformer), follower.exact, splats)
 
     return make
 
@@ -172,18 +196,28 @@ def is_at_rest(live, goal) -> bool:
 
 
 def displaced(live, goal, steps=None, start=None, progress=None):
-    """Solve for handles in local space, (h, 3); return the points, as `Live.matrix` places them, and displacements.
+    """Solve for handles in local space, (h, 3); return a `Moved`.
 
     With a number of steps the result is exact, otherwise it is a quick one.
     """
     rest = live.follower.points
     if is_at_rest(live, goal):
-        return rest, np.zeros_like(rest)
+        return Moved(rest, np.zeros_like(rest), None)
     if steps is None:
-        points = live.follower.solve(goal @ live.matrix.T, steps=1, start=start)
+        solver = live.follower
+        points = solver.solve(goal @ live.matrix.T, steps=1, start=start)
     else:
-        points = live.prepare(progress).exact.solve(goal @ live.matrix.T, steps=steps, progress=progress)
-    return points, (points - rest) @ np.linalg.inv(live.matrix).T
+        solver = live.prepare(progress).exact
+        points = solver.solve(goal @ live.matrix.T, steps=steps, progress=progress)
+    inverse = np.linalg.inv(live.matrix)
+    displacement = (points - rest) @ inverse.T
+    if live.splats is None:
+        return Moved(points, displacement, None)
+    splats = live.splats
+    if steps is None:  # harmonics take longer than all else, and can wait
+        splats = replace(splats, harmonics=splats.harmonics[:, :0])
+    gradients = inverse @ solver.gradients(points) @ live.matrix
+    return Moved(points, displacement, splats.deformed(live.rest + displacement, gradients))
 
 
 def plan_prepared(obj):
@@ -209,8 +243,7 @@ def plan_settled(obj, depsgraph=None, waits=True):
     Returns
     -------
     callable
-        From a progress callback to the `Live`, made if there is none, the points, the displacements, and whether these
-        are settled.
+        From a progress callback to the `Live`, made if there is none, the `Moved`, and whether it is settled.
     ndarray
         The pose.
     """
@@ -224,7 +257,7 @@ def plan_settled(obj, depsgraph=None, waits=True):
     def compute(progress):
         live = known or make(progress)
         settled = waits or known is not None or live.exact is not None
-        return live, *displaced(live, goal, steps if settled else None, progress=progress), settled
+        return live, displaced(live, goal, steps if settled else None, progress=progress), settled
 
     return compute, binding.read_pose(obj, depsgraph)
 
@@ -236,10 +269,10 @@ def _plan_bound(obj):
     return plan_factors(obj, rest, matrix, constraints), rest, constraints
 
 
-def write(obj, live, points, displacement, pose, settled=True):
-    """Write the displacements of an object, and keep what the next ones start from."""
-    live.last[obj.session_uid] = points
-    binding.write_displacement(obj, displacement, pose, settled)
+def write(obj, live, moved, pose, settled=True):
+    """Write where an object is moved, and keep what the next result starts from."""
+    live.last[obj.session_uid] = moved.points
+    binding.write_displacement(obj, moved.displacement, pose, settled, moved.splats)
     _troubles.pop(obj.session_uid, None)
 
 
@@ -266,14 +299,13 @@ def update(obj, depsgraph=None, quick=False, waits=True):
         return
     live = find(obj)
     if not quick and (waits or is_prepared(obj)):
-        live, points, displacement, _ = plan_settled(obj, depsgraph)[0](lambda stage, fraction: None)
+        live, moved, _ = plan_settled(obj, depsgraph)[0](lambda stage, fraction: None)
         keep(obj, live)
-        write(obj, live, points, displacement, pose)
+        write(obj, live, moved, pose)
         return
     if live is not None:
         goal = binding.goal(obj, live.constraints, live.rest, depsgraph)
-        points, displacement = displaced(live, goal, start=live.last.get(obj.session_uid))
-        write(obj, live, points, displacement, pose, settled=False)
+        write(obj, live, displaced(live, goal, start=live.last.get(obj.session_uid)), pose, settled=False)
     settle_later(obj)
 
 
@@ -397,7 +429,7 @@ def _start(obj, key, pose, depsgraph):
 def _take(obj, job, key, pose):
     """Write what a thread has computed, unless it is past."""
     try:
-        live, points, displacement, settled = job.work.result()
+        live, moved, settled = job.work.result()
     except Cancelled:
         if job.prepares and job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
             work = "Binding" if find(obj) is None else "The exact result"
@@ -406,7 +438,7 @@ def _take(obj, job, key, pose):
     if job.key == key:
         keep(obj, live)
         if binding.same_pose(job.pose, pose):
-            write(obj, live, points, displacement, pose, settled)
+            write(obj, live, moved, pose, settled)
 
 
 def _is_playing():

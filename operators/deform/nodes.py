@@ -2,11 +2,14 @@
 
 import bpy
 
-from ..objects.attributes import DISPLACEMENT, REST
+from ..objects.attributes import DISPLACEMENT, REST, SPLAT_HARMONIC, SPLAT_ROTATION, SPLAT_SCALE
 from ..objects.modifiers import DEFORM_TAG, add_input, add_node, is_deform, is_display, is_intact, new_group, set_input
+from ..objects.splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats
 
 NAME = "Mesh-Free Deform"
-_LIVE, _BAKED = "live", "baked"  # what the custom property of the node groups says
+_LIVE, _BAKED = "live", "baked"  # how the custom property of the node groups begins
+BAKED_SCALE, BAKED_ROTATION = " scale", " rotation"  # what follows the number of a frame in names of attributes
+_KINDS = {"FLOAT_VECTOR": "VECTOR", "QUATERNION": "ROTATION"}  # of attributes, as nodes call them
 
 
 def find_deform(obj):
@@ -17,7 +20,7 @@ def find_deform(obj):
 def is_baked(obj) -> bool:
     """Whether an object shows a baked animation, which no handle changes."""
     modifier = find_deform(obj)
-    return modifier is not None and modifier.node_group[DEFORM_TAG] == _BAKED
+    return modifier is not None and modifier.node_group[DEFORM_TAG].startswith(_BAKED)
 
 
 def add_deform(obj):
@@ -40,7 +43,10 @@ def add_deform(obj):
 
 def show_live(modifier):
     """Let a modifier show where the handles have moved the points."""
-    modifier.node_group = _group(_LIVE) or _live_group()
+    data = modifier.id_data.data
+    carried = _live_splats(len(harmonic_names(data))) if has_splats(data) else ()
+    kind = f"{_LIVE} {len(carried)}" if carried else _LIVE
+    modifier.node_group = _group(kind) or _live_group(kind, carried)
 
 
 def show_baked(modifier, cache, first: int, frames: int):
@@ -50,11 +56,14 @@ def show_baked(modifier, cache, first: int, frames: int):
     ----------
     modifier : bpy.types.NodesModifier
     cache : bpy.types.Object
-        Its attributes "0", "1" and so on hold the displacements of all points from the first frame on.
+        Its attributes "0", "1" and so on hold the displacements of all points from the first frame on, those named
+        "0 scale" and "0 rotation" the splats.
     first, frames : int
         The first frame, and how many there are.
     """
-    modifier.node_group = _group(_BAKED) or _baked_group()
+    splats = has_splats(modifier.id_data.data)
+    kind = f"{_BAKED} splats" if splats else _BAKED
+    modifier.node_group = _group(kind) or _baked_group(kind, _BAKED_SPLATS if splats else ())
     for name, value in (("Cache", cache), ("First Frame", first), ("Frames", frames)):
         set_input(modifier, name, value)
 
@@ -65,16 +74,38 @@ def _group(kind):
     return next((item for item in known if is_intact(item)), None)
 
 
-def _live_group():
-    group, given = _new(NAME, _LIVE)
+def _live_splats(harmonics):
+    """Return which attributes of splats take the place of which, and their types."""
+    numbered = ((f"{SPLAT_HARMONIC}{number}", f"{HARMONIC}{number}", "FLOAT_VECTOR") for number in range(harmonics))
+    return (SPLAT_SCALE, SCALE, "FLOAT_VECTOR"), (SPLAT_ROTATION, ROTATION, "QUATERNION"), *numbered
+
+
+_BAKED_SPLATS = (BAKED_SCALE, SCALE, "FLOAT_VECTOR"), (BAKED_ROTATION, ROTATION, "QUATERNION")
+
+
+def _live_group(kind, carried):
+    group, given = _new(NAME, kind)
     displacement = add_node(group, "GeometryNodeInputNamedAttribute", 0, -200, data_type="FLOAT_VECTOR")
     displacement.inputs["Name"].default_value = DISPLACEMENT
-    _place(group, given.outputs["Geometry"], given.outputs["Strength"], displacement.outputs["Attribute"])
+    strength, geometry = given.outputs["Strength"], given.outputs["Geometry"]
+    for number, (source, target, data_type) in enumerate(carried, 1):
+        y = -400 * number
+        stored = _attribute(group, source, data_type, 7, y)
+        at_rest = _attribute(group, target, data_type, 7, y - 150)
+        there = add_node(group, "GeometryNodeSwitch", 8, y, input_type=_KINDS[data_type])
+        for output, place in (
+            (stored.outputs["Exists"], "Switch"),
+            (at_rest.outputs["Attribute"], "False"),
+            (stored.outputs["Attribute"], "True"),
+        ):
+            group.links.new(output, there.inputs[place])
+        geometry = _replace(group, geometry, target, data_type, there.outputs["Output"], strength, y)
+    _place(group, geometry, strength, displacement.outputs["Attribute"])
     return group
 
 
-def _baked_group():
-    group, given = _new(f"{NAME} Baked", _BAKED)
+def _baked_group(kind, carried):
+    group, given = _new(f"{NAME} Baked", kind)
     for name, kind in (("Cache", "Object"), ("First Frame", "Int"), ("Frames", "Int")):
         add_input(group, name, kind, f"{name} of the baked animation")
     time = add_node(group, "GeometryNodeInputSceneTime", 0, -300)
@@ -88,9 +119,6 @@ def _baked_group():
     share = add_node(group, "ShaderNodeMath", 4, -100, operation="FRACT")
     after = add_node(group, "ShaderNodeMath", 5, -400, operation="CEIL")
     cached = add_node(group, "GeometryNodeObjectInfo", 5, 100, transform_space="ORIGINAL")
-    mixed = add_node(group, "ShaderNodeMix", 9, -200, data_type="VECTOR")
-    # Its sockets have one name for each kind of data.
-    factor, *ends = [item for item in mixed.inputs if item.enabled]
     for source, target in (
         (time.outputs["Frame"], elapsed.inputs[0]),
         (given.outputs["First Frame"], elapsed.inputs[1]),
@@ -102,37 +130,84 @@ def _baked_group():
         (inside.outputs[0], share.inputs[0]),
         (inside.outputs[0], after.inputs[0]),
         (given.outputs["Cache"], cached.inputs["Object"]),
-        (share.outputs[0], factor),
-        (_sample(group, cached, whole, 100), ends[0]),
-        (_sample(group, cached, after, -400), ends[1]),
     ):
         group.links.new(source, target)
-    displacement = next(item for item in mixed.outputs if item.enabled)
-    kept = add_node(group, "GeometryNodeStoreNamedAttribute", 9, 0, data_type="FLOAT_VECTOR")
-    kept.inputs["Name"].default_value = DISPLACEMENT
-    value = next(item for item in kept.inputs if item.name == "Value" and item.enabled)
-    group.links.new(given.outputs["Geometry"], kept.inputs["Geometry"])
-    group.links.new(displacement, value)
-    _place(group, kept.outputs["Geometry"], given.outputs["Strength"], displacement)
+
+    def now(suffix, data_type, y):
+        """Add nodes for what is baked, between two frames; return their socket."""
+        frames = [_sample(group, cached, frame, y - 400 * index, suffix, data_type) for index, frame in ends]
+        return _mix(group, share.outputs[0], frames, data_type, y)
+
+    ends = list(enumerate((whole, after)))
+    displacement, strength = now("", "FLOAT_VECTOR", 100), given.outputs["Strength"]
+    geometry = _store(group, given.outputs["Geometry"], DISPLACEMENT, "FLOAT_VECTOR", displacement, 0)
+    for number, (suffix, target, data_type) in enumerate(carried, 1):
+        y = -900 * number
+        geometry = _replace(group, geometry, target, data_type, now(suffix, data_type, y), strength, y)
+    _place(group, geometry, strength, displacement)
     return group
 
 
-def _sample(group, cached, frame, y):
-    """Add nodes that look up the displacements of a frame, whose number names the attribute; return their socket."""
-    name = add_node(group, "FunctionNodeValueToString", 6, y)
-    stored = add_node(group, "GeometryNodeInputNamedAttribute", 7, y, data_type="FLOAT_VECTOR")
+def _sample(group, cached, frame, y, suffix, data_type):
+    """Add nodes that look up an attribute that the number of a frame, and a suffix, name; return their socket."""
+    number = add_node(group, "FunctionNodeValueToString", 6, y)
+    name = add_node(group, "GeometryNodeStringJoin", 6, y - 150)
+    ending = add_node(group, "FunctionNodeInputString", 5, y - 150, string=suffix)
+    stored = add_node(group, "GeometryNodeInputNamedAttribute", 7, y, data_type=data_type)
     index = add_node(group, "GeometryNodeInputIndex", 7, y - 150)
-    sample = add_node(group, "GeometryNodeSampleIndex", 8, y, data_type="FLOAT_VECTOR", domain="POINT")
-    value = next(item for item in sample.inputs if item.name == "Value" and item.enabled)
+    sample = add_node(group, "GeometryNodeSampleIndex", 8, y, data_type=data_type, domain="POINT")
     for source, target in (
-        (frame.outputs[0], name.inputs["Value"]),
+        (frame.outputs[0], number.inputs["Value"]),
+        (ending.outputs["String"], name.inputs["Strings"]),  # the last one linked comes first
+        (number.outputs["String"], name.inputs["Strings"]),
         (name.outputs["String"], stored.inputs["Name"]),
         (cached.outputs["Geometry"], sample.inputs["Geometry"]),
-        (stored.outputs["Attribute"], value),
+        (stored.outputs["Attribute"], _value(sample)),
         (index.outputs[0], sample.inputs["Index"]),
     ):
         group.links.new(source, target)
-    return next(item for item in sample.outputs if item.enabled)
+    return _output(sample)
+
+
+def _attribute(group, name, data_type, column, y):
+    """Add a node that reads an attribute; return it."""
+    node = add_node(group, "GeometryNodeInputNamedAttribute", column, y, data_type=data_type)
+    node.inputs["Name"].default_value = name
+    return node
+
+
+def _replace(group, geometry, target, data_type, value, strength, y):
+    """Add nodes that mix an attribute with what takes its place; return the geometry."""
+    before = _attribute(group, target, data_type, 9, y - 150).outputs["Attribute"]
+    return _store(group, geometry, target, data_type, _mix(group, strength, (before, value), data_type, y), y)
+
+
+def _mix(group, share, ends, data_type, y):
+    """Add a node that mixes two values of a type; return its socket."""
+    mixed = add_node(group, "ShaderNodeMix", 10, y, data_type=_KINDS[data_type])
+    # Its sockets have one name for each kind of data.
+    for source, target in zip((share, *ends), (item for item in mixed.inputs if item.enabled), strict=True):
+        group.links.new(source, target)
+    return _output(mixed)
+
+
+def _store(group, geometry, name, data_type, value, y):
+    """Add a node that keeps an attribute; return the geometry."""
+    kept = add_node(group, "GeometryNodeStoreNamedAttribute", 12, y, data_type=data_type)
+    kept.inputs["Name"].default_value = name
+    group.links.new(geometry, kept.inputs["Geometry"])
+    group.links.new(value, _value(kept))
+    return kept.outputs["Geometry"]
+
+
+def _output(node):
+    """Return the output of a node whose sockets have one name for each kind of data."""
+    return next(item for item in node.outputs if item.enabled)
+
+
+def _value(node):
+    """Return the input for values of such a node."""
+    return next(item for item in node.inputs if item.name == "Value" and item.enabled)
 
 
 def _new(name, kind):

@@ -14,6 +14,7 @@ from ..objects.modifiers import get_input
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
 from ..objects.result import length_text
+from ..objects.splats import has_splats, read_splats, write_splats
 from ..running.application import ApplicationOperator
 from ..running.job import busy
 from ..running.ready import ReadyOperator, reporting
@@ -37,6 +38,7 @@ from .binding import (
     write_displacement,
 )
 from .nodes import add_deform, find_deform, is_baked, show_live
+from .splats import shown_splats
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -208,10 +210,10 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
         return lambda progress: (pose, *compute(progress))
 
     def write(self, context, obj, result):
-        pose, made, points, displacement, _ = result
+        pose, made, moved, _ = result
         live.keep(obj, made)
-        live.write(obj, made, points, displacement, pose)
-        distance = np.linalg.norm(points - made.follower.points, axis=1)
+        live.write(obj, made, moved, pose)
+        distance = np.linalg.norm(moved.points - made.follower.points, axis=1)
         converged = made.exact is None or made.exact.converged
         notices = [] if converged else ["The turns of details were still changing. Raise Steps."]
         return [*notices, f"{obj.name}: moved at most by {length_text(distance.max())}"]
@@ -230,7 +232,11 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         empties = [
             (item.empty, relative_matrix(obj, item.empty)) if item.has_empty else None for item in settings.handle_items
         ]
-        write_own_positions(obj.data, positions)
+        if has_splats(obj.data):
+            strength = get_input(find_deform(obj), "Strength")
+            write_splats(obj.data, shown_splats(obj.data, read_splats(obj.data), positions, strength))
+        else:
+            write_own_positions(obj.data, positions)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
         write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"

@@ -22,6 +22,11 @@ _STORAGE = {
     "INT": _Storage(np.int32, 1, "value"),
     "BOOLEAN": _Storage(np.bool_, 1, "value"),
 }
+_FOUR = {  # numbers that are kept, but are no results that one could choose
+    "QUATERNION": _Storage(np.float32, 4, "value"),
+    "FLOAT_COLOR": _Storage(np.float32, 4, "color"),
+    "FLOAT4": _Storage(np.float32, 4, "vector"),  # Blender 5.3 on
+}
 _LAYERS = {"FLOAT": "float", "FLOAT_VECTOR": "float_vector", "INT": "int", "BOOLEAN": "bool"}  # in Edit Mode
 
 SELECTION = ".selection"  # of point clouds, as Blender names it
@@ -46,6 +51,8 @@ CELL, DIRECTION = "lb_cell", "lb_direction"  # nearest source, and what was carr
 UV = "lb_uv"  # texture coordinates around a point
 DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
+SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of splats that are carried along
+SPLAT_HARMONIC = "lb_splat_sh_"  # followed by the number of the harmonic, from 0
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
 # Of every analysis, as in the panel.
@@ -56,13 +63,15 @@ _TYPES = {  # all others are FLOAT
     **dict.fromkeys((COMPONENT, SEGMENT, CELL), "INT"),
     **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
     UV: "FLOAT2",
+    SPLAT_SCALE: "FLOAT_VECTOR",
+    SPLAT_ROTATION: "QUATERNION",
 }
 STORABLE = tuple(_STORAGE)
 
 
 def type_of(name: str) -> str:
     """Type of one of this extension's attributes."""
-    return _TYPES.get(name, "FLOAT")
+    return "FLOAT_VECTOR" if name.startswith(SPLAT_HARMONIC) else _TYPES.get(name, "FLOAT")
 
 
 def eigenvector_name(mode: int) -> str:
@@ -125,14 +134,14 @@ def write_attribute(data, name: str, values, data_type: str = ""):
     ----------
     data : bpy.types.Mesh or bpy.types.PointCloud
     name : str
-    values : array_like, (n,), (n, 2) or (n, 3)
+    values : array_like, (n,), (n, 2), (n, 3) or (n, 4)
     data_type : str
         As Blender names it; empty for that of our own results.
     """
     if not data_type:
         data_type = type_of(name)
         check_size(name, values)
-    storage = _STORAGE[data_type]
+    storage = _STORAGE.get(data_type) or _FOUR[data_type]
     values = np.ascontiguousarray(values, dtype=storage.dtype).reshape(-1)
     if len(values) != storage.components * point_count(data):
         raise PointCloudError(
@@ -179,11 +188,11 @@ def _grows(name):
 
 
 def read_attribute(data, name: str):
-    """Read an attribute of the points as an array of shape (n,), (n, 2) or (n, 3)."""
+    """Read an attribute of the points as an array of shape (n,), (n, 2), (n, 3) or (n, 4)."""
     attribute = data.attributes.get(name)
     if attribute is None:
         raise PointCloudError(f'"{data.name}" has no attribute {name}. Analyze the object, or choose another name.')
-    storage = _STORAGE.get(attribute.data_type)
+    storage = _STORAGE.get(attribute.data_type) or _FOUR.get(attribute.data_type)
     if storage is None or attribute.domain != "POINT":
         raise PointCloudError(
             f"Attribute {name} has the type {attribute.data_type} on the domain {attribute.domain}. Choose a"

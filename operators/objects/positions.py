@@ -7,6 +7,7 @@ from ...core import PointCloudError
 from .attributes import check_size, own_positions, write_own_positions
 from .modifiers import is_own
 from .reading import key_positions, shape_keys
+from .splats import has_splats, read_splats, write_splats
 
 TARGETS = (
     ("SHAPE_KEY", "Shape Key", "Add a shape key, whose value mixes the result with the points as they were"),
@@ -48,7 +49,7 @@ def check_movable(obj, target: str):
         )
 
 
-def write_positions(obj, reading, points, target: str, name: str):
+def write_positions(obj, reading, points, target: str, name: str, gradients=None):
     """Move the points to given places.
 
     Parameters
@@ -62,6 +63,8 @@ def write_positions(obj, reading, points, target: str, name: str):
         One of `TARGETS`.
     name : str
         Of the shape key; Blender adds a number if there is one already.
+    gradients : ndarray, (n, 3, 3), optional
+        Of the deformation, as `reading.points`, with which splats go.
 
     Returns
     -------
@@ -69,6 +72,11 @@ def write_positions(obj, reading, points, target: str, name: str):
     """
     moved = reading.local(points - reading.points)
     check_size("position", moved)
+    if has_splats(obj.data) and gradients is not None:
+        matrix = reading.matrix
+        local = np.linalg.inv(matrix) @ gradients @ matrix
+        write_splats(obj.data, read_splats(obj.data).deformed(own_positions(obj.data) + moved, local))
+        return None
     if target == "IN_PLACE" or obj.type != "MESH":
         write_own_positions(obj.data, own_positions(obj.data) + moved)
         return None

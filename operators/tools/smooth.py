@@ -9,6 +9,7 @@ from ...core import (
     PointBlend,
     PointCloudError,
     boost,
+    deformation_gradients,
     displace_by_mode,
     exponential,
     fair_points,
@@ -18,6 +19,7 @@ from ...core import (
 from ..objects.groups import chosen_weights
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.result import length_text
+from ..objects.splats import has_splats
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 
@@ -93,10 +95,14 @@ class Smooth(Tool):
         mask = chosen_weights(obj, self.group, "Vertex Group") if self.group else None
         method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
         shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
-        keep_boundary, name = self.keep_boundary, obj.name
+        keep_boundary, name, carries = self.keep_boundary, obj.name, has_splats(obj.data)
 
         def compute(progress):
             laplacian = operator(progress)
+            points = smoothed(laplacian, progress)
+            return reading, points, deformation_gradients(laplacian, points) if carries else None
+
+        def smoothed(laplacian, progress):
             dirichlet = keep_boundary and bool(laplacian.boundary.any())
             if dirichlet and shared["keep"]:
                 raise PointCloudError(
@@ -121,20 +127,20 @@ class Smooth(Tool):
                 )
 
             if not shared["keep"]:
-                return reading, blend(filtered())
+                return blend(filtered())
 
             def scaled():
                 places = filtered()
                 progress("Size", 0.9)
                 return blend(places)
 
-            return reading, cache.result(laplacian, "scaled", *settings, *shared.values(), compute=scaled)
+            return cache.result(laplacian, "scaled", *settings, *shared.values(), compute=scaled)
 
         return compute
 
     def write(self, context, obj, result):
-        reading, points = result
-        write_positions(obj, reading, points, self.target, "Smooth")
+        reading, points, gradients = result
+        write_positions(obj, reading, points, self.target, "Smooth", gradients)
         moved = np.sqrt(np.mean(np.sum((points - reading.points) ** 2, axis=1)))
         return [f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"]
 
@@ -216,7 +222,7 @@ class ModeShape(Tool):
         check_movable(obj, target)
         reading, operator = operator_reader(context, obj)
         mode, amplitude, phase = self.mode, self.amplitude or None, self.phase
-        repeated = self.is_repeated(context)
+        repeated, carries = self.is_repeated(context), has_splats(obj.data) and not self.animate
 
         def compute(progress):
             laplacian = operator(progress)
@@ -227,13 +233,15 @@ class ModeShape(Tool):
                 several = max(mode, min(_READY, len(reading.points) // 3))
                 cache.lowest_modes(laplacian, several, progress, raw=True)
             vector = cache.lowest_modes(laplacian, number, progress).eigenvectors[:, number - 1]
-            return reading, displace_by_mode(laplacian, vector, amplitude, phase=phase), number
+            points = displace_by_mode(laplacian, vector, amplitude, phase=phase)
+            return reading, points, number, deformation_gradients(laplacian, points) if carries else None
 
         return compute
 
     def write(self, context, obj, result):
-        reading, points, mode = result
-        key = write_positions(obj, reading, points, "SHAPE_KEY" if self.animate else self.target, f"Mode {mode}")
+        reading, points, mode, gradients = result
+        target = "SHAPE_KEY" if self.animate else self.target
+        key = write_positions(obj, reading, points, target, f"Mode {mode}", gradients)
         if self.animate:
             key.slider_min = -1.0
             scene, quarter = context.scene, 0.25 * self.period

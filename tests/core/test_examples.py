@@ -22,6 +22,7 @@ SHOWN = [
     "blue_noise_subset",
     "build_laplacian",
     "check_stability",
+    "deformation_gradients",
     "displace_by_mode",
     "estimate_areas",
     "estimate_normals",

@@ -1,0 +1,136 @@
+"""Deformation gradients: what a moved surface does to small steps around each of its points."""
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from ..arguments import check_positions
+from ..geometry import frames
+from ..rotations import nearest_rotations
+
+
+class DeformationGradients:
+    """Finds deformation gradients of a surface that is moved again and again; see `deformation_gradients`.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of the points at rest.
+
+    See Also
+    --------
+    deformation_gradients : Does it once.
+    """
+
+    def __init__(self, laplacian):
+        self._count = len(laplacian.points)
+        own = np.flatnonzero(laplacian.component >= 0)
+        self._own, self._near = own, np.arange(self._count)
+        alone = np.flatnonzero(laplacian.component < 0)
+        if len(own):
+            self._near[own] = np.arange(len(own))
+            self._near[alone] = cKDTree(laplacian.points[own]).query(laplacian.points[alone])[1]
+        rest = laplacian.points[own]
+        rest = rest - rest.mean(axis=0) if len(own) else rest
+        self._products = _step_products(laplacian.stiffness[own][:, own].tocoo(), rest)
+        self._at_rest = self._pairs(rest)
+        self._frames = np.moveaxis(frames(laplacian.normals[own]), 0, 2)  # normal, then two tangents, as columns
+
+    def _pairs(self, points):
+        """Return the sums over neighbours of w_ij (x_j - x_i)(p_j - p_i)^T, (3, 3, m), p the points at rest."""
+        return np.ascontiguousarray((self._products @ points).reshape(3, len(points), 3).transpose(2, 0, 1))
+
+    def at(self, positions):
+        """Return the gradients, (n, 3, 3), for the points after the deformation, (n, 3) [L]."""
+        now = check_positions(positions, self._count, "points after the deformation", "point")
+        if not len(self._own):
+            return np.tile(np.eye(3), (self._count, 1, 1))
+        now = now[self._own]
+        after, before = self._pairs(now - now.mean(axis=0)), self._at_rest
+        turn = nearest_rotations(after)
+        spread = np.einsum("aan->n", before)
+        size = np.einsum("abn,abn->n", turn, after) / np.where(spread > 0.0, spread, 1.0)
+        alike = size * turn  # the similarity that fits best
+        # What is left of it along the surface: the linear fit in the tangent plane, to steps less those by similarity.
+        tangents = self._frames[:, 1:]
+        left = np.einsum("abn,bcn->acn", after - np.einsum("abn,bcn->acn", alike, before), tangents)
+        inner = np.einsum("abn,bdn->adn", np.einsum("ban,bcn->acn", tangents, before), tangents)
+        slopes = np.einsum("abn,bcn->acn", left, _inverse(inner))
+        stretched = np.einsum("abn,bcn->acn", alike, tangents) + slopes
+        across = np.cross(stretched[:, 1], stretched[:, 0], axis=0)  # as `frames` orders them
+        area = np.sqrt(np.einsum("an,an->n", across, across))
+        across /= np.sqrt(np.where(area > 0.0, area, 1.0))  # as thick as the root of the area is wide
+        columns = np.stack([across, stretched[:, 0], stretched[:, 1]], axis=1)
+        return np.einsum("abn,cbn->nac", columns, self._frames)[self._near]
+
+
+def deformation_gradients(laplacian, positions):
+    """Find how a deformation maps small steps around each point.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of the points before the deformation.
+    positions : array_like, (n, 3)
+        The points after it [L].
+
+    Returns
+    -------
+    ndarray, (n, 3, 3)
+        F, so that a step s along the surface becomes F s. Across the surface, of which points tell nothing, lengths
+        change by the square root of the change of the area, and the normal stays normal: a turn, a shift and a scale of
+        all points come out to round-off. Points that belong to no surface have the F of the nearest that does.
+
+    Raises
+    ------
+    InvalidPointsError
+        Points of the wrong shape or type, or not finite.
+
+    See Also
+    --------
+    Deformer : Deforms a surface by its handles.
+    Splats.deformed : Carries ellipsoids along.
+
+    Notes
+    -----
+    The weights w are those of the stiffness, as far as they are positive. With S the sum of w (x_j - x_i)(p_j - p_i)^T,
+    the similarity s R that fits the steps best has the polar factor R of S; the linear fit in the tangent plane to what
+    it leaves is added.
+
+    Examples
+    --------
+    A sphere that is stretched to twice its length along z: steps along its equator stay, those across it double.
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> gradients = core.deformation_gradients(laplacian, points * [1, 1, 2])
+    >>> print(np.median(gradients[abs(z) < 0.05, 2, 2]).round(1))
+    2.0
+    """
+    return DeformationGradients(laplacian).at(positions)
+
+
+def _step_products(stiffness, rest):
+    """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_j - p_i)_c (x_j - x_i), p the points at rest."""
+    weight = np.where(stiffness.row != stiffness.col, np.maximum(-stiffness.data, 0.0), 0.0)
+    step = rest[stiffness.col] - rest[stiffness.row]
+    parts = []
+    for c in range(3):
+        share = weight * step[:, c]
+        part = sparse.csr_array((share, (stiffness.row, stiffness.col)), shape=stiffness.shape)
+        own = np.bincount(stiffness.row, share, minlength=len(rest))
+        parts.append(part - sparse.diags_array(own, format="csr"))
+    return sparse.vstack(parts, format="csr")
+
+
+def _inverse(matrices):
+    """Return the inverses of symmetric matrices, (2, 2, m); zero along what has no extent."""
+    (a, b), (_, d) = matrices
+    trace = a + d
+    lifted = np.where(trace > 0.0, 1e-12 * trace, 1.0)
+    a, d = a + lifted, d + lifted
+    return np.array([[d, -b], [-b, a]]) / (a * d - b * b)

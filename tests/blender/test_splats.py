@@ -1,0 +1,163 @@
+"""Gaussian splats that go with a deformation: sizes, rotations and harmonics, live, applied, baked, smoothed."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler, Matrix, Vector
+
+from tests.blender.clouds import add_group
+from tests.blender.splats import add_attribute, add_splats, bar_splats, read, shown, splats_of
+
+TURN = np.array(Euler((0.4, -0.3, 0.8)).to_matrix())
+
+
+@pytest.fixture
+def rest(core):
+    return bar_splats(core)
+
+
+def choose(obj, name, mask):
+    if obj.type == "MESH":
+        add_group(obj, name, mask)
+    else:
+        layer = obj.data.attributes.new(name, "BOOLEAN", "POINT")
+        layer.data.foreach_set("value", np.asarray(mask, dtype=bool))
+
+
+def ends(points):
+    z = points[:, 2]
+    low, high = z.min(), z.max()
+    return z > high - 0.1 * (high - low), z < low + 0.1 * (high - low)
+
+
+def bound(rest, anchors=True):
+    """An object of splats whose upper end has an empty, and that empty."""
+    obj = add_splats(rest)
+    top, bottom = ends(rest.positions)
+    choose(obj, "Handle", top)
+    if anchors:
+        choose(obj, "Anchor", bottom)
+    assert bpy.ops.meshfree.deform_bind() == {"FINISHED"}
+    return obj, next(child for child in obj.children if child.type == "EMPTY")
+
+
+def close(found, wanted, rtol=1e-5):
+    size = np.abs(wanted.covariances).max(axis=(1, 2))
+    assert (np.abs(found.covariances - wanted.covariances).max(axis=(1, 2)) <= rtol * size).all()
+    np.testing.assert_allclose(found.positions, wanted.positions, atol=1e-5)
+    np.testing.assert_allclose(found.harmonics, wanted.harmonics, atol=1e-5)
+
+
+def turned(splats, matrix, shift=(0.0, 0.0, 0.0)):
+    maps = np.tile(matrix, (len(splats), 1, 1))
+    return splats.deformed(splats.positions @ np.transpose(matrix) + np.array(shift), maps)
+
+
+def test_handles_that_are_moved_rigidly_carry_the_splats_rigidly(core, rest):
+    obj, empty = bound(rest, anchors=False)
+    empty.matrix_world = Matrix.Translation((1.0, 2.0, 3.0)) @ Matrix(TURN).to_4x4() @ empty.matrix_world
+    assert bpy.ops.meshfree.deform_update() == {"FINISHED"}
+    close(splats_of(core, shown(obj)), turned(rest, TURN, (1.0, 2.0, 3.0)))
+    close(splats_of(core, obj.data), rest)  # those at rest are as they were
+
+
+def test_an_object_that_is_placed_carries_splats_by_the_same_turn(core, rest):
+    obj = add_splats(rest)
+    obj.matrix_world = (
+        Matrix.Translation((5, 6, 7)) @ Euler((1.0, 0.5, 0.2)).to_matrix().to_4x4() @ Matrix.Scale(3.0, 4)
+    )
+    bpy.context.view_layer.update()
+    choose(obj, "Handle", ends(rest.positions)[0])
+    assert bpy.ops.meshfree.deform_bind() == {"FINISHED"}
+    empty = next(child for child in obj.children if child.type == "EMPTY")
+    local = Matrix(TURN).to_4x4()
+    empty.matrix_world = obj.matrix_world @ local @ obj.matrix_world.inverted() @ empty.matrix_world
+    assert bpy.ops.meshfree.deform_update() == {"FINISHED"}
+    close(splats_of(core, shown(obj)), turned(rest, TURN))
+
+
+def test_a_bent_bar_is_carried_as_core_does_it(core, rest):
+    obj, empty = bound(rest)
+    empty.matrix_world = Matrix.Translation((0.0, 1.0, 0.0)) @ Matrix.Rotation(0.7, 4, "X") @ empty.matrix_world
+    assert bpy.ops.meshfree.deform_update() == {"FINISHED"}
+    found = splats_of(core, shown(obj))
+    laplacian = core.build_laplacian(rest.positions.astype(float))
+    gradients = core.Deformer(laplacian, *ends(rest.positions)).gradients(found.positions.astype(float))
+    close(found, rest.deformed(found.positions, gradients), 1e-4)
+
+
+def test_half_of_the_strength_shows_splats_half_way(core, rest, modifiers):
+    obj, empty = bound(rest, anchors=False)
+    empty.matrix_world = Matrix(TURN).to_4x4() @ empty.matrix_world
+    bpy.ops.meshfree.deform_update()
+    item = next(item for item in obj.modifiers if item.name == "Mesh-Free Deform")
+    modifiers.set_input(item, "Strength", 0.5)
+    obj.update_tag()
+    half = np.array(Matrix(TURN).to_quaternion().slerp((1, 0, 0, 0), 0.5).to_matrix())
+    found = splats_of(core, shown(obj))
+    np.testing.assert_allclose(found.covariances, turned(rest, half).covariances, atol=1e-6)
+    assert bpy.ops.meshfree.deform_apply() == {"FINISHED"}
+    np.testing.assert_allclose(splats_of(core, obj.data).covariances, found.covariances, atol=1e-7)
+
+
+def test_apply_keeps_what_is_shown(core, rest):
+    obj, empty = bound(rest)
+    empty.location += Vector((0.0, 1.0, 0.5))
+    bpy.ops.meshfree.deform_update()
+    before = splats_of(core, shown(obj))
+    assert bpy.ops.meshfree.deform_apply() == {"FINISHED"}
+    close(splats_of(core, obj.data), before)
+    close(splats_of(core, shown(obj)), before)
+    assert not [layer.name for layer in obj.data.attributes if layer.name.startswith("lb_splat_")]
+
+
+@pytest.mark.parametrize("way", ["deform_reset", "deform_unbind"])
+def test_splats_go_back_to_rest(core, rest, way):
+    obj, empty = bound(rest)
+    empty.location += Vector((0.0, 1.0, 0.5))
+    bpy.ops.meshfree.deform_update()
+    assert getattr(bpy.ops.meshfree, way)() == {"FINISHED"}
+    close(splats_of(core, shown(obj)), rest)
+    assert not [layer.name for layer in obj.data.attributes if layer.name.startswith("lb_splat_")]
+
+
+def test_a_bake_shows_the_splats_of_each_frame(core, rest):
+    obj, empty = bound(rest, anchors=False)
+    scene = bpy.context.scene
+    for frame, angle in ((1, 0.0), (3, 1.0)):
+        empty.rotation_euler = (angle, 0.0, 0.0)
+        empty.keyframe_insert("rotation_euler", frame=frame)
+    seen = {}
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        seen[frame] = splats_of(core, shown(obj))
+    scene.frame_set(2)
+    assert bpy.ops.meshfree.deform_bake(first=1, last=3) == {"FINISHED"}
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        found = splats_of(core, shown(obj))
+        np.testing.assert_allclose(found.covariances, seen[frame].covariances, atol=1e-7)
+        np.testing.assert_allclose(found.positions, seen[frame].positions, atol=1e-5)
+    assert np.abs(seen[3].covariances - seen[1].covariances).max() > 1e-3
+    assert bpy.ops.meshfree.deform_free() == {"FINISHED"}
+    close(splats_of(core, shown(obj)), seen[3])
+
+
+@pytest.mark.parametrize("name", ["smooth", "mode_shape"])
+def test_smoothed_points_carry_their_splats(core, rest, name):
+    obj = add_splats(rest)
+    assert getattr(bpy.ops.meshfree, name)(target="IN_PLACE") == {"FINISHED"}
+    found = splats_of(core, obj.data)
+    assert np.abs(found.positions - rest.positions).max() > 1e-3
+    laplacian = core.build_laplacian(rest.positions.astype(float))
+    wanted = rest.deformed(found.positions, core.deformation_gradients(laplacian, found.positions.astype(float)))
+    close(found, wanted, 1e-4)
+
+
+def test_points_that_are_no_splats_get_no_attributes_of_such(rest):
+    obj = add_splats(rest)
+    obj.data.attributes.remove(obj.data.attributes["rotation"])
+    add_attribute(obj.data, "rotation", "FLOAT_VECTOR", rest.scales)  # of another type
+    before = read(obj.data, "scale")
+    assert bpy.ops.meshfree.smooth(target="IN_PLACE") == {"FINISHED"}
+    np.testing.assert_array_equal(read(obj.data, "scale"), before)
