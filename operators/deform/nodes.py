@@ -92,14 +92,9 @@ def _live_group(kind, carried):
         y = -400 * number
         stored = _attribute(group, source, data_type, 7, y)
         at_rest = _attribute(group, target, data_type, 7, y - 150)
-        there = add_node(group, "GeometryNodeSwitch", 8, y, input_type=_KINDS[data_type])
-        for output, place in (
-            (stored.outputs["Exists"], "Switch"),
-            (at_rest.outputs["Attribute"], "False"),
-            (stored.outputs["Attribute"], "True"),
-        ):
-            group.links.new(output, there.inputs[place])
-        geometry = _replace(group, geometry, target, data_type, there.outputs["Output"], strength, y)
+        ends = at_rest.outputs["Attribute"], stored.outputs["Attribute"]
+        value = _choose(group, stored.outputs["Exists"], *ends, data_type, 8, y)
+        geometry = _replace(group, geometry, target, data_type, value, strength, y)
     _place(group, geometry, strength, displacement.outputs["Attribute"])
     return group
 
@@ -179,7 +174,21 @@ def _attribute(group, name, data_type, column, y):
 def _replace(group, geometry, target, data_type, value, strength, y):
     """Add nodes that mix an attribute with what takes its place; return the geometry."""
     before = _attribute(group, target, data_type, 9, y - 150).outputs["Attribute"]
-    return _store(group, geometry, target, data_type, _mix(group, strength, (before, value), data_type, y), y)
+    mixed = _mix(group, strength, (before, value), data_type, y)
+    # In full it is taken as it is: the mix of Blender 5.2 leaves out turns of less than about 1e-4.
+    full = add_node(group, "FunctionNodeCompare", 10, y - 150, data_type="FLOAT", operation="GREATER_EQUAL")
+    full.inputs["B"].default_value = 1.0
+    group.links.new(strength, full.inputs["A"])
+    chosen = _choose(group, full.outputs["Result"], mixed, value, data_type, 11, y)
+    return _store(group, geometry, target, data_type, chosen, y)
+
+
+def _choose(group, switch, off, on, data_type, column, y):
+    """Add a node that chooses one of two values of a type; return its socket."""
+    node = add_node(group, "GeometryNodeSwitch", column, y, input_type=_KINDS[data_type])
+    for source, name in ((switch, "Switch"), (off, "False"), (on, "True")):
+        group.links.new(source, node.inputs[name])
+    return node.outputs["Output"]
 
 
 def _mix(group, share, ends, data_type, y):
