@@ -3,14 +3,23 @@
 import bpy
 
 from ..operators.deform.binding import handled_object
-from ..operators.objects.attributes import APPLICATIONS, DISC, RESULTS, eigenvector_name, mode_number, point_count
-from ..operators.objects.modifiers import is_own, is_sequence
+from ..operators.objects.attributes import (
+    ALONG_SURFACE,
+    APPLICATIONS,
+    DISC,
+    RESULTS,
+    eigenvector_name,
+    mode_number,
+    point_count,
+)
+from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
 from ..operators.running.job import running
 from .dialogs import draw_setting
 from .display import find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
+from .nodes import LENGTH
 
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
@@ -222,6 +231,10 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
             layout.prop(obj.meshfree, "component")
+            if shown in ALONG_SURFACE:
+                layout.prop(obj.meshfree, "strokes")
+                if has_input(find_display(obj).node_group, LENGTH):
+                    layout.prop(*input_property(find_display(obj), LENGTH), text=LENGTH)
         if range_node(obj) is not None:
             _draw_colors(layout, obj)
         if DISC in attributes:

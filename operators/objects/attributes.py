@@ -48,6 +48,7 @@ DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
+ALONG_SURFACE = DIRECTION, DIRECTION_1
 # Of every analysis, as in the panel.
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT, TRUST
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
