@@ -24,6 +24,12 @@ from .nodes import LENGTH
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
+_TASKS = (  # that one click does, each with its defaults
+    ("smooth", "Clean"),
+    ("segment", "Segment"),
+    ("principal_curvatures", "Curvature"),
+    ("deform_bind", "Bend"),
+)
 _SETTINGS = (  # what belongs together
     ("boundary", "boundary_group", "sheets", "projection"),
     ("bandwidth", "neighbors", "bandwidth_factor"),
@@ -84,9 +90,9 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             _draw_result(layout, obj.meshfree)
             if is_stale(obj, glance=True):
                 layout.label(text="Points or settings changed: analyze again", icon="ERROR")
-        row = layout.row(align=True)  # of tasks that one click does, each with its defaults
-        for name, text in (("smooth", "Clean"), ("segment", "Segment"), ("principal_curvatures", "Curvature")):
-            row.operator(f"meshfree.{name}", text=text).at_once = True
+        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+        for name, text in _TASKS:
+            grid.operator(f"meshfree.{name}", text=text).at_once = True
 
 
 def _draw_job(layout, job):
