@@ -112,11 +112,11 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
             rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
         make = live.plan_factors(obj, rest, reading.matrix, constraints)
-        return lambda progress: (make(progress), by_empty)
+        return lambda progress: (make(progress), by_empty, False)
 
     def write(self, context, obj, result):
-        made, by_empty = result
-        if self.at_once and not handle_names(obj):
+        made, by_empty, chosen = result
+        if chosen:
             _assign_ends(obj, made.constraints)
         items = obj.meshfree.deform.handle_items
         kept = {item.name: (item.empty, tuple(item.rest)) for item in items if item.has_empty and is_there(item.empty)}
@@ -140,7 +140,8 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False)
         live.update(obj, waits=bpy.app.background)
         moved, stay = len(made.constraints.moved), len(made.constraints.kept)
-        way = f'Move "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
+        press = "Press G or R to move" if self.at_once else "Move"
+        way = f'{press} "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
         return [*made.follower.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
 
     def conclude(self, context, objects):
@@ -181,11 +182,13 @@ def _plan_ends(context, obj):
 
     rest = reading.local(reading.points).astype(np.float32)
     make = live.plan_factors(obj, rest, reading.matrix, choose)
-    return lambda progress: (make(progress), [True])
+    return lambda progress: (make(progress), [True], True)
 
 
 def _assign_ends(obj, constraints):
     """Make the groups of handles and anchors that `_plan_ends` has chosen, where they are not there."""
+    if handle_names(obj):  # while it was computed
+        raise PointCloudError(f'"{obj.name}" has handles by now. Press Bend again to take these.')
     settings, every = obj.meshfree.deform, np.arange(point_count(obj.data))
     settings.anchors = settings.anchors or ANCHOR
     assign(obj, constraints.names[0], np.isin(every, constraints.moved), "REPLACE", 1.0)

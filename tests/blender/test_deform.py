@@ -1210,6 +1210,20 @@ class TestAtOnce:
             bpy.ops.meshfree.deform_bind()
         assert everything(pole) == before
 
+    def test_anchors_all_over_leave_no_handle(self, pole):
+        add_group(pole, "Anchor", np.ones(720, dtype=bool))
+        before = everything(pole)
+        with pytest.raises(RuntimeError, match="Error"):
+            bpy.ops.meshfree.deform_bind(at_once=True)
+        assert everything(pole) == before
+
+    def test_clouds_of_a_few_points(self):
+        obj = add_object(np.eye(4)[:, :3])
+        before = everything(obj)
+        with pytest.raises(RuntimeError, match="Error"):
+            bpy.ops.meshfree.deform_bind(at_once=True)
+        assert everything(obj) == before
+
     def test_names_that_attributes_have(self, pole):
         pole.data.attributes.new("Anchor", "FLOAT", "POINT")
         before = everything(pole)
