@@ -11,7 +11,8 @@ from .value_range import CLASSES, STEPPED
 
 MOST = "Viewport Points"  # input of the display: how many it draws there
 DISCS = "Discs"  # another: whether it draws discs
-STROKES, LENGTH = "Strokes", "Stroke Length"  # two more: the attribute that has strokes, and how long these are
+STROKES = "Strokes"  # another: the attribute that has them
+LENGTH, INK = "Stroke Length", "Stroke Material"  # others: what they look like
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
 BACK = "Back Side"  # another: how dark what is seen from behind is
@@ -24,6 +25,7 @@ _APART = 0.5  # how far strokes are apart, in their lengths
 _LIFTED = 0.2  # how far they lie above the surface, in radii of the points
 _CELLS = 256.0  # of the grid that spreads strokes, along each axis, beyond which it repeats: single precision tells
 _INK = (0.012, 0.012, 0.016, 1.0)  # color of strokes
+_INK_TAG = "meshfree_strokes"  # custom property of the material of strokes
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
@@ -53,6 +55,7 @@ def display_group():
     )
     length = add_input(group, LENGTH, "Float", "Length of the strokes, 1 for a fortieth of the object")
     length.default_value, length.min_value = 1.0, 0.0
+    add_input(group, INK, "Material", "Color of the strokes")
 
     given = add_node(group, "NodeGroupInput", 0, 0)
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
@@ -218,12 +221,12 @@ def _stroked(group, given, points):
     lifted = add_node(group, "GeometryNodeSetPosition", 19, -1500)
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 20, -1500)
     inked = add_node(group, "GeometryNodeSetMaterial", 23, -1500)
-    inked.inputs["Material"].default_value = _ink()
     for source, target in (
         (given.outputs[STROKES], next(item for item in asked.inputs if item.name == "A" and item.type == "STRING")),
         (asked.outputs["Result"], some.inputs["Switch"]),
         (points, some.inputs["True"]),
         (given.outputs[STROKES], direction.inputs["Name"]),
+        (given.outputs[INK], inked.inputs["Material"]),
         (direction.outputs["Attribute"], size.inputs[0]),
         (some.outputs["Output"], box.inputs["Geometry"]),
         (box.outputs["Min"], diagonal.inputs[0]),
@@ -257,9 +260,13 @@ def _stroked(group, given, points):
     return inked.outputs["Geometry"]
 
 
-def _ink():
-    """Make the material of strokes, which reads alike in every light."""
+def stroke_material():
+    """Return the material that all strokes share, which reads alike in every light."""
+    for material in bpy.data.materials:
+        if _INK_TAG in material and material.library is None:
+            return material
     material = bpy.data.materials.new("Mesh-Free Strokes")
+    material[_INK_TAG] = True
     material.diffuse_color = _INK  # in Solid
     tree = new_tree(material)
     emission = add_node(tree, "ShaderNodeEmission", 0, 0)

@@ -33,6 +33,7 @@ from .display import (
 )
 from .nodes import (
     DISCS,
+    INK,
     MOST,
     STROKES,
     color_by_checker,
@@ -42,6 +43,7 @@ from .nodes import (
     dim_back,
     display_group,
     is_plain,
+    stroke_material,
 )
 from .value_range import fit_range
 
@@ -203,7 +205,10 @@ def reshape(obj):
         if has_input(group, DISCS):
             set_input(modifier, DISCS, turned and obj.meshfree.point_shape == "DISCS")
         if has_input(group, STROKES):
-            set_input(modifier, STROKES, shown_attribute(obj) if turned and _has_strokes(obj) else "")
+            stroked = turned and _has_strokes(obj)
+            set_input(modifier, STROKES, shown_attribute(obj) if stroked else "")
+            if stroked and get_input(modifier, INK) is None:  # else one of the user's choice stays
+                set_input(modifier, INK, stroke_material())
     obj.update_tag()
 
 
