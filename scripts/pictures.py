@@ -88,6 +88,13 @@ def shape_index(path):
     single(obj, "lb_shape_index", path)
 
 
+def curvature_direction(path):
+    """Where the shape bends most: around its arms, and through the valleys between them."""
+    obj = coral()
+    bpy.ops.meshfree.principal_curvatures(display="DIRECTION")
+    single(obj, "lb_direction_1", path)
+
+
 def roughness(path):
     """The roughness of the shape, with noise between two heights."""
     points, places = demo.Coral().sample(demo.POINTS), np.random.default_rng(1)
@@ -287,6 +294,7 @@ PICTURES = {
     "mesh": mesh,
     "compare": compare,
     "shape_index": shape_index,
+    "curvature_direction": curvature_direction,
     "roughness": roughness,
     "orient": orient,
     "signature": signature,

@@ -154,6 +154,7 @@ def color(gui):
     gui.wait_until(WORKING)
     gui.wait_until(f"not {WORKING}", 120)
     scroll(gui, 40)
+    scroll(gui, -3)  # back to the names of results, above the end
     gui.press('meshfree.colormap(attribute="lb_mean_curvature"')
 
 

@@ -1,4 +1,4 @@
-"""The node trees that make values visible: round points or discs for vertices, and colours for values."""
+"""The node trees that make values visible: round points or discs for vertices, strokes, and colours for values."""
 
 import math
 
@@ -11,11 +11,21 @@ from .value_range import CLASSES, STEPPED
 
 MOST = "Viewport Points"  # input of the display: how many it draws there
 DISCS = "Discs"  # another: whether it draws discs
+STROKES = "Strokes"  # another: the attribute that has them
+LENGTH, INK = "Stroke Length", "Stroke Material"  # others: what they look like
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
 BACK = "Back Side"  # another: how dark what is seen from behind is
 _SIDES = 8  # of a disc
 _SLOPE = 0.25  # by which discs fall off from their points, so that each place shows the point nearest to it
+_SHARE = 1.0 / 40.0  # length of strokes in the diagonal of the object, so that they are seen where all of it is
+_LEAST = 2.0  # that length in radii of the points at least
+_SLIM = 0.16  # width of a stroke in its length
+_APART = 0.5  # how far strokes are apart, in their lengths
+_LIFTED = 0.2  # how far they lie above the surface, in radii of the points
+_CELLS = 256.0  # of the grid that spreads strokes, along each axis, beyond which it repeats: single precision tells
+_INK = (0.012, 0.012, 0.016, 1.0)  # color of strokes
+_INK_TAG = "meshfree_strokes"  # custom property of the material of strokes
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
@@ -29,7 +39,7 @@ _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 def display_group():
     """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
-        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, DISCS):
+        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, STROKES):
             return group
     group = new_group("Mesh-Free Display", DISPLAY_TAG)
     radius = add_input(group, "Radius", "Float", "Size of the points")
@@ -40,6 +50,12 @@ def display_group():
     most = add_input(group, MOST, "Int", "How many points the viewport draws at most, larger ones then; 0 for all")
     most.min_value = 0
     add_input(group, DISCS, "Bool", f"Draw discs that lie in the surface, as the attribute {DISC} says")
+    add_input(
+        group, STROKES, "String", "Attribute with directions along the surface, which strokes show; empty for none"
+    )
+    length = add_input(group, LENGTH, "Float", "Length of the strokes, 1 for a fortieth of the object")
+    length.default_value, length.min_value = 1.0, 0.0
+    add_input(group, INK, "Material", "Color of the strokes")
 
     given = add_node(group, "NodeGroupInput", 0, 0)
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
@@ -55,7 +71,8 @@ def display_group():
     every = add_node(group, "GeometryNodeJoinGeometry", 5, -200)
     joined = add_node(group, "GeometryNodeJoinGeometry", 10, 0)
     colored = add_node(group, "GeometryNodeSetMaterial", 11, 0)
-    result = add_node(group, "NodeGroupOutput", 12, 0)
+    drawn_over = add_node(group, "GeometryNodeJoinGeometry", 12, 0)
+    result = add_node(group, "NodeGroupOutput", 13, 0)
     compared = next(socket for socket in loose.inputs if socket.name == "A" and socket.type == "INT")
     for source, target in (
         (neighbors.outputs["Face Count"], compared),
@@ -79,7 +96,9 @@ def display_group():
         (faces.outputs["Geometry"], joined.inputs["Geometry"]),
         (joined.outputs["Geometry"], colored.inputs["Geometry"]),
         (given.outputs["Material"], colored.inputs["Material"]),
-        (colored.outputs["Geometry"], result.inputs["Geometry"]),
+        (colored.outputs["Geometry"], drawn_over.inputs["Geometry"]),
+        (_stroked(group, given, every.outputs["Geometry"]), drawn_over.inputs["Geometry"]),
+        (drawn_over.outputs["Geometry"], result.inputs["Geometry"]),
     ):
         group.links.new(source, target)
     return group
@@ -124,10 +143,6 @@ def _shaped(group, given, points, size):
     turned = add_node(group, "FunctionNodeAlignRotationToVector", 6, -500, axis="Z")
     length = add_node(group, "ShaderNodeVectorMath", 6, -900, operation="LENGTH")
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -300)
-    realized = add_node(group, "GeometryNodeRealizeInstances", 8, -300)
-    marked = add_node(group, "GeometryNodeStoreNamedAttribute", 8, -500, data_type="BOOLEAN")
-    marked.inputs["Name"].default_value = CORNER
-    next(socket for socket in marked.inputs if socket.name == "Value" and socket.type == "BOOLEAN").default_value = True
     chosen = add_node(group, "GeometryNodeSwitch", 9, -200, input_type="GEOMETRY")
     unknown = _math(group, 7, -1300, "LESS_THAN", length.outputs["Value"], 1e-6)  # of points added since: like a dot
     scale = _math(group, 7, -900, "MULTIPLY", _math(group, 7, -1100, "ADD", length.outputs["Value"], unknown), size)
@@ -139,14 +154,126 @@ def _shaped(group, given, points, size):
         (lowered.outputs["Geometry"], placed.inputs["Instance"]),
         (turned.outputs["Rotation"], placed.inputs["Rotation"]),
         (scale, placed.inputs["Scale"]),
-        (placed.outputs["Instances"], realized.inputs["Geometry"]),
         (given.outputs[DISCS], chosen.inputs["Switch"]),
         (points, chosen.inputs["False"]),
-        (realized.outputs["Geometry"], marked.inputs["Geometry"]),
-        (marked.outputs["Geometry"], chosen.inputs["True"]),
+        (_corners(group, 8, -300, placed.outputs["Instances"]), chosen.inputs["True"]),
     ):
         group.links.new(source, target)
     return chosen.outputs["Output"]
+
+
+def _corners(group, column, y, instances):
+    """Add the nodes that make instances real, and mark their corners, which are no points."""
+    realized = add_node(group, "GeometryNodeRealizeInstances", column, y)
+    marked = add_node(group, "GeometryNodeStoreNamedAttribute", column, y - 200, data_type="BOOLEAN")
+    marked.inputs["Name"].default_value = CORNER
+    next(socket for socket in marked.inputs if socket.name == "Value" and socket.type == "BOOLEAN").default_value = True
+    group.links.new(instances, realized.inputs["Geometry"])
+    group.links.new(realized.outputs["Geometry"], marked.inputs["Geometry"])
+    return marked.outputs["Geometry"]
+
+
+def _stroked(group, given, points):
+    """Add the nodes that draw directions along the surface as strokes a little above it; return the strokes.
+
+    All strokes would hide each other where points are many. So of the points in each cell of a grid the first one that
+    has a direction has a stroke, which points along it.
+    """
+    asked = add_node(group, "FunctionNodeCompare", 5, -1500, data_type="STRING", operation="NOT_EQUAL")
+    some = add_node(group, "GeometryNodeSwitch", 6, -1500, input_type="GEOMETRY")  # else nothing below costs any time
+    direction = add_node(group, "GeometryNodeInputNamedAttribute", 6, -1700, data_type="FLOAT_VECTOR")
+    disc = add_node(group, "GeometryNodeInputNamedAttribute", 6, -1900, data_type="FLOAT_VECTOR")
+    disc.inputs["Name"].default_value = DISC
+    size = add_node(group, "ShaderNodeVectorMath", 7, -1700, operation="LENGTH")
+    there = _math(group, 8, -1700, "GREATER_THAN", size.outputs["Value"], 1e-6)
+    box = add_node(group, "GeometryNodeBoundBox", 7, -1500)
+    for radius in box.inputs[1:]:  # which Blender 4.2 cannot leave out
+        radius.default_value = False
+    diagonal = add_node(group, "ShaderNodeVectorMath", 8, -1500, operation="DISTANCE")
+    share = _math(group, 9, -1500, "MULTIPLY", diagonal.outputs["Value"], _SHARE)
+    least = _math(group, 9, -1300, "MULTIPLY", given.outputs["Radius"], _LEAST)
+    length = _math(
+        group, 11, -1500, "MULTIPLY", _math(group, 10, -1500, "MAXIMUM", share, least), given.outputs[LENGTH]
+    )
+
+    place = add_node(group, "GeometryNodeInputPosition", 8, -2100)
+    offset = add_node(group, "ShaderNodeVectorMath", 9, -2100, operation="SUBTRACT")
+    cell = add_node(group, "ShaderNodeVectorMath", 12, -2100, operation="SCALE")
+    whole = add_node(group, "ShaderNodeVectorMath", 13, -2100, operation="FLOOR")
+    kept = add_node(group, "ShaderNodeVectorMath", 14, -2100, operation="MODULO")
+    kept.inputs[1].default_value = (_CELLS,) * 3
+    number = add_node(group, "ShaderNodeVectorMath", 15, -2100, operation="DOT_PRODUCT")
+    number.inputs[1].default_value = 1.0, _CELLS, _CELLS**2
+    before = add_node(group, "GeometryNodeAccumulateField", 16, -1900, data_type="FLOAT", domain="POINT")
+    first = _math(
+        group, 18, -1900, "MULTIPLY", _math(group, 17, -1900, "LESS_THAN", before.outputs["Trailing"], 0.5), there
+    )
+
+    stroke = add_node(group, "GeometryNodeMeshCircle", 12, -2500, fill_type="NGON")  # a triangle, its first corner at x
+    stroke.inputs["Vertices"].default_value = 3
+    slim = add_node(group, "GeometryNodeTransform", 13, -2500)
+    slim.inputs["Scale"].default_value = 1.0 / 1.5, _SLIM / math.sqrt(3.0), 1.0
+    slim.inputs["Translation"].default_value = -0.25 / 1.5, 0.0, 0.0  # its middle
+    along = add_node(group, "FunctionNodeAlignRotationToVector", 12, -2300, axis="X")
+    flat = add_node(group, "FunctionNodeAlignRotationToVector", 13, -2300, axis="Z", pivot_axis="X")
+    unit = add_node(group, "ShaderNodeVectorMath", 17, -2300, operation="NORMALIZE")
+    above = add_node(group, "ShaderNodeVectorMath", 18, -2300, operation="SCALE")
+    lifted = add_node(group, "GeometryNodeSetPosition", 19, -1500)
+    placed = add_node(group, "GeometryNodeInstanceOnPoints", 20, -1500)
+    inked = add_node(group, "GeometryNodeSetMaterial", 23, -1500)
+    for source, target in (
+        (given.outputs[STROKES], next(item for item in asked.inputs if item.name == "A" and item.type == "STRING")),
+        (asked.outputs["Result"], some.inputs["Switch"]),
+        (points, some.inputs["True"]),
+        (given.outputs[STROKES], direction.inputs["Name"]),
+        (given.outputs[INK], inked.inputs["Material"]),
+        (direction.outputs["Attribute"], size.inputs[0]),
+        (some.outputs["Output"], box.inputs["Geometry"]),
+        (box.outputs["Min"], diagonal.inputs[0]),
+        (box.outputs["Max"], diagonal.inputs[1]),
+        (place.outputs["Position"], offset.inputs[0]),
+        (box.outputs["Min"], offset.inputs[1]),
+        (offset.outputs[0], cell.inputs[0]),
+        (_math(group, 11, -2100, "DIVIDE", 1.0 / _APART, length), cell.inputs["Scale"]),
+        (cell.outputs[0], whole.inputs[0]),
+        (whole.outputs[0], kept.inputs[0]),
+        (kept.outputs[0], number.inputs[0]),
+        (there, before.inputs[0]),
+        (number.outputs["Value"], before.inputs["Group ID"]),
+        (direction.outputs["Attribute"], along.inputs["Vector"]),
+        (along.outputs["Rotation"], flat.inputs["Rotation"]),
+        (disc.outputs["Attribute"], flat.inputs["Vector"]),
+        (disc.outputs["Attribute"], unit.inputs[0]),
+        (unit.outputs[0], above.inputs[0]),
+        (_math(group, 17, -2500, "MULTIPLY", given.outputs["Radius"], _LIFTED), above.inputs["Scale"]),
+        (some.outputs["Output"], lifted.inputs["Geometry"]),
+        (above.outputs[0], lifted.inputs["Offset"]),
+        (lifted.outputs["Geometry"], placed.inputs["Points"]),
+        (first, placed.inputs["Selection"]),
+        (stroke.outputs["Mesh"], slim.inputs["Geometry"]),
+        (slim.outputs["Geometry"], placed.inputs["Instance"]),
+        (flat.outputs["Rotation"], placed.inputs["Rotation"]),
+        (length, placed.inputs["Scale"]),
+        (_corners(group, 21, -1500, placed.outputs["Instances"]), inked.inputs["Geometry"]),
+    ):
+        group.links.new(source, target)
+    return inked.outputs["Geometry"]
+
+
+def stroke_material():
+    """Return the material that all strokes share, which reads alike in every light."""
+    for material in bpy.data.materials:
+        if _INK_TAG in material and material.library is None:
+            return material
+    material = bpy.data.materials.new("Mesh-Free Strokes")
+    material[_INK_TAG] = True
+    material.diffuse_color = _INK  # in Solid
+    tree = new_tree(material)
+    emission = add_node(tree, "ShaderNodeEmission", 0, 0)
+    emission.inputs["Color"].default_value = _INK
+    output = add_node(tree, "ShaderNodeOutputMaterial", 1, 0)
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    return material
 
 
 def color_plain(material, groups):

@@ -3,18 +3,33 @@
 import bpy
 
 from ..operators.deform.binding import handled_object
-from ..operators.objects.attributes import APPLICATIONS, DISC, RESULTS, eigenvector_name, mode_number, point_count
-from ..operators.objects.modifiers import is_own, is_sequence
+from ..operators.objects.attributes import (
+    ALONG_SURFACE,
+    APPLICATIONS,
+    DISC,
+    RESULTS,
+    eigenvector_name,
+    mode_number,
+    point_count,
+)
+from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
 from ..operators.running.job import running
 from .dialogs import draw_setting
 from .display import find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
+from .nodes import LENGTH
 
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
+_TASKS = (  # that one click does, each with its defaults
+    ("smooth", "Clean"),
+    ("segment", "Segment"),
+    ("principal_curvatures", "Curvature"),
+    ("deform_bind", "Bend"),
+)
 _SETTINGS = (  # what belongs together
     ("boundary", "boundary_group", "sheets", "projection"),
     ("bandwidth", "neighbors", "bandwidth_factor"),
@@ -75,9 +90,9 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             _draw_result(layout, obj.meshfree)
             if is_stale(obj, glance=True):
                 layout.label(text="Points or settings changed: analyze again", icon="ERROR")
-        row = layout.row(align=True)  # of tasks that one click does, each with its defaults
-        for name, text in (("smooth", "Clean"), ("segment", "Segment"), ("principal_curvatures", "Curvature")):
-            row.operator(f"meshfree.{name}", text=text).at_once = True
+        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+        for name, text in _TASKS:
+            grid.operator(f"meshfree.{name}", text=text).at_once = True
 
 
 def _draw_job(layout, job):
@@ -222,6 +237,10 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
             layout.prop(obj.meshfree, "component")
+            if shown in ALONG_SURFACE:
+                layout.prop(obj.meshfree, "strokes")
+                if has_input(find_display(obj).node_group, LENGTH):
+                    layout.prop(*input_property(find_display(obj), LENGTH), text=LENGTH)
         if range_node(obj) is not None:
             _draw_colors(layout, obj)
         if DISC in attributes:

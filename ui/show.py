@@ -8,7 +8,14 @@ import numpy as np
 
 from ..operators.deform.binding import positions_now
 from ..operators.deform.nodes import find_deform
-from ..operators.objects.attributes import DEVIATION, DISC, MEAN_CURVATURE, SIGNED_DISTANCE, read_attribute
+from ..operators.objects.attributes import (
+    ALONG_SURFACE,
+    DEVIATION,
+    DISC,
+    MEAN_CURVATURE,
+    SIGNED_DISTANCE,
+    read_attribute,
+)
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
@@ -26,7 +33,9 @@ from .display import (
 )
 from .nodes import (
     DISCS,
+    INK,
     MOST,
+    STROKES,
     color_by_checker,
     color_by_direction,
     color_by_number,
@@ -34,6 +43,7 @@ from .nodes import (
     dim_back,
     display_group,
     is_plain,
+    stroke_material,
 )
 from .value_range import fit_range
 
@@ -69,8 +79,8 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
         set_input(modifier, "Radius", radius)
     elif new or not _sized_by_hand(obj):
         resize(obj)
-    reshape(obj)
     _color(obj, name, values)
+    reshape(obj)
 
 
 def _add_display(obj):
@@ -81,11 +91,12 @@ def _add_display(obj):
         modifier = obj.modifiers.new(NAME, "NODES")
         modifier.node_group = display_group()
         set_input(modifier, MOST, viewport_points())
-    elif not has_input(modifier.node_group, DISCS):  # of an earlier version
-        radius, material = (get_input(modifier, name) for name in ("Radius", "Material"))
+    elif not has_input(modifier.node_group, STROKES):  # of an earlier version
+        names = [name for name in ("Radius", "Material", MOST) if has_input(modifier.node_group, name)]
+        kept = {name: get_input(modifier, name) for name in names}
         modifier.node_group = display_group()
-        set_input(modifier, "Radius", radius)
-        set_input(modifier, "Material", material)
+        for name, value in kept.items():
+            set_input(modifier, name, value)
     modifier.use_pin_to_last = True
     obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
     return modifier, new
@@ -103,6 +114,7 @@ def recolor(obj):
     if not name or name not in obj.data.attributes:
         return
     _color(obj, name, read_attribute(obj.data, name))
+    reshape(obj)
 
 
 def show_groups(obj):
@@ -186,12 +198,24 @@ def resize(obj):
 
 
 def reshape(obj):
-    """Draw discs where that is chosen and they are known; while handles move the points, dots, which need no turn."""
+    """Draw discs and strokes where chosen and known; while handles move the points, dots, which need no turn."""
     modifier = find_display(obj)
-    if modifier is not None and has_input(modifier.node_group, DISCS):
-        chosen = obj.meshfree.point_shape == "DISCS" and DISC in obj.data.attributes
-        set_input(modifier, DISCS, chosen and find_deform(obj) is None)
+    if modifier is not None:
+        group, turned = modifier.node_group, DISC in obj.data.attributes and find_deform(obj) is None
+        if has_input(group, DISCS):
+            set_input(modifier, DISCS, turned and obj.meshfree.point_shape == "DISCS")
+        if has_input(group, STROKES):
+            stroked = turned and _has_strokes(obj)
+            set_input(modifier, STROKES, shown_attribute(obj) if stroked else "")
+            if stroked and get_input(modifier, INK) is None:  # else one of the user's choice stays
+                set_input(modifier, INK, stroke_material())
     obj.update_tag()
+
+
+def _has_strokes(obj):
+    """Whether strokes are to show what is on show."""
+    settings, name = obj.meshfree, shown_attribute(obj)
+    return settings.strokes and name in ALONG_SURFACE and component(name, settings) == "DIRECTION"
 
 
 def _radius(settings):

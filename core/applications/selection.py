@@ -1,4 +1,4 @@
-"""Sets of points: grown by distance along the cloud."""
+"""Sets of points: grown by distance along the cloud, and around its ends."""
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
@@ -66,3 +66,74 @@ def grow(laplacian, chosen, distance):
         return mask.copy()
     way = dijkstra(graph.lengths, directed=False, indices=start, min_only=True, limit=reach)
     return mask | graph.scatter(np.isfinite(way), False)
+
+
+def opposite_ends(laplacian, share=0.03):
+    """Choose the points around both ends of the longest way along the surface, on its largest component.
+
+    From anywhere the point that is farthest along the surface is such an end, and the one that is farthest from there
+    is the other; so it is exactly on trees, and nearly on surfaces (the double sweep of graph diameters).
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+    share : float
+        Area around each end, as a share of that of the component; above 0, up to 1/4. Three points at least.
+
+    Returns
+    -------
+    ndarray, (k,) int
+        Points around one end, in ascending order.
+    ndarray, (l,) int
+        Points around the other; none is in both.
+
+    Raises
+    ------
+    PointCloudError
+        A share out of these bounds, or too few points at different places.
+
+    See Also
+    --------
+    grow : Adds points within a distance to a set.
+    Deformer : Moves one end while the other stays.
+
+    Examples
+    --------
+    On the unit sphere opposite ends are caps around opposite points:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> laplacian = core.build_laplacian(points)
+    >>> one, other = core.opposite_ends(laplacian, share=0.05)
+    >>> print((points[one].mean(axis=0) @ points[other].mean(axis=0)).round(1))
+    -0.9
+    """
+    if not 0.0 < real(share) <= 0.25:
+        raise PointCloudError(f"The share of the area at each end is {share!r}. Use a number above 0, up to 0.25.")
+    component, areas = laplacian.component, laplacian.areas
+    known = component >= 0
+    largest = np.flatnonzero(component == np.bincount(component[known], weights=areas[known]).argmax())
+    graph = near_graph(laplacian, _NEIGHBORS)
+
+    def ways(start):
+        return dijkstra(graph.lengths, directed=False, indices=graph.place[start])[graph.place[largest]]
+
+    offset = laplacian.points[largest] - laplacian.points[largest].mean(axis=0)
+    one = ways(largest[np.einsum("ij,ij->i", offset, offset).argmax()]).argmax()
+    from_one = ways(largest[one])
+    from_other = ways(largest[from_one.argmax()])
+    ends = []
+    for near, far in ((from_one, from_other), (from_other, from_one)):
+        order = np.argsort(near, kind="stable")
+        order = order[near[order] < far[order]]
+        count = np.searchsorted(np.cumsum(areas[largest[order]]), share * areas[largest].sum(), side="right")
+        if len(order) < 3:
+            raise PointCloudError(
+                f"{len(largest)} points of the largest component are too few for two ends. Choose handles yourself."
+            )
+        ends.append(np.sort(largest[order[: max(count, 3)]]))
+    return tuple(ends)

@@ -81,6 +81,11 @@ def read_constraints(obj) -> Constraints:
     anchors = np.zeros(weights.shape[1])
     if is_chosen(obj, settings.anchors, ANCHOR):
         anchors = chosen_weights(obj, settings.anchors, "Anchors")
+    return constrain(names, weights, anchors)
+
+
+def constrain(names, weights, anchors) -> Constraints:
+    """Return the constraints by the groups of handles, with their weights, (g, n), and those of the anchors, (n,)."""
     moved, kept = np.flatnonzero(weights.max(axis=0) > 0.0), np.flatnonzero(anchors > 0.0)
     owner = weights.argmax(axis=0)[moved]
     strength = np.concatenate([weights.max(axis=0)[moved], anchors[kept]])

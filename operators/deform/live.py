@@ -165,27 +165,31 @@ def plan_factors(obj, rest, matrix, constraints):
         Points at rest in local space.
     matrix : ndarray, (3, 3)
         From local space to the lengths of the world.
-    constraints : binding.Constraints
+    constraints : binding.Constraints or callable
+        Or a function of the `LaplaceBeltrami` and a progress callback that finds them.
     """
     settings = obj.meshfree.deform
-    weights = settings.weight * constraints.strength if settings.soft else None
+    softness = settings.weight if settings.soft else None
     options, boundary, aware = laplacian_options(obj.meshfree), boundary_points(obj), settings.rotation_aware
     splats = read_splats(obj.data) if has_splats(obj.data) else None
 
-    def make_by(kind, progress):
-        laplacian = cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress).laplacian
+    def operator(progress):
+        return cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress).laplacian
+
+    def make_by(kind, known, progress):
         return kind(
-            laplacian,
-            constraints.moved,
-            constraints.kept,
+            operator(progress),
+            known.moved,
+            known.kept,
             rotation_aware=aware,
-            weights=weights,
+            weights=None if softness is None else softness * known.strength,
             progress=progress,
         )
 
     def make(progress):
-        follower = make_by(CoarseDeformer, progress)
-        return Live(constraints, rest, matrix, follower, partial(make_by, Deformer), follower.exact, splats)
+        known = constraints(operator(progress), progress) if callable(constraints) else constraints
+        follower = make_by(CoarseDeformer, known, progress)
+        return Live(known, rest, matrix, follower, partial(make_by, Deformer, known), follower.exact, splats)
 
     return make
 

@@ -5,10 +5,10 @@ import numpy as np
 from bpy.props import BoolProperty
 from mathutils import Matrix, Vector
 
-from ...core import PointCloudError
+from ...core import PointCloudError, opposite_ends
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import REST, own_positions, point_count, read_attribute, write_own_positions
-from ..objects.groups import HANDLE, assign, check_assignable, handle_names, has_group
+from ..objects.groups import ANCHOR, HANDLE, assign, check_assignable, group_weights, handle_names, has_group
 from ..objects.handlers import tell
 from ..objects.modifiers import get_input
 from ..objects.positions import add_key, check_movable
@@ -23,6 +23,7 @@ from . import live
 from .binding import (
     POSE,
     WRITES,
+    constrain,
     copied_from,
     edited_rows,
     forget,
@@ -85,8 +86,19 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
     only_active = True
     writes = WRITES
 
+    @classmethod
+    def description(cls, context, properties):
+        """Say what the button in the panel does; an empty text leaves it to the docstring."""
+        if not properties.at_once:
+            return ""
+        return (
+            "Make the upper end of the surface a handle and the other one an anchor, unless there are handles, and bind"
+        )
+
     def plan(self, context, obj):
         settings = obj.meshfree.deform
+        if self.at_once and settings.handles and not handle_names(obj):
+            return _plan_ends(context, obj)
         constraints = read_constraints(obj)
         reading = read_points(context, obj)
         rest = reading.local(reading.points).astype(np.float32)
@@ -102,10 +114,12 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
             rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
         make = live.plan_factors(obj, rest, reading.matrix, constraints)
-        return lambda progress: (make(progress), by_empty)
+        return lambda progress: (make(progress), by_empty, False)
 
     def write(self, context, obj, result):
-        made, by_empty = result
+        made, by_empty, chosen = result
+        if chosen:
+            _assign_ends(obj, made.constraints)
         items = obj.meshfree.deform.handle_items
         kept = {item.name: (item.empty, tuple(item.rest)) for item in items if item.has_empty and is_there(item.empty)}
         if copied_from(obj) is not None:
@@ -128,8 +142,61 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False)
         live.update(obj, waits=bpy.app.background)
         moved, stay = len(made.constraints.moved), len(made.constraints.kept)
-        way = f'Move "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
+        press = "Press G or R to move" if self.at_once else "Move"
+        way = f'{press} "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
         return [*made.follower.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
+
+    def conclude(self, context, objects):
+        item = objects[0].meshfree.deform.handle_items[0]
+        if self.at_once and item.has_empty and item.empty.name in context.view_layer.objects:
+            for other in context.selected_objects:
+                other.select_set(False)
+            item.empty.select_set(True)
+            context.view_layer.objects.active = item.empty
+
+
+def _plan_ends(context, obj):
+    """Read an object without handles; return what finds them and binds it, see `MESHFREE_OT_deform_bind.plan`.
+
+    The upper end of the surface is the handle and the other one stays, as what stands on the ground does. Anchors that
+    are there already stay instead, and the handle is the end that is farther from them.
+    """
+    settings, reading = obj.meshfree.deform, read_points(context, obj)
+    name, anchors = settings.handles, settings.anchors or ANCHOR
+    check_assignable(obj, name, must_exist=False)
+    held = group_weights(obj, anchors) if has_group(obj, anchors) else np.zeros(len(reading.points))
+    if not held.any():
+        check_assignable(obj, anchors, must_exist=False)
+
+    def choose(laplacian, progress):
+        progress("Ends", 0.0)
+        points, kept = laplacian.points, held > 0.0
+        ends = opposite_ends(laplacian)
+        if kept.any():
+            middle = points[kept].mean(axis=0)
+            ends = sorted(ends, key=lambda rows: np.linalg.norm(points[rows].mean(axis=0) - middle))
+        else:
+            ends = sorted(ends, key=lambda rows: points[rows, 2].mean())
+        weights = np.zeros(len(points))
+        weights[ends[1]] = 1.0
+        stay = held if kept.any() else np.isin(np.arange(len(points)), ends[0]).astype(np.float64)
+        return constrain([name], np.where(stay > 0.0, 0.0, weights)[None], stay)
+
+    rest = reading.local(reading.points).astype(np.float32)
+    make = live.plan_factors(obj, rest, reading.matrix, choose)
+    return lambda progress: (make(progress), [True], True)
+
+
+def _assign_ends(obj, constraints):
+    """Make the groups of handles and anchors that `_plan_ends` has chosen, where they are not there."""
+    if handle_names(obj):  # while it was computed
+        raise PointCloudError(f'"{obj.name}" has handles by now. Press Bend again to take these.')
+    settings, every = obj.meshfree.deform, np.arange(point_count(obj.data))
+    settings.anchors = settings.anchors or ANCHOR
+    assign(obj, constraints.names[0], np.isin(every, constraints.moved), "REPLACE", 1.0)
+    if not has_group(obj, settings.anchors) or not group_weights(obj, settings.anchors).any():
+        assign(obj, settings.anchors, np.isin(every, constraints.kept), "REPLACE", 1.0)
+    groups_changed(obj)
 
 
 def _add_empty(context, obj, name, rest, rows):

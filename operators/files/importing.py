@@ -9,9 +9,12 @@ import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...core import PointCloudError
+from ...core import PointCloudError, surface_discs
 from ...core.files import READABLE, numbered_files, order_frames, read_points
 from ..objects.all_or_nothing import all_or_nothing
+from ..objects.attributes import DISC, check_size, tag_changed, write_attribute
+from ..objects.handlers import tell
+from ..objects.reading import discs
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
@@ -20,6 +23,7 @@ from .sequence import add_sequence
 
 OWN = tuple(suffix for suffix in READABLE if suffix not in (".ply", ".obj"))  # Blender reads those by itself, too
 
+_QUICK = 80_000  # points whose discs are found in less than two seconds
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
 if bpy.app.version >= (4, 5, 0):
     _KINDS.append(("POINTCLOUD", "Point Cloud", "A point cloud object, which shows its points by itself"))
@@ -35,7 +39,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-    asks = ("up", "kind", "attributes", "sequence", "frame")
+    asks = ("up", "kind", "attributes", "surface", "sequence", "frame")
 
     filepath: StringProperty(
         name="File Path",
@@ -72,6 +76,11 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Import the other columns too: colors, normals, intensity and so on",
         default=True,
     )
+    surface: BoolProperty(
+        name="Show as Surface",
+        description=f"Draw points as discs in the surface that they lie on, up to {_QUICK:,} of them; not a sequence",
+        default=True,
+    )
     sequence: BoolProperty(
         name="Sequence",
         description="Make one object of numbered files, which shows one of them at each frame of the scene; of one file"
@@ -104,7 +113,8 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         if self.sequence:
             paths = order_frames(paths) if len(paths) > 1 else numbered_files(paths[0].parent)
         self._paths = paths
-        return self.work(context, [], lambda progress: _read_all(paths, progress))
+        surface = self.surface and not self.sequence
+        return self.work(context, [], lambda progress: _read_all(paths, surface, progress))
 
     def finish(self, context, objects, results):
         """Add an object for each table."""
@@ -124,22 +134,32 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             _frame_selected(context)
         return {"FINISHED"}
 
-    def _add(self, context, tables):
+    def _add(self, context, read):
         for other in context.selected_objects:
             other.select_set(False)
         shared = known_offset(context.scene)
-        for path, table in zip(self._paths, tables, strict=True):
+        surfaces = []
+        for path, (table, found) in zip(self._paths, read, strict=True):
             turned = _turned_up(table) if self.up == "Y" else table
             obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
             obj.select_set(True)
             context.view_layer.objects.active = obj
             self._tell(obj, table, shared)
+            if isinstance(found, str):
+                self.report({"INFO"}, f"{obj.name} is shown as dots. {found}")
+            elif found is not None:
+                surfaces.append(obj)
+                if DISC not in obj.data.attributes:  # those of the file, if there are any, may have been turned
+                    write_attribute(obj.data, DISC, _turned(found) if self.up == "Y" else found)
+                    tag_changed(obj.data)
             if shared is None and OFFSET in obj:
                 shared = offset_of(obj)
         if self.kind == "POINTCLOUD":
             meshes = [obj.data for obj in context.selected_objects]
             bpy.ops.object.convert(target="POINTCLOUD")
             bpy.data.batch_remove(meshes)
+        for obj in surfaces:  # Convert would have taken discs for points
+            tell("surface_found", obj)
         if self.sequence:
             self._join(context)
 
@@ -171,15 +191,38 @@ def _frame_selected(context):
                 bpy.ops.view3d.view_selected()
 
 
-def _read_all(paths, progress):
-    """Read some files, those that were just read from memory: Adjust Last Operation imports them again."""
+def _read_all(paths, surface, progress):
+    """Read some files, those that were just read from memory: Adjust Last Operation imports them again.
+
+    Returns
+    -------
+    list of (PointTable, ndarray or str or None)
+        With each table how the display is to draw its points as a surface, if that is wanted, or why it cannot.
+    """
     tables = []
     for number, path in enumerate(paths):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
         key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
         tables.append(cache.fetch(key, lambda path=path: read_points(path)))
-    return tables
+    if not surface:
+        return [(table, None) for table in tables]
+    total = sum(len(table.points) for table in tables)
+    if total > _QUICK:
+        return [(table, f"Discs of {total:,} points take a while: press Show as Surface") for table in tables]
+    return [(table, _find_discs(table.points, progress)) for table in tables]
+
+
+def _find_discs(points, progress):
+    """Find how the display is to draw points as a surface, (n, 3); a text where they are none."""
+    points = points - points.mean(axis=0)  # far from the origin their squares would have no digits left
+    try:
+        found = cache.fetch(cache.content("discs", points), lambda: surface_discs(points, progress=progress))
+        shown = discs(found.normals, found.radii, points)
+        check_size(DISC, shown)
+    except PointCloudError as error:
+        return str(error)
+    return shown
 
 
 def _turned_up(table):

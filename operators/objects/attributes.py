@@ -55,6 +55,7 @@ SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of splats
 SPLAT_HARMONIC = "lb_splat_sh_"  # followed by the number of the harmonic, from 0
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
+ALONG_SURFACE = DIRECTION, DIRECTION_1
 # Of every analysis, as in the panel.
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT, TRUST
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT

@@ -253,6 +253,12 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         default="DISCS",
         update=_reshape,
     )
+    strokes: BoolProperty(
+        name="Strokes",
+        description="Draw short strokes along directions that lie in the surface, where such are on show",
+        default=True,
+        update=_reshape,
+    )
     dim_back: BoolProperty(
         name="Dim Back Side",
         description="Darken discs that are seen from behind, such as those of the inside of an open scan",

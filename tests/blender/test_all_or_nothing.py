@@ -79,6 +79,13 @@ def handled():
     return obj
 
 
+def unhandled():
+    obj = handled()
+    for name in ("Handle", "Anchor"):
+        obj.vertex_groups.remove(obj.vertex_groups[name])
+    return obj
+
+
 def keyed():
     obj = handled()
     obj.shape_key_add(name="Basis")
@@ -116,6 +123,7 @@ def film():
         (handled, "harmonic_field", {}),
         (handled, "geodesic_distance", {}),
         (handled, "deform_bind", {"step": 37}),
+        (unhandled, "deform_bind", {"step": 37, "at_once": True}),
         (film, "minimal_surface", {"target": "IN_PLACE"}),
         (film, "minimal_surface", {}),
     ],

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.blender.clouds import add_group, add_object, attribute, everything, grid_points, local_points
 from tests.blender.test_panel import draw
@@ -1139,3 +1139,112 @@ class TestPanel:
         bpy.ops.object.mode_set(mode="EDIT")
         assert "Bound: follows its handles" in draw()
         bpy.ops.object.mode_set(mode="OBJECT")
+
+
+class TestAtOnce:
+    """One click chooses the handles, where there are none, and binds them."""
+
+    @pytest.fixture
+    def pole(self):
+        """An upright strip without groups, six long."""
+        points, _ = grid_points(columns=60, rows=12, step=0.1, jitter=0.0)
+        obj = add_object(points[:, [2, 1, 0]])
+        obj.select_set(True)
+        return obj
+
+    def members(self, obj, name):
+        index = obj.vertex_groups[name].index
+        held = [any(item.group == index for item in vertex.groups) for vertex in obj.data.vertices]
+        return np.flatnonzero(held)
+
+    def test_the_upper_end_moves_and_the_lower_one_stays(self, pole):
+        assert bpy.ops.meshfree.deform_bind(at_once=True) == {"FINISHED"}
+        rest = local_points(pole)
+        moved, kept = self.members(pole, "Handle"), self.members(pole, "Anchor")
+        assert 3 <= len(moved) < 0.06 * len(rest)
+        assert rest[moved, 2].min() > 4.5
+        assert rest[kept, 2].max() < 1.5
+        empty = bpy.context.object  # ready to be moved by G and R
+        assert (empty.type, empty.name, bpy.context.selected_objects) == ("EMPTY", "Cloud Handle", [empty])
+        empty.location.x += 1.0
+        bpy.context.view_layer.update()
+        bpy.ops.meshfree.deform_update()
+        shift = attribute(pole, "lb_displacement")
+        assert_allclose(shift[moved], np.tile([1.0, 0.0, 0.0], (len(moved), 1)), atol=1e-4)
+        assert_allclose(shift[kept], 0.0, atol=1e-4)
+        middle = np.abs(rest[:, 2] - 3.0) < 0.2
+        assert 0.2 < shift[middle, 0].mean() < 0.8
+
+    def test_the_turn_of_the_object_counts(self, pole):
+        pole.rotation_euler.y = np.pi
+        bpy.context.view_layer.update()
+        bpy.ops.meshfree.deform_bind(at_once=True)
+        assert local_points(pole)[self.members(pole, "Handle"), 2].max() < 1.5
+
+    def test_groups_that_are_there_are_used_as_they_are(self, strip):
+        handles, anchors = self.members(strip, "Handle"), self.members(strip, "Anchor")
+        assert bpy.ops.meshfree.deform_bind(at_once=True) == {"FINISHED"}
+        assert_array_equal(self.members(strip, "Handle"), handles)
+        assert_array_equal(self.members(strip, "Anchor"), anchors)
+        assert [group.name for group in strip.vertex_groups] == ["Anchor", "Handle"]
+        assert bpy.context.object.name == "Cloud Handle"
+
+    def test_the_end_far_from_anchors_moves(self, pole):
+        rest = local_points(pole)
+        add_group(pole, "Anchor", rest[:, 2] > 5.0)
+        bpy.ops.meshfree.deform_bind(at_once=True)
+        assert_array_equal(self.members(pole, "Anchor"), np.flatnonzero(rest[:, 2] > 5.0))
+        assert rest[self.members(pole, "Handle"), 2].max() < 1.5
+
+    def test_it_stays_bound_and_fresh(self, pole, binding):
+        bpy.ops.meshfree.deform_bind(at_once=True)
+        assert binding.stale_reason(pole) == ""
+        before = {name: self.members(pole, name).tolist() for name in ("Handle", "Anchor")}
+        assert bpy.ops.meshfree.deform_bind(at_once=True) == {"FINISHED"}  # from the empty, which is active
+        assert {name: self.members(pole, name).tolist() for name in before} == before
+        assert sum(obj.type == "EMPTY" for obj in bpy.data.objects) == 1
+
+    def test_without_it_handles_are_chosen_by_nobody(self, pole):
+        before = everything(pole)
+        with pytest.raises(RuntimeError, match="no vertex group named"):
+            bpy.ops.meshfree.deform_bind()
+        assert everything(pole) == before
+
+    def test_anchors_all_over_leave_no_handle(self, pole):
+        add_group(pole, "Anchor", np.ones(720, dtype=bool))
+        before = everything(pole)
+        with pytest.raises(RuntimeError, match="Error"):
+            bpy.ops.meshfree.deform_bind(at_once=True)
+        assert everything(pole) == before
+
+    def test_clouds_of_a_few_points(self):
+        obj = add_object(np.eye(4)[:, :3])
+        before = everything(obj)
+        with pytest.raises(RuntimeError, match="Error"):
+            bpy.ops.meshfree.deform_bind(at_once=True)
+        assert everything(obj) == before
+
+    def test_names_that_attributes_have(self, pole):
+        pole.data.attributes.new("Anchor", "FLOAT", "POINT")
+        before = everything(pole)
+        with pytest.raises(RuntimeError, match='has an attribute named "Anchor"'):
+            bpy.ops.meshfree.deform_bind(at_once=True)
+        assert everything(pole) == before
+        assert bpy.context.object == pole
+
+    def test_one_undo_takes_it_back(self, pole):
+        bpy.ops.ed.undo_push(message="Before")
+        before = everything(pole)
+        bpy.ops.meshfree.deform_bind("EXEC_DEFAULT", True, at_once=True)
+        bpy.ops.ed.undo()
+        obj = bpy.data.objects["Cloud"]
+        assert everything(obj) == before
+        assert not obj.vertex_groups
+        assert len(bpy.data.objects) == 1
+
+    @pytest.mark.skipif(bpy.app.version < (4, 5), reason="meshes become point clouds from Blender 4.5 on")
+    def test_of_point_clouds_the_groups_are_attributes(self, pole):
+        bpy.ops.meshfree.convert()
+        assert bpy.ops.meshfree.deform_bind(at_once=True) == {"FINISHED"}
+        cloud = next(obj for obj in bpy.data.objects if obj.type == "POINTCLOUD")
+        assert {"Handle", "Anchor"} <= {*cloud.data.attributes.keys()}

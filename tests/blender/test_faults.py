@@ -15,7 +15,7 @@ import pytest
 from numpy.linalg import LinAlgError
 
 from tests.blender.clouds import add_object, differences, everything, sphere_points
-from tests.blender.test_all_or_nothing import film, handled, keyed, shared
+from tests.blender.test_all_or_nothing import film, handled, keyed, shared, unhandled
 
 COUNT = int(os.environ.get("MESHFREE_FAULTS", "25"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))
@@ -83,6 +83,7 @@ RUNS = [
     (handled, "unwrap", {}),
     (keyed, "extend_direction", {}),
     (handled, "deform_bind", {}),
+    (unhandled, "deform_bind", {"at_once": True}),
     (bound, "deform_update", {}),
     (animated, "deform_bake", {"first": 1, "last": 3}),
     (film, "minimal_surface", {"target": "IN_PLACE", "steps": 3}),

@@ -164,3 +164,74 @@ def test_the_back_side_is_dimmed_on_demand(tmp_path):
     after = brightness(tmp_path / "after.png", below), brightness(tmp_path / "still.png", not below)
     assert after[0] < 0.7 * before[0]
     assert after[1] > 0.85 * before[1]  # some of the light comes from discs in the same plane, from behind
+
+
+class TestImport:
+    @staticmethod
+    def run(path, points, **options):
+        np.save(path / "scan.npy", points)
+        assert bpy.ops.meshfree.import_points(filepath=str(path / "scan.npy"), **options) == {"FINISHED"}
+        return bpy.context.object
+
+    @pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (446_123.456, 4_000_456.789, 78.9)])
+    @pytest.mark.parametrize("up", ["Z", "Y"])
+    def test_a_scan_looks_like_a_surface_at_first_sight(self, tmp_path, up, place):
+        obj = self.run(tmp_path, sphere_points(600) * (1.0, 2.0, 3.0) + place, up=up)
+        assert drawn(obj).shape == (600, 9, 3)
+        found = attribute(obj, "lb_disc")
+        bpy.ops.meshfree.show_surface()
+        expected = attribute(obj, "lb_disc")
+        size = np.linalg.norm(expected, axis=1)
+        assert_allclose(np.linalg.norm(found, axis=1), size, rtol=1e-3)
+        assert_allclose(np.abs(np.einsum("ij,ij->i", found, expected)), size**2, rtol=1e-3)
+
+    @pytest.mark.skipif(bpy.app.version < (4, 5), reason="meshes become point clouds from Blender 4.5 on")
+    def test_point_cloud_objects_keep_their_points(self, tmp_path, extension):
+        obj = self.run(tmp_path, sphere_points(600), kind="POINTCLOUD")
+        assert (obj.type, len(obj.data.points), len(attribute(obj, "lb_disc"))) == ("POINTCLOUD", 600, 600)
+        assert extension.ui.display.find_display(obj) is not None
+
+    def test_it_can_be_turned_off(self, tmp_path, extension):
+        obj = self.run(tmp_path, sphere_points(600), surface=False)
+        assert "lb_disc" not in obj.data.attributes
+        assert extension.ui.display.find_display(obj) is None
+
+    def test_of_very_many_points_dots_are_shown_and_a_notice_tells(self, tmp_path, extension, monkeypatch, capfd):
+        monkeypatch.setattr(extension.operators.files.importing, "_QUICK", 599)
+        obj = self.run(tmp_path, sphere_points(600))
+        assert not obj.modifiers
+        assert "lb_disc" not in obj.data.attributes
+        assert "scan is shown as dots. Discs of 600 points take a while" in capfd.readouterr().out
+        obj = self.run(tmp_path, sphere_points(599))
+        assert "lb_disc" in obj.data.attributes
+
+    @pytest.mark.parametrize(
+        "points",
+        [
+            np.zeros((1, 3)),
+            np.eye(4)[:, :3],
+            np.ones((50, 3)),
+            np.linspace(0.0, 1.0, 50)[:, None] * [1.0, 2.0, 3.0],
+            np.array([[1e30, 0.0, 0.0], *np.random.default_rng(0).random((50, 3))]),
+        ],
+        ids=["one", "four", "all at one place", "a line", "one very far"],
+    )
+    def test_points_that_are_no_surface_are_imported_all_the_same(self, tmp_path, points, capfd):
+        obj = self.run(tmp_path, points)
+        assert len(obj.data.vertices) == len(points)
+        notice = "is shown as dots" in capfd.readouterr().out
+        assert notice == ("lb_disc" not in obj.data.attributes) == (not obj.modifiers)
+
+    def test_four_points_are_dots(self, tmp_path, capfd):
+        assert not self.run(tmp_path, np.eye(4)[:, :3]).modifiers
+        assert "scan is shown as dots" in capfd.readouterr().out
+
+    def test_discs_of_the_file_are_kept(self, tmp_path):
+        obj = add_object(sphere_points(600))
+        bpy.ops.meshfree.show_surface()
+        turned = -attribute(obj, "lb_disc")
+        obj.data.attributes["lb_disc"].data.foreach_set("vector", turned.astype(np.float32).ravel())
+        bpy.ops.meshfree.export_points(filepath=str(tmp_path / "again.ply"))
+        bpy.ops.meshfree.import_points(filepath=str(tmp_path / "again.ply"))
+        assert bpy.context.object.name == "again"
+        assert_allclose(attribute(bpy.context.object, "lb_disc"), turned, atol=1e-6)

@@ -406,6 +406,7 @@ def calls():
         {"areas": laplacian.areas, "points": points, "points_before": points, "tolerance": 0.02},
     )
     yield core.grow, on, {"chosen": [0], "distance": 0.3}
+    yield core.opposite_ends, on, {"share": 0.05}
     yield (
         core.Deformer,
         on,

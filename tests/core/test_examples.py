@@ -38,6 +38,7 @@ SHOWN = [
     "minimal_surface",
     "nearest_source",
     "nodal_domains",
+    "opposite_ends",
     "orient_normals",
     "principal_curvatures",
     "roughness",

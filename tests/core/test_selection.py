@@ -1,4 +1,4 @@
-"""Selections that grow along the surface."""
+"""Selections that grow along the surface, and the ends of it."""
 
 import numpy as np
 import pytest
@@ -77,3 +77,56 @@ def test_distances_that_make_no_sense(sphere, distance):
 def test_unknown_points(sphere):
     with pytest.raises(core.InvalidPointsError, match="below 3000"):
         core.grow(sphere, [3000], 1.0)
+
+
+class TestOppositeEnds:
+    @pytest.fixture
+    def strip(self):
+        return np.random.default_rng(3).random((2000, 3)) * (6.0, 1.0, 0.0)
+
+    def test_of_a_strip_they_are_quarters_of_discs_at_opposite_corners(self, strip):
+        ends = core.opposite_ends(core.build_laplacian(strip), share=0.05)
+        radius = np.sqrt(4.0 * 0.05 * 6.0 / np.pi)  # of a quarter of a disc that has this share of 6 x 1
+        corners = np.array([[x, y, 0.0] for x in (0.0, 6.0) for y in (0.0, 1.0)])
+        found = []
+        for rows in ends:
+            away = np.linalg.norm(strip[:, None] - corners, axis=2)
+            corner = away[rows].max(axis=0).argmin()
+            assert away[rows, corner].max() == pytest.approx(radius, rel=0.1)
+            assert np.isin(np.flatnonzero(away[:, corner] < 0.85 * radius), rows).all()
+            found.append(corner)
+        assert sum(found) == 3  # opposite ones
+        assert found[0] != found[1]
+
+    def test_neither_place_nor_order_nor_size_of_the_points_counts(self, strip):
+        turn = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
+        order = np.random.default_rng(7).permutation(2000)
+        before = {frozenset(rows) for rows in core.opposite_ends(core.build_laplacian(strip))}
+        moved = core.opposite_ends(core.build_laplacian(30.0 * strip[order] @ turn.T + 5.0))
+        assert {frozenset(order[rows]) for rows in moved} == before
+
+    def test_they_lie_on_the_largest_component(self):
+        points = np.concatenate([0.3 * random_sphere(400) + [9.0, 0.0, 0.0], random_sphere(1500)])
+        for rows in core.opposite_ends(core.build_laplacian(points)):
+            assert rows.min() >= 400
+
+    def test_three_points_at_least(self, sphere):
+        assert [len(rows) for rows in core.opposite_ends(sphere, 1e-9)] == [3, 3]
+
+    @pytest.mark.parametrize("share", [0.0, -1.0, 0.3, np.nan])
+    def test_shares_out_of_bounds(self, sphere, share):
+        with pytest.raises(core.PointCloudError, match="Use a number above 0, up to 0.25"):
+            core.opposite_ends(sphere, share)
+
+    @pytest.mark.parametrize("share", [0.01, 0.05, 0.25])
+    def test_on_a_sphere_they_are_caps_of_that_area_around_opposite_points(self, sphere, share):
+        one, other = core.opposite_ends(sphere, share)
+        assert sphere.areas[one].sum() / sphere.areas.sum() == pytest.approx(share, abs=0.003)
+        assert sphere.areas[other].sum() / sphere.areas.sum() == pytest.approx(share, abs=0.003)
+        assert not np.intersect1d(one, other).size
+        middles = [sphere.points[rows].mean(axis=0) for rows in (one, other)]
+        directions = [middle / np.linalg.norm(middle) for middle in middles]
+        assert directions[0] @ directions[1] < -0.95
+        for rows, direction in zip((one, other), directions, strict=True):
+            angle = np.arccos(np.clip(sphere.points[rows] @ direction, -1.0, 1.0))
+            assert angle.max() < np.arccos(1.0 - 2.0 * share) + 0.15  # the area of a cap, 2 pi (1 - cos angle)
