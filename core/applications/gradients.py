@@ -93,9 +93,10 @@ def deformation_gradients(laplacian, positions):
 
     Notes
     -----
-    The weights w are those of the stiffness, as far as they are positive. With S the sum of w (x_j - x_i)(p_j - p_i)^T,
-    the similarity s R that fits the steps best has the polar factor R of S; the linear fit in the tangent plane to what
-    it leaves is added.
+    With S the sum of w (x_j - x_i)(p_j - p_i)^T, the similarity s R that fits the steps best has the polar factor R of
+    S; the linear fit in the tangent plane to what it leaves is added. The weights w are those of the stiffness, as far
+    as they are positive, by the squared lengths of the steps: heights above the tangent plane, which grow as these,
+    then weigh as in the operator, to which linear functions add up to zero, and do not pull at the fit.
 
     Examples
     --------
@@ -118,6 +119,8 @@ def _step_products(stiffness, rest):
     """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_j - p_i)_c (x_j - x_i), p the points at rest."""
     weight = np.where(stiffness.row != stiffness.col, np.maximum(-stiffness.data, 0.0), 0.0)
     step = rest[stiffness.col] - rest[stiffness.row]
+    squared = np.einsum("ka,ka->k", step, step)
+    weight = np.divide(weight, squared, out=np.zeros_like(weight), where=squared > 0.0)
     parts = []
     for c in range(3):
         share = weight * step[:, c]

@@ -63,7 +63,7 @@ def read_splats(path) -> Splats:
     InvalidPointsError
         It is broken, or holds no splats; the text says what is missing.
     """
-    path = Path(path)
+    path = _path(path)
     with reading(path):
         vertices = read_vertex_columns(path)
     missing = [name for name in NEEDED if name not in vertices.columns]
@@ -110,7 +110,11 @@ def write_splats(path, splats):
     PointCloudError
         The name ends otherwise, or there is no splat.
     """
-    path = Path(path)
+    path = _path(path)
+    if not isinstance(splats, Splats):
+        raise PointCloudError(
+            f"What is to be written to {path} is {type(splats).__name__}, not Splats. Make Splats first."
+        )
     if path.suffix.lower() != ".ply":
         raise PointCloudError(f"Splats cannot be written to {path}. Give it a name that ends in .ply.")
     if not len(splats):
@@ -124,6 +128,13 @@ def write_splats(path, splats):
         columns[name] = values.astype(kind)
     with replacing(path) as part:
         write_vertex_columns(part, columns, file.order, file.comments)
+
+
+def _path(given):
+    try:
+        return Path(given)
+    except TypeError as error:
+        raise PointCloudError(f"{given!r} is no name of a file. Give a text or a path.") from error
 
 
 def _encoded(splats, columns):

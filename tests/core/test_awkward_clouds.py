@@ -426,12 +426,13 @@ def public():
 
 
 TYPED = {"points_that_fit", "mean_curvature", "principal_curvatures", "smoothing_base", "check_stability"}
+FILES = {"read_splats", "write_splats"}  # whose own tests give them wrong names
 
 
 def test_all_public_functions_are_tried(public):
     tested = {function.__name__ for function, _, _ in public}
     functions = {name for name in core.__all__ if inspect.isfunction(getattr(core, name))}
-    assert functions - tested <= TYPED
+    assert functions - tested <= TYPED | FILES
 
 
 @pytest.mark.parametrize("number", range(len(list(calls()))))

@@ -203,6 +203,10 @@ def test_files_that_hold_no_splats_are_refused(tmp_path):
         core.read_splats(tmp_path / "none.ply")
     with pytest.raises(core.PointCloudError, match=r"\.ply"):
         core.write_splats(tmp_path / "splats.txt", some_splats(2))
+    with pytest.raises(core.PointCloudError, match="no name of a file"):
+        core.read_splats(5)
+    with pytest.raises(core.PointCloudError, match="not Splats"):
+        core.write_splats(tmp_path / "splats.ply", [1.0])
     rows = written_ply(tmp_path / "bad.ply", 0)
     rows["x"][3] = np.nan
     (tmp_path / "bad.ply").write_bytes((tmp_path / "bad.ply").read_bytes()[: -rows.nbytes] + rows.tobytes())
