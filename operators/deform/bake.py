@@ -15,14 +15,13 @@ from ..objects.attributes import (
     write_attribute,
 )
 from ..objects.reading import find_object
-from ..objects.splats import ROTATION, SCALE, has_splats
+from ..objects.splats import ROTATION, SCALE, carried_names, has_splats
 from ..running.job import Job, JobOperator, SteppedJob, all_steps
 from ..running.ready import reporting
 from ..running.stages import Stages
 from . import live
 from .binding import POSE, stale_reason, write_displacement
 from .nodes import BAKED_ROTATION, BAKED_SCALE, find_deform, is_baked, show_baked
-from .splats import carried_names
 from .tools import BoundOperator, check_fresh, delete_bake
 
 _LAST = 1048574  # frame of Blender

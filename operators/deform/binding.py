@@ -27,8 +27,8 @@ from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
 from ..objects.handlers import tell
 from ..objects.options import settings_values
 from ..objects.reading import TYPES, fingerprint, sharing_objects
+from ..objects.splats import carried_names, write_carried
 from .nodes import find_deform, is_baked
-from .splats import carried_names, write_carried
 
 WRITES = DISPLACEMENT, REST
 POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for

@@ -14,7 +14,7 @@ from ..objects.modifiers import get_input
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
 from ..objects.result import length_text
-from ..objects.splats import has_splats, read_splats, write_splats
+from ..objects.splats import has_splats, shown_splats, write_splats
 from ..running.application import ApplicationOperator
 from ..running.job import busy
 from ..running.ready import ReadyOperator, reporting
@@ -39,7 +39,6 @@ from .binding import (
     write_displacement,
 )
 from .nodes import add_deform, find_deform, is_baked, show_live
-from .splats import shown_splats
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -300,8 +299,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
             (item.empty, relative_matrix(obj, item.empty)) if item.has_empty else None for item in settings.handle_items
         ]
         if has_splats(obj.data):
-            strength = get_input(find_deform(obj), "Strength")
-            write_splats(obj.data, shown_splats(obj.data, read_splats(obj.data), positions, strength))
+            write_splats(obj.data, shown_splats(obj))
         else:
             write_own_positions(obj.data, positions)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)

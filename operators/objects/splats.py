@@ -1,12 +1,25 @@
 """Gaussian splats as Blender 5.3 keeps them: attributes of the points of a point cloud, or of a mesh before 4.5."""
 
+from dataclasses import replace
 from itertools import count, takewhile
 
 import numpy as np
 
 from ...core import PointCloudError, Splats
 from ...core.splats.harmonics import COUNTS
-from .attributes import own_positions, read_attribute, tag_changed, write_attribute, write_own_positions
+from .attributes import (
+    DISPLACEMENT,
+    REST,
+    SPLAT_HARMONIC,
+    SPLAT_ROTATION,
+    SPLAT_SCALE,
+    own_positions,
+    read_attribute,
+    tag_changed,
+    write_attribute,
+    write_own_positions,
+)
+from .modifiers import get_input, is_deform
 
 SCALE, ROTATION, BASE, HARMONIC = "scale", "rotation", "radiance:base", "radiance:sh_"
 _TYPES = {SCALE: ("FLOAT_VECTOR",), ROTATION: ("QUATERNION",), BASE: ("FLOAT4", "FLOAT_COLOR")}
@@ -61,3 +74,55 @@ def write_splats(data, splats):
     for number, name in enumerate(harmonic_names(data)):
         write_attribute(data, name, splats.harmonics[:, number], "FLOAT_VECTOR")
     tag_changed(data)
+
+
+def write_carried(data, splats):
+    """Keep how splats are carried, those harmonics that they have here; None for as they are at rest."""
+    if splats is None:
+        for name in carried_names(data):
+            data.attributes.remove(data.attributes[name])
+        return
+    write_attribute(data, SPLAT_SCALE, splats.scales)
+    write_attribute(data, SPLAT_ROTATION, splats.rotations)
+    for number in range(splats.harmonics.shape[1]):
+        write_attribute(data, f"{SPLAT_HARMONIC}{number}", splats.harmonics[:, number])
+
+
+def carried_names(data) -> list:
+    """Return the names of the attributes that are there for splats carried along."""
+    return [name for name in (item.name for item in data.attributes) if name.startswith("lb_splat_")]
+
+
+def shown_splats(obj) -> Splats:
+    """Return the splats of an object as its deformation shows them: in between those at rest and those carried."""
+    data = obj.data
+    splats = read_splats(data)
+    modifier = next(filter(is_deform, obj.modifiers), None)
+    if modifier is None or DISPLACEMENT not in data.attributes:
+        return splats
+    strength = get_input(modifier, "Strength")
+    positions = read_attribute(data, REST) + strength * read_attribute(data, DISPLACEMENT)
+    if SPLAT_SCALE not in data.attributes:
+        return replace(splats, positions=positions)
+    scales = _between(splats.scales, read_attribute(data, SPLAT_SCALE), strength)
+    rotations = _turned_between(splats.rotations, read_attribute(data, SPLAT_ROTATION), strength)
+    harmonics = splats.harmonics.copy()
+    for number in range(harmonics.shape[1]):
+        name = f"{SPLAT_HARMONIC}{number}"
+        if name in data.attributes:
+            harmonics[:, number] = _between(harmonics[:, number], read_attribute(data, name), strength)
+    return replace(splats, positions=positions, scales=scales, rotations=rotations, harmonics=harmonics)
+
+
+def _between(one, other, share):
+    return one + share * (other - one)
+
+
+def _turned_between(one, other, share):
+    """Return the quaternions on the short way between unit quaternions, (n, 4)."""
+    cosine = np.einsum("nk,nk->n", one, other, dtype=np.float64)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = [np.where(angle > 1e-6, np.sin(part * angle) / np.sin(angle), part) for part in (1.0 - share, share)]
+    mixed = shares[0] * one + shares[1] * np.where(cosine < 0.0, -1.0, 1.0)[:, None] * other
+    return mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
