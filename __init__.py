@@ -32,6 +32,7 @@ def _modules():
         sequence,
         smooth,
         spectrum,
+        splats,
         surface,
     )
     from .operators.tools import select as selecting
@@ -47,6 +48,7 @@ def _modules():
         analyze,
         orient,
         surface,
+        splats,
         mesh,
         compare,
         spectrum,

@@ -5,7 +5,7 @@ import bpy
 from ..operators.files.importing import OWN
 
 _TOOLS = (
-    ("show_surface", "analyze", "spectrum", "analyze_sequence", "colormap", "legend"),
+    ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "legend"),
     ("mesh_surface", "compare"),
     ("principal_curvatures", "roughness", "orient_normals"),
     ("smooth", "mode_shape"),
@@ -14,6 +14,7 @@ _TOOLS = (
     ("signed_distance", "nearest_source", "unwrap", "extend_direction"),
     ("deform_bind", "deform_update", "deform_reset", "deform_apply", "deform_to_shape_key", "deform_unbind"),
     ("deform_bake", "deform_free"),
+    ("apply_to_splats",),
     ("minimal_surface",),
     ("stop",),
 )
@@ -64,6 +65,7 @@ def _draw_import(self, _context):
 def _draw_export(self, _context):
     layout = self.layout
     layout.operator("meshfree.export_points", text="Points with Results (.ply/.xyz/.csv)")
+    layout.operator("meshfree.export_splats", text="Gaussian Splats (.ply)")
     layout.operator("meshfree.export_operator", text="Laplacian and Modes (.npz)")
     layout.operator("meshfree.export_eigenvalues", text="Eigenvalues (.csv)")
 

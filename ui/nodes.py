@@ -6,12 +6,14 @@ import bpy
 
 from ..operators.objects.attributes import CORNER, DISC
 from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, has_input, is_intact, new_group
+from ..operators.objects.splats import BASE, ROTATION, SCALE
 from . import colormaps
 from .value_range import CLASSES, STEPPED
 
 MOST = "Viewport Points"  # input of the display: how many it draws there
 DISCS = "Discs"  # another: whether it draws discs
 STROKES = "Strokes"  # another: the attribute that has them
+SPLATS = "Splats"  # another: whether it draws their ellipsoids
 LENGTH, INK = "Stroke Length", "Stroke Material"  # others: what they look like
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
@@ -33,13 +35,15 @@ _DIM = 0.85  # how dark the back side becomes where it is dimmed
 _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but groups
 _CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
 CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
+_DEVIATIONS = 2.0  # standard deviations at which the ellipsoid of a splat ends
+_SPLATTED, _CONSTANT = "SPLATS", 0.28209479  # the harmonic of degree 0
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
 
 def display_group():
     """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
-        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, STROKES):
+        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, SPLATS):
             return group
     group = new_group("Mesh-Free Display", DISPLAY_TAG)
     radius = add_input(group, "Radius", "Float", "Size of the points")
@@ -50,6 +54,7 @@ def display_group():
     most = add_input(group, MOST, "Int", "How many points the viewport draws at most, larger ones then; 0 for all")
     most.min_value = 0
     add_input(group, DISCS, "Bool", f"Draw discs that lie in the surface, as the attribute {DISC} says")
+    add_input(group, SPLATS, "Bool", f"Draw ellipsoids, as the attributes {SCALE} and {ROTATION} say")
     add_input(
         group, STROKES, "String", "Attribute with directions along the surface, which strokes show; empty for none"
     )
@@ -144,6 +149,7 @@ def _shaped(group, given, points, size):
     length = add_node(group, "ShaderNodeVectorMath", 6, -900, operation="LENGTH")
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -300)
     chosen = add_node(group, "GeometryNodeSwitch", 9, -200, input_type="GEOMETRY")
+    splats = add_node(group, "GeometryNodeSwitch", 9, -500, input_type="GEOMETRY")
     unknown = _math(group, 7, -1300, "LESS_THAN", length.outputs["Value"], 1e-6)  # of points added since: like a dot
     scale = _math(group, 7, -900, "MULTIPLY", _math(group, 7, -1100, "ADD", length.outputs["Value"], unknown), size)
     for source, target in (
@@ -157,9 +163,33 @@ def _shaped(group, given, points, size):
         (given.outputs[DISCS], chosen.inputs["Switch"]),
         (points, chosen.inputs["False"]),
         (_corners(group, 8, -300, placed.outputs["Instances"]), chosen.inputs["True"]),
+        (given.outputs[SPLATS], splats.inputs["Switch"]),
+        (chosen.outputs["Output"], splats.inputs["False"]),
+        (_ellipsoids(group, points), splats.inputs["True"]),
     ):
         group.links.new(source, target)
-    return chosen.outputs["Output"]
+    return splats.outputs["Output"]
+
+
+def _ellipsoids(group, points):
+    """Add the nodes that make splats into ellipsoids of two standard deviations; return what is drawn."""
+    ball = add_node(group, "GeometryNodeMeshIcoSphere", 5, -1700)
+    ball.inputs["Radius"].default_value, ball.inputs["Subdivisions"].default_value = _DEVIATIONS, 1
+    smooth = add_node(group, "GeometryNodeSetShadeSmooth", 6, -1700)
+    scale = add_node(group, "GeometryNodeInputNamedAttribute", 5, -1900, data_type="FLOAT_VECTOR")
+    scale.inputs["Name"].default_value = SCALE
+    rotation = add_node(group, "GeometryNodeInputNamedAttribute", 5, -2100, data_type="QUATERNION")
+    rotation.inputs["Name"].default_value = ROTATION
+    placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -1700)
+    for source, target in (
+        (ball.outputs["Mesh"], smooth.inputs[0]),
+        (points, placed.inputs["Points"]),
+        (smooth.outputs[0], placed.inputs["Instance"]),
+        (rotation.outputs["Attribute"], placed.inputs["Rotation"]),
+        (scale.outputs["Attribute"], placed.inputs["Scale"]),
+    ):
+        group.links.new(source, target)
+    return _corners(group, 8, -1700, placed.outputs["Instances"])
 
 
 def _corners(group, column, y, instances):
@@ -284,6 +314,46 @@ def color_plain(material, groups):
         gray.outputs[0].default_value = _GRAY
         _shine(material.node_tree, gray.outputs[0], groups)
         material[_KIND] = kind
+
+
+def color_splats(material):
+    """Let a material show splats in their own colors, fading from their middles, as far as they are opaque."""
+    if material.get(_KIND) == _SPLATTED and material.node_tree is not None:
+        return
+    tree = new_tree(material)
+    base = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=BASE)
+    color = add_node(tree, "ShaderNodeVectorMath", 1, 0, operation="MULTIPLY_ADD")
+    color.inputs[1].default_value, color.inputs[2].default_value = (_CONSTANT,) * 3, (0.5,) * 3
+    above = add_node(tree, "ShaderNodeVectorMath", 2, 0, operation="MAXIMUM")
+    above.inputs[1].default_value = 0.0, 0.0, 0.0
+    linear = add_node(tree, "ShaderNodeGamma", 3, 0)
+    linear.inputs["Gamma"].default_value = _GAMMA  # splats are trained in sRGB
+    light = add_node(tree, "ShaderNodeEmission", 4, 0)
+    # A ray that passes the middle of a ball at the share b of its radius meets it at an angle whose sine is b.
+    place = add_node(tree, "ShaderNodeNewGeometry", 0, -300)
+    facing = add_node(tree, "ShaderNodeVectorMath", 1, -300, operation="DOT_PRODUCT")
+    squared = _math(tree, 2, -300, "MULTIPLY", facing.outputs["Value"], facing.outputs["Value"])
+    passed = _math(tree, 3, -300, "SUBTRACT", 1.0, squared)
+    fading = _math(tree, 4, -300, "EXPONENT", _math(tree, 3, -500, "MULTIPLY", passed, -0.5 * _DEVIATIONS**2))
+    front = _math(tree, 4, -500, "SUBTRACT", 1.0, place.outputs["Backfacing"])
+    alpha = _math(tree, 5, -300, "MULTIPLY", _math(tree, 5, -500, "MULTIPLY", fading, base.outputs["Alpha"]), front)
+    through = add_node(tree, "ShaderNodeBsdfTransparent", 5, 200)
+    mixed = add_node(tree, "ShaderNodeMixShader", 6, 0)
+    output = add_node(tree, "ShaderNodeOutputMaterial", 7, 0)
+    for source, target in (
+        (base.outputs["Vector"], color.inputs[0]),
+        (color.outputs[0], above.inputs[0]),
+        (above.outputs[0], linear.inputs["Color"]),
+        (linear.outputs[0], light.inputs["Color"]),
+        (place.outputs["Normal"], facing.inputs[0]),
+        (place.outputs["Incoming"], facing.inputs[1]),
+        (alpha, mixed.inputs[0]),
+        (through.outputs[0], mixed.inputs[1]),
+        (light.outputs[0], mixed.inputs[2]),
+        (mixed.outputs[0], output.inputs["Surface"]),
+    ):
+        tree.links.new(source, target)
+    material[_KIND] = _SPLATTED
 
 
 def dim_back(material, dimmed):

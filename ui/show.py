@@ -20,6 +20,7 @@ from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, ha
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
+from ..operators.objects.splats import has_splats
 from . import colormaps, legend
 from .display import (
     NAME,
@@ -35,11 +36,13 @@ from .nodes import (
     DISCS,
     INK,
     MOST,
+    SPLATS,
     STROKES,
     color_by_checker,
     color_by_direction,
     color_by_number,
     color_plain,
+    color_splats,
     dim_back,
     display_group,
     is_plain,
@@ -91,7 +94,7 @@ def _add_display(obj):
         modifier = obj.modifiers.new(NAME, "NODES")
         modifier.node_group = display_group()
         set_input(modifier, MOST, viewport_points())
-    elif not has_input(modifier.node_group, STROKES):  # of an earlier version
+    elif not has_input(modifier.node_group, SPLATS):  # of an earlier version
         names = [name for name in ("Radius", "Material", MOST) if has_input(modifier.node_group, name)]
         kept = {name: get_input(modifier, name) for name in names}
         modifier.node_group = display_group()
@@ -167,6 +170,15 @@ def show_surface(obj):
     resize(obj)
 
 
+def show_splats(obj):
+    """Show splats as ellipsoids in their own colors."""
+    _add_display(obj)
+    color_splats(_own_material(obj))
+    obj.meshfree.point_shape = "DISCS"
+    resize(obj)
+    use_material_preview(bpy.context)
+
+
 def show_alike(obj, made):
     """Show on a mesh made of an object what that shows."""
     name = shown_attribute(obj)
@@ -202,8 +214,11 @@ def reshape(obj):
     modifier = find_display(obj)
     if modifier is not None:
         group, turned = modifier.node_group, DISC in obj.data.attributes and find_deform(obj) is None
+        formed = obj.meshfree.point_shape == "DISCS"
         if has_input(group, DISCS):
-            set_input(modifier, DISCS, turned and obj.meshfree.point_shape == "DISCS")
+            set_input(modifier, DISCS, turned and formed)
+        if has_input(group, SPLATS):
+            set_input(modifier, SPLATS, formed and has_splats(obj.data))
         if has_input(group, STROKES):
             stroked = turned and _has_strokes(obj)
             set_input(modifier, STROKES, shown_attribute(obj) if stroked else "")
@@ -303,6 +318,7 @@ _HANDLERS = {
     "shape_changed": reshape,
     "groups_changed": show_groups,
     "surface_found": show_surface,
+    "splats_found": show_splats,
     "result_written": show_result,
     "mesh_made": show_alike,
     "sequence_written": show_sequence,

@@ -3,6 +3,6 @@
 from .formats import READABLE, WRITABLE, read_points, reading, write_points
 from .frames import numbered_files, order_frames
 from .origin import choose_origin, is_coarse
-from .ply import PlyVertices, read_vertex_columns, write_vertex_columns
+from .ply import PlyVertices, read_vertex_columns, read_vertex_names, write_vertex_columns
 from .table import PointTable, check_places
 from .whole import replacing

@@ -90,6 +90,13 @@ def read_vertex_columns(path) -> PlyVertices:
     return PlyVertices(dict(zip(vertex.names, columns, strict=True)), order, comments, notices)
 
 
+def read_vertex_names(path) -> list:
+    """Read the names of the properties of the vertices of a PLY file; none if it has no vertices."""
+    with open(path, "rb") as file:
+        elements = _read_header(file, path)[1]
+    return next((element.names for element in elements if element.name == "vertex"), [])
+
+
 def _read_header(file, path):
     """Return the byte order, None for text, the elements and comments; leave the file where the data begin."""
     if file.readline(_LONGEST).strip() != b"ply":

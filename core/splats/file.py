@@ -6,7 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError
-from ..files import PlyVertices, check_places, read_vertex_columns, reading, replacing, write_vertex_columns
+from ..files import (
+    PlyVertices,
+    check_places,
+    read_vertex_columns,
+    read_vertex_names,
+    reading,
+    replacing,
+    write_vertex_columns,
+)
 from .harmonics import COUNTS
 from .splats import Splats
 
@@ -38,9 +46,15 @@ class SplatFile(NamedTuple):
     comments: tuple = ()
 
 
-def has_splats(names) -> bool:
-    """Tell whether these are the names of the properties of splats."""
-    return set(NEEDED) <= set(names)
+def holds_splats(path) -> bool:
+    """Tell whether a file is one of splats, by its header; files that are broken are none."""
+    if Path(path).suffix.lower() != ".ply":
+        return False
+    try:
+        with reading(Path(path)):
+            return set(NEEDED) <= set(read_vertex_names(path))
+    except PointCloudError:
+        return False
 
 
 def read_splats(path) -> Splats:

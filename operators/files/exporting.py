@@ -7,15 +7,17 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ...core import PointCloudError
+from ...core import PointCloudError, write_splats
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
 from ..objects.reading import read_points
 from ..objects.result import read_eigenvalues
+from ..objects.splats import has_splats
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
 from .objects import analysis_arrays, file_filter, place_of, point_table, save_arrays
+from .splats import splats_to_write
 
 
 class ExportOperator(JobOperator, ExportHelper):
@@ -99,6 +101,35 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
         return write
 
 
+class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
+    """Export the Gaussian splats of the active object to a PLY file, as its deformation shows them"""
+
+    bl_idname = "meshfree.export_splats"
+    bl_label = "Export Splats"
+    filename_ext = ".ply"
+
+    filter_glob: file_filter(".ply")
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason or has_splats(context.object.data):
+            return reason
+        return f'"{context.object.name}" holds no Gaussian splats. Import a file of splats'
+
+    def plan(self, context, obj):
+        splats, name = splats_to_write(obj), obj.name
+        scaled = not np.allclose(np.linalg.norm(np.array(obj.matrix_world)[:3, :3], axis=0), 1.0, atol=1e-5)
+        hint = ". The scale of the object is not in it: Apply Transform to Splats applies it" if scaled else ""
+
+        def write(path, progress):
+            progress("Write", 0.0)
+            write_splats(path, splats)
+            return f"{name}: {len(splats):,} splats written to {path.name}{hint}"
+
+        return write
+
+
 class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
     """Export the Laplace-Beltrami operator of the active object, its areas and its modes as numpy arrays"""
 
@@ -150,4 +181,9 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
         return write
 
 
-CLASSES = (MESHFREE_OT_export_points, MESHFREE_OT_export_operator, MESHFREE_OT_export_eigenvalues)
+CLASSES = (
+    MESHFREE_OT_export_points,
+    MESHFREE_OT_export_splats,
+    MESHFREE_OT_export_operator,
+    MESHFREE_OT_export_eigenvalues,
+)

@@ -9,10 +9,11 @@ import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...core import PointCloudError, surface_discs
+from ...core import PointCloudError, Splats, read_splats, surface_discs
 from ...core.files import READABLE, numbered_files, order_frames, read_points
+from ...core.splats import holds_splats
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import DISC, check_size, tag_changed, write_attribute
+from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
 from ..objects.handlers import tell
 from ..objects.reading import discs
 from ..running import cache
@@ -20,10 +21,12 @@ from ..running.job import JobOperator
 from ..running.ready import reporting
 from .objects import OFFSET, add_object, file_filter, known_offset, offset_of
 from .sequence import add_sequence
+from .splats import add_splats, is_drawn, mark
 
 OWN = tuple(suffix for suffix in READABLE if suffix not in (".ply", ".obj"))  # Blender reads those by itself, too
 
 _QUICK = 80_000  # points whose discs are found in less than two seconds
+_DRAWN = 200_000  # splats whose ellipsoids are drawn by themselves
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
 if bpy.app.version >= (4, 5, 0):
     _KINDS.append(("POINTCLOUD", "Point Cloud", "A point cloud object, which shows its points by itself"))
@@ -138,8 +141,11 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         for other in context.selected_objects:
             other.select_set(False)
         shared = known_offset(context.scene)
-        surfaces = []
+        surfaces, clouds = [], []
         for path, (table, found) in zip(self._paths, read, strict=True):
+            if isinstance(table, Splats):
+                clouds.append(self._add_splats(context, path.stem, table))
+                continue
             turned = _turned_up(table) if self.up == "Y" else table
             obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
             obj.select_set(True)
@@ -154,14 +160,31 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
                     tag_changed(obj.data)
             if shared is None and OFFSET in obj:
                 shared = offset_of(obj)
-        if self.kind == "POINTCLOUD":
-            meshes = [obj.data for obj in context.selected_objects]
-            bpy.ops.object.convert(target="POINTCLOUD")
-            bpy.data.batch_remove(meshes)
+        every = context.selected_objects
+        _convert(context, every if self.kind == "POINTCLOUD" else clouds)
+        for obj in every:
+            obj.select_set(True)
+        for obj in clouds:
+            mark(obj.data)
+            if self.surface and not self.sequence and point_count(obj.data) <= _DRAWN and not is_drawn(obj.data):
+                tell("splats_found", obj)
         for obj in surfaces:  # Convert would have taken discs for points
             tell("surface_found", obj)
         if self.sequence:
             self._join(context)
+
+    def _add_splats(self, context, name, splats):
+        """Add an object of splats, which keep the numbers of their file: it is the object that is turned upright."""
+        obj = add_splats(name, splats, context.collection)
+        if self.up == "Y":
+            obj.rotation_euler.x = np.pi / 2.0
+        obj.select_set(True)
+        context.view_layer.objects.active = obj
+        for notice in splats.notices:
+            self.report({"WARNING"}, notice)
+        degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
+        self.report({"INFO"}, f"{obj.name}: {len(splats):,} Gaussian splats with harmonics of degree {degree}")
+        return obj
 
     def _join(self, context):
         """Let one object show those just imported, one at each frame from the scene's first one on."""
@@ -180,6 +203,21 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
         if shared is not None and (offset != shared).any():
             self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
+
+
+def _convert(context, objects):
+    """Turn new meshes into point clouds, where Blender can."""
+    if bpy.app.version < (4, 5) or not objects:
+        return
+    context.view_layer.update()
+    for other in context.view_layer.objects:
+        other.select_set(other in objects)
+    active = context.view_layer.objects.active
+    context.view_layer.objects.active = objects[0]
+    meshes = [obj.data for obj in objects]
+    bpy.ops.object.convert(target="POINTCLOUD")
+    bpy.data.batch_remove(meshes)
+    context.view_layer.objects.active = active
 
 
 def _frame_selected(context):
@@ -204,13 +242,13 @@ def _read_all(paths, surface, progress):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
         key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
-        tables.append(cache.fetch(key, lambda path=path: read_points(path)))
+        tables.append(cache.fetch(key, lambda path=path: (read_splats if holds_splats(path) else read_points)(path)))
     if not surface:
         return [(table, None) for table in tables]
-    total = sum(len(table.points) for table in tables)
+    total = sum(len(table.points) for table in tables if not isinstance(table, Splats))
     if total > _QUICK:
         return [(table, f"Discs of {total:,} points take a while: press Show as Surface") for table in tables]
-    return [(table, _find_discs(table.points, progress)) for table in tables]
+    return [(table, None if isinstance(table, Splats) else _find_discs(table.points, progress)) for table in tables]
 
 
 def _find_discs(points, progress):

@@ -79,7 +79,7 @@ def add_object(name, table, collection, known=None, with_attributes=True):
     if with_attributes:
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large for single precision becomes infinite
             for column, values in table.attributes.items():
-                _add_attribute(mesh, column, values)
+                add_column(mesh, column, values)
         if table.colors is not None:
             layer = mesh.color_attributes.new("Color", "BYTE_COLOR", "POINT")
             layer.data.foreach_set("color_srgb", table.colors.reshape(-1))
@@ -91,7 +91,7 @@ def add_object(name, table, collection, known=None, with_attributes=True):
     return obj
 
 
-def _add_attribute(mesh, name, values):
+def add_column(mesh, name, values):
     """Add a column of a file as an attribute; our own by the types that they have."""
     if values.ndim == 2:
         kind = "FLOAT_VECTOR"

@@ -247,7 +247,11 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         name="Point Shape",
         description="What points are drawn as, where Show as Surface has found how they lie",
         items=(
-            ("DISCS", "Discs", "Discs in the surface, as large as the gaps between the points ask"),
+            (
+                "DISCS",
+                "Discs",
+                "Discs in the surface, as large as the gaps between the points; of splats ellipsoids",
+            ),
             ("DOTS", "Dots", "Round dots of one size"),
         ),
         default="DISCS",
