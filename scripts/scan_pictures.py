@@ -71,7 +71,25 @@ def figure13_camel(path):
     studio.deformed_row(rest, obj, path, view=(0.4, -1.0, 0.3))
 
 
+def splats(path):
+    """A guitar of Gaussian splats, as it was trained, and with its neck bent."""
+    objects = []
+    for _ in range(2):
+        bpy.ops.meshfree.import_points(filepath=str(Path(FOLDER) / "splats" / "guitar.ply"), up="-Y")
+        objects.append(bpy.context.object)
+    rest, obj = objects
+    bpy.context.view_layer.update()
+    height = studio.world_points(obj)[:, 2]
+    studio.group(obj, height > 3.6, "HANDLE")
+    studio.group(obj, height < 1.6, "ANCHOR")
+    studio.deform(obj, move=(1.0, 0.0, -0.4), turn=(0.0, 1.0, 0.0))
+    bpy.ops.meshfree.deform_apply()
+    bpy.ops.meshfree.deform_unbind()
+    studio.row([rest, obj], path, legend=None, view=(1.0, 0.3, 0.1), size=(700, 420))
+
+
 PICTURES = {
+    "splats": splats,
     "armadillo": armadillo,
     "figure12": figure12,
     "figure13_planck": figure13_planck,

@@ -130,9 +130,10 @@ def make_object(points, name):
 
 
 def world_points(obj):
-    """Vertices of a mesh object in the world, (n, 3)."""
-    points = np.empty(3 * len(obj.data.vertices), np.float32)
-    obj.data.attributes["position"].data.foreach_get("vector", points)
+    """Points of an object in the world, (n, 3)."""
+    positions = obj.data.attributes["position"].data
+    points = np.empty(3 * len(positions), np.float32)
+    positions.foreach_get("vector", points)
     matrix = np.array(obj.matrix_world, np.float64)
     return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
 

@@ -321,7 +321,7 @@ def color_splats(material):
     if material.get(_KIND) == _SPLATTED and material.node_tree is not None:
         return
     tree = new_tree(material)
-    base = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=BASE)
+    base = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=BASE, name="Splats")  # no result on show
     color = add_node(tree, "ShaderNodeVectorMath", 1, 0, operation="MULTIPLY_ADD")
     color.inputs[1].default_value, color.inputs[2].default_value = (_CONSTANT,) * 3, (0.5,) * 3
     above = add_node(tree, "ShaderNodeVectorMath", 2, 0, operation="MAXIMUM")

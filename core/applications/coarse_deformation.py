@@ -154,7 +154,9 @@ class CoarseDeformer:
             neighbors=neighbors,
             progress=lambda stage, share: report(stage, 0.6 + 0.2 * share),
         )
-        self._carry(laplacian, followers(laplacian, held), lambda share: report("Points", 0.8 + 0.2 * share))
+        self._carry(
+            laplacian, followers(self.points, component, held), lambda share: report("Points", 0.8 + 0.2 * share)
+        )
 
     def _gathered(self, laplacian, coarse, own, weights):
         """Return the weights of constrained coarse points, each with the pull of the soft constraints next to it.

@@ -10,7 +10,8 @@ from ..errors import PointCloudError
 from ..geometry import as_indices
 from ..operator import dissect, factorize, narrow_laplacian, sparsify
 from ..rotations import nearest_rotations
-from .gradients import DeformationGradients
+from .gradients import DeformationGradients, coupled
+from .graph import coupled_components
 
 NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
 STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
@@ -124,10 +125,11 @@ class Deformer:
         narrow = narrow_laplacian(laplacian, neighbors, progress=lambda stage, share: report("Operator", 0.4 * share))
         self.notices += [notice for notice in narrow.notices if notice not in laplacian.notices]
         held_components = components_held(narrow.component, held[weights > 0.0])
-        self.notices += notices_of_components(narrow.component, held_components)
+        component = _without_uncoupled(narrow, held_components, held[weights > 0.0])
+        self.notices += notices_of_components(component, held_components)
         self._narrow, self._gradients = narrow, None
-        self._moving = np.flatnonzero(np.isin(narrow.component, held_components))
-        self._component = np.searchsorted(held_components, narrow.component[self._moving])
+        self._moving = np.flatnonzero(np.isin(component, held_components))
+        self._component = np.searchsorted(held_components, component[self._moving])
         self._components = len(held_components)
         self._chosen = np.flatnonzero(weights)
         self._held, weights = held[self._chosen], weights[self._chosen]
@@ -138,7 +140,7 @@ class Deformer:
         row = np.full(n, -1)
         row[moving] = np.arange(len(moving))
         self._row = row[self._held]
-        self._lone, leaders = followers(narrow, held)
+        self._lone, leaders = followers(narrow.points, component, held)
         self._leader = row[leaders]  # -1 where the surface next to them stays
         if not len(moving):
             return
@@ -328,13 +330,21 @@ class Deformer:
         return np.einsum("nab,nb->na", turn[self._component], vectors)
 
 
-def followers(laplacian, held):
+def _without_uncoupled(laplacian, held_components, held):
+    """Return components, -1 for points of those that are held which nothing couples to any of the constraints."""
+    piece = coupled_components(laplacian)
+    fast = np.isin(piece, piece[held]) & (piece >= 0) & coupled(laplacian)
+    loose = np.isin(laplacian.component, held_components) & ~fast
+    return np.where(loose, -1, laplacian.component)
+
+
+def followers(points, component, held):
     """Return the points of no surface that no constraint holds, and for each the point of a surface next to it."""
-    alone = laplacian.component < 0
+    alone = component < 0
     lone, own = np.setdiff1d(np.flatnonzero(alone), held), np.flatnonzero(~alone)
     if not len(lone) or not len(own):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    return lone, own[cKDTree(laplacian.points[own]).query(laplacian.points[lone])[1]]
+    return lone, own[cKDTree(points[own]).query(points[lone])[1]]
 
 
 def components_held(component, held):

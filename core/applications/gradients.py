@@ -8,6 +8,9 @@ from ..arguments import check_positions
 from ..geometry import frames
 from ..rotations import nearest_rotations
 
+_FAINT = 1e-3  # share of what its area asks below which a point counts as coupled to none
+_ROUND = 0.05  # share of the smaller extent of a neighbourhood, squared, in both: a half where it is round
+
 
 class DeformationGradients:
     """Finds deformation gradients of a surface that is moved again and again; see `deformation_gradients`.
@@ -24,9 +27,9 @@ class DeformationGradients:
 
     def __init__(self, laplacian):
         self._count = len(laplacian.points)
-        own = np.flatnonzero(laplacian.component >= 0)
+        joined = coupled(laplacian)
+        own, alone = np.flatnonzero(joined), np.flatnonzero(~joined)
         self._own, self._near = own, np.arange(self._count)
-        alone = np.flatnonzero(laplacian.component < 0)
         if len(own):
             self._near[own] = np.arange(len(own))
             self._near[alone] = cKDTree(laplacian.points[own]).query(laplacian.points[alone])[1]
@@ -115,6 +118,20 @@ def deformation_gradients(laplacian, positions):
     return DeformationGradients(laplacian).at(positions)
 
 
+def coupled(laplacian):
+    """Tell which points the operator couples to others, (n,) bool.
+
+    On a surface the weights times the squared lengths of the steps add up to four times the area, for the Laplacian of
+    the squared distance is four. Points of which hardly anything of that is left, such as single ones far off the
+    surface, belong to a component by name only.
+    """
+    pairs = laplacian.stiffness.tocoo()
+    step = laplacian.points[pairs.row] - laplacian.points[pairs.col]
+    weight = np.maximum(-pairs.data, 0.0) * np.einsum("ka,ka->k", step, step)
+    sums = np.bincount(pairs.row, weight, minlength=len(laplacian.points))
+    return (laplacian.component >= 0) & (sums > _FAINT * 4.0 * laplacian.areas)
+
+
 def _step_products(stiffness, rest):
     """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_j - p_i)_c (x_j - x_i), p the points at rest."""
     weight = np.where(stiffness.row != stiffness.col, np.maximum(-stiffness.data, 0.0), 0.0)
@@ -131,9 +148,10 @@ def _step_products(stiffness, rest):
 
 
 def _inverse(matrices):
-    """Return the inverses of symmetric matrices, (2, 2, m); zero along what has no extent."""
+    """Return the inverses of symmetric matrices, (2, 2, m), lifted where steps lie in a row and tell nothing across."""
     (a, b), (_, d) = matrices
     trace = a + d
-    lifted = np.where(trace > 0.0, 1e-12 * trace, 1.0)
+    smaller = 0.5 * (trace - np.hypot(a - d, 2.0 * b))
+    lifted = np.where(trace > 0.0, np.maximum(_ROUND * trace - smaller, 0.0), 1.0)
     a, d = a + lifted, d + lifted
     return np.array([[d, -b], [-b, a]]) / (a * d - b * b)

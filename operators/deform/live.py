@@ -48,8 +48,8 @@ class Live:
         For quick updates.
     make_exact : callable
         From a progress callback to the `Deformer` for settled ones.
-    exact : Deformer or None
-        That, once it was needed.
+    exact : Deformer or CoarseDeformer or None
+        That, once it was needed; of splats the follower.
     splats : Splats or None
         Those at rest in local space, where the points are splats.
     last : dict of int to ndarray
@@ -61,7 +61,7 @@ class Live:
     matrix: np.ndarray
     follower: CoarseDeformer
     make_exact: Callable
-    exact: Deformer | None
+    exact: Deformer | CoarseDeformer | None
     splats: Splats | None = None
     last: dict = field(default_factory=dict)
 
@@ -189,7 +189,9 @@ def plan_factors(obj, rest, matrix, constraints):
     def make(progress):
         known = constraints(operator(progress), progress) if callable(constraints) else constraints
         follower = make_by(CoarseDeformer, known, progress)
-        return Live(known, rest, matrix, follower, partial(make_by, Deformer, known), follower.exact, splats)
+        # Splats scatter about their surface: motions of some points that carry the others even that out.
+        exact = follower if splats is not None else follower.exact
+        return Live(known, rest, matrix, follower, partial(make_by, Deformer, known), exact, splats)
 
     return make
 

@@ -70,6 +70,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         items=[
             ("Z", "Z", "Coordinates as they are in the file, as in Blender and in surveys"),
             ("Y", "Y", "Turn the points upright that other programs store with Y upwards"),
+            ("-Y", "-Y", "Turn the points upright that are stored with Y downwards, as many Gaussian splats are"),
         ],
         default="Z",
     )
@@ -146,7 +147,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             if isinstance(table, Splats):
                 clouds.append(self._add_splats(context, path.stem, table))
                 continue
-            turned = _turned_up(table) if self.up == "Y" else table
+            turned = _turned_up(table, self.up) if self.up != "Z" else table
             obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
             obj.select_set(True)
             context.view_layer.objects.active = obj
@@ -156,7 +157,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             elif found is not None:
                 surfaces.append(obj)
                 if DISC not in obj.data.attributes:  # those of the file, if there are any, may have been turned
-                    write_attribute(obj.data, DISC, _turned(found) if self.up == "Y" else found)
+                    write_attribute(obj.data, DISC, _turned(found, self.up) if self.up != "Z" else found)
                     tag_changed(obj.data)
             if shared is None and OFFSET in obj:
                 shared = offset_of(obj)
@@ -176,8 +177,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def _add_splats(self, context, name, splats):
         """Add an object of splats, which keep the numbers of their file: it is the object that is turned upright."""
         obj = add_splats(name, splats, context.collection)
-        if self.up == "Y":
-            obj.rotation_euler.x = np.pi / 2.0
+        obj.rotation_euler.x = {"Z": 0.0, "Y": 0.5, "-Y": -0.5}[self.up] * np.pi
         obj.select_set(True)
         context.view_layer.objects.active = obj
         for notice in splats.notices:
@@ -263,14 +263,15 @@ def _find_discs(points, progress):
     return shown
 
 
-def _turned_up(table):
-    """Return a table with what points along Y turned towards Z."""
-    vectors = {name: _turned(values) for name, values in table.attributes.items() if values.ndim == 2}
-    return replace(table, points=_turned(table.points), attributes={**table.attributes, **vectors})
+def _turned_up(table, up):
+    """Return a table with what points along Y, or against it, turned towards Z."""
+    vectors = {name: _turned(values, up) for name, values in table.attributes.items() if values.ndim == 2}
+    return replace(table, points=_turned(table.points, up), attributes={**table.attributes, **vectors})
 
 
-def _turned(vectors):
-    return vectors[:, [0, 2, 1]] * np.array([1.0, -1.0, 1.0], vectors.dtype)
+def _turned(vectors, up):
+    side = 1.0 if up == "Y" else -1.0
+    return vectors[:, [0, 2, 1]] * np.array([1.0, -side, side], vectors.dtype)
 
 
 CLASSES = (MESHFREE_OT_import_points,)

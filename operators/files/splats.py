@@ -11,7 +11,7 @@ from ..objects.attributes import read_attribute, write_attribute
 from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, shown_splats
 from .objects import add_column
 
-LAYOUT = "lb_splat_layout"  # custom property of an object: how the file that it came from was laid out
+FORMAT = "lb_splat_format"  # custom property of an object: how the file that it came from was laid out
 # What decoding a file loses, so that what is not changed can be written as it was: attributes and their columns.
 _RAW = {
     "ply_scale": ("FLOAT_VECTOR", ("scale_0", "scale_1", "scale_2")),
@@ -57,7 +57,7 @@ def _keep_file(obj, splats):
     for name in columns.keys() - known:
         add_column(obj.data, name, columns[name])
     types = [[name, values.dtype.str[1:]] for name, values in columns.items()]
-    obj[LAYOUT] = json.dumps({"order": splats.file.order, "comments": splats.file.comments, "columns": types})
+    obj[FORMAT] = json.dumps({"order": splats.file.order, "comments": splats.file.comments, "columns": types})
 
 
 def _known_columns(splats):
@@ -82,16 +82,16 @@ def is_drawn(data) -> bool:
 def splats_to_write(obj) -> Splats:
     """Return the splats of an object as a deformation shows them, in local space, with what their file held."""
     splats, data = shown_splats(obj), obj.data
-    layout = obj.get(LAYOUT)
-    if not layout:
+    written = obj.get(FORMAT)
+    if not written:
         return splats
-    layout = json.loads(layout)
+    written = json.loads(written)
     raw = {}
     for name, (_, parts) in _RAW.items():
         values = read_attribute(data, name) if name in data.attributes else np.zeros((len(splats), len(parts)))
         raw.update(zip(parts, values.reshape(len(splats), -1).T, strict=True))
     columns = {}
-    for name, code in layout["columns"]:
+    for name, code in written["columns"]:
         if name in raw:
             values = raw[name]
         elif name in data.attributes:
@@ -99,6 +99,6 @@ def splats_to_write(obj) -> Splats:
         else:  # written from the splats, or deleted since
             values = np.zeros(len(splats))
         columns[name] = values.astype(code)
-    file = SplatFile(columns, layout["order"], tuple(layout["comments"]))
+    file = SplatFile(columns, written["order"], tuple(written["comments"]))
     rest = (splats.positions, splats.scales, splats.rotations, splats.opacities, splats.colors, splats.harmonics)
     return Splats(*rest, file=file)

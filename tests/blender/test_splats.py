@@ -1,11 +1,13 @@
 """Gaussian splats that go with a deformation: sizes, rotations and harmonics, live, applied, baked, smoothed."""
 
+import importlib
+
 import bpy
 import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
 
-from tests.blender.clouds import add_group
+from tests.blender.clouds import add_group, everything
 from tests.blender.splats import add_attribute, add_splats, bar_splats, read, shown, splats_of
 
 TURN = np.array(Euler((0.4, -0.3, 0.8)).to_matrix())
@@ -161,3 +163,143 @@ def test_points_that_are_no_splats_get_no_attributes_of_such(rest):
     before = read(obj.data, "scale")
     assert bpy.ops.meshfree.smooth(target="IN_PLACE") == {"FINISHED"}
     np.testing.assert_array_equal(read(obj.data, "scale"), before)
+
+
+def kept_in(core, rest, folder, name="given.ply"):
+    core.write_splats(folder / name, rest)
+    return folder / name
+
+
+class TestFiles:
+    @pytest.mark.parametrize("degree", [0, 1, 2, 3, 4])
+    @pytest.mark.parametrize("up", ["Z", "Y", "-Y"])
+    def test_untouched_splats_come_back_bit_for_bit(self, core, tmp_path, degree, up):
+        given = kept_in(core, bar_splats(core, degree), tmp_path)
+        assert bpy.ops.meshfree.import_points(filepath=str(given), up=up) == {"FINISHED"}
+        obj = bpy.context.object
+        assert obj.type == ("POINTCLOUD" if bpy.app.version >= (4, 5) else "MESH")
+        assert obj.select_get()
+        close(splats_of(core, obj.data), core.read_splats(given))
+        assert bpy.ops.meshfree.export_splats(filepath=str(tmp_path / "again.ply")) == {"FINISHED"}
+        assert (tmp_path / "again.ply").read_bytes() == given.read_bytes()
+
+    def test_an_odd_file_comes_back_bit_for_bit(self, core, tmp_path):
+        """Big end first, with normals, a column of its own and a comment."""
+        splats = core.read_splats(kept_in(core, bar_splats(core, 1), tmp_path))
+        columns = {
+            "nx": np.full(len(splats), 0.25, np.float32),
+            **splats.file.columns,
+            "confidence": splats.file.columns["x"],
+        }
+        file = splats.file._replace(columns=columns, order=">", comments=("comment of a trainer",))
+        odd = kept_in(core, splats.__class__(**{**vars(splats), "file": file}), tmp_path, "odd.ply")
+        assert bpy.ops.meshfree.import_points(filepath=str(odd)) == {"FINISHED"}
+        assert bpy.ops.meshfree.export_splats(filepath=str(tmp_path / "again.ply")) == {"FINISHED"}
+        assert (tmp_path / "again.ply").read_bytes() == odd.read_bytes()
+
+    def test_a_deformed_object_is_written_as_it_is_shown(self, core, rest, tmp_path):
+        obj, empty = bound(rest)
+        empty.location += Vector((0.0, 1.0, 0.5))
+        bpy.ops.meshfree.deform_update()
+        assert bpy.ops.meshfree.export_splats(filepath=str(tmp_path / "bent.ply")) == {"FINISHED"}
+        found = core.read_splats(tmp_path / "bent.ply")
+        np.testing.assert_allclose(found.positions, read(shown(obj), "position"), atol=1e-6)
+        assert np.abs(found.covariances - rest.covariances).max() > 1e-3
+
+    def test_objects_that_are_no_splats_are_refused(self, rest):
+        obj = add_splats(rest)
+        obj.data.attributes.remove(obj.data.attributes["scale"])
+        assert not bpy.ops.meshfree.export_splats.poll()
+        assert not bpy.ops.meshfree.apply_to_splats.poll()
+
+
+class TestPlace:
+    @pytest.mark.parametrize("scale", [(1, 1, 1), (2, 2, 2), (1, 2, 0.5), (-1, 1, 1)])
+    def test_the_place_of_an_object_becomes_that_of_its_splats(self, core, rest, scale):
+        obj = add_splats(rest)
+        obj.matrix_world = Matrix.Translation((5, 6, 7)) @ Matrix(TURN).to_4x4() @ Matrix.Diagonal((*scale, 1))
+        bpy.context.view_layer.update()
+        matrix = np.array(obj.matrix_world)
+        assert bpy.ops.meshfree.apply_to_splats() == {"FINISHED"}
+        np.testing.assert_allclose(np.array(obj.matrix_world), np.eye(4), atol=1e-6)
+        close(splats_of(core, obj.data), turned(rest, matrix[:3, :3], matrix[:3, 3]))
+
+    def test_bound_shared_and_flattened_objects_are_refused(self, core, rest):
+        obj, _ = bound(rest)
+        with pytest.raises(RuntimeError, match="Unbind it first"):
+            bpy.ops.meshfree.apply_to_splats()
+        bpy.ops.meshfree.deform_unbind()
+        obj.scale.x = 0.0
+        bpy.context.view_layer.update()
+        before = everything(obj)
+        with pytest.raises(RuntimeError, match="scaled to nothing"):
+            bpy.ops.meshfree.apply_to_splats()
+        assert everything(obj) == before
+
+
+class TestDisplay:
+    def test_imported_splats_are_drawn_as_ellipsoids(self, core, rest, tmp_path):
+        bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)))
+        obj = bpy.context.object
+        drawn = corners(obj)
+        assert len(drawn) == 12 * len(rest)  # an icosahedron each
+        offsets = drawn.reshape(len(rest), 12, 3) - rest.positions[:, None]
+        spread = np.einsum("nka,nkb->nab", offsets, offsets) / 12  # that of a ball of radius 2 is 4 / 3
+        np.testing.assert_allclose(spread, 4.0 / 3.0 * rest.covariances, atol=1e-5)
+
+    def test_results_and_splats_are_shown_in_turn(self, core, rest, tmp_path):
+        bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)))
+        obj = bpy.context.object
+        assert bpy.ops.meshfree.analyze() == {"FINISHED"}
+        material = next(item for item in bpy.data.materials if "Display" in item.name)
+        names = {node.attribute_name for node in material.node_tree.nodes if node.type == "ATTRIBUTE"}
+        assert "lb_mean_curvature" in names
+        assert bpy.ops.meshfree.show_splats() == {"FINISHED"}
+        names = {node.attribute_name for node in material.node_tree.nodes if node.type == "ATTRIBUTE"}
+        assert names == {"radiance:base"}
+        assert len(corners(obj)) == 12 * len(rest)
+        obj.meshfree.point_shape = "DOTS"
+        assert corners(obj) is None
+
+    def test_without_the_switch_splats_are_plain_points(self, core, rest, tmp_path):
+        bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)), surface=False)
+        assert not bpy.context.object.modifiers
+
+
+def corners(obj):
+    """Vertices that the display draws, (n, 3); None if it draws points."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    geometry = evaluated.evaluated_geometry() if hasattr(evaluated, "evaluated_geometry") else None
+    mesh = geometry.mesh if geometry else evaluated.data
+    if mesh is None or not len(mesh.vertices):
+        return None
+    places = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", places)
+    return places.reshape(-1, 3)
+
+
+class FutureData:
+    """What Blender 5.3 is said to give of a point cloud: a type, which the module here does not have yet."""
+
+    class bl_rna:
+        class properties:
+            @staticmethod
+            def get(name):
+                class Kind:
+                    enum_items = ("POINTS", "GAUSSIAN_SPLAT")
+
+                return Kind if name == "type" else None
+
+    type = "POINTS"
+
+
+def test_point_clouds_get_the_type_of_splats_where_blender_has_it(extension):
+    splats = importlib.import_module(f"{extension.__name__}.operators.files.splats")
+    future = FutureData()
+    assert not splats.is_drawn(future)
+    splats.mark(future)
+    assert future.type == "GAUSSIAN_SPLAT"
+    assert splats.is_drawn(future)
+    now = bpy.data.meshes.new("now")
+    splats.mark(now)  # nothing to mark
+    assert not splats.is_drawn(now)

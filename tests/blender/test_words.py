@@ -8,7 +8,7 @@ import pytest
 # Words that stay small within a label, and names that are not written as others are.
 SMALL = {"a", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "the", "to", "with"}
 # These change nothing in the scene.
-NO_UNDO = {"export_eigenvalues", "export_operator", "export_points", "stop", "escape"}
+NO_UNDO = {"export_eigenvalues", "export_operator", "export_points", "export_splats", "stop", "escape"}
 UNLOGGED = {"stop", "escape"}  # nothing to repeat
 # A button beside its menu, as with all presets of Blender; and what hears Esc.
 HIDDEN = {"add_preset", "escape"}

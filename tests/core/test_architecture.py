@@ -77,6 +77,7 @@ BELOW = {  # what each wing of core may use
 SIDEWAYS = {  # applications that build on others
     ("coarse_deformation", "deformation"),
     ("deformation", "gradients"),
+    ("deformation", "graph"),
     ("fields", "graph"),
     ("geodesics", "graph"),
     ("transport", "geodesics"),

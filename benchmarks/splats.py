@@ -1,0 +1,114 @@
+"""Gaussian splats: times, what a bend keeps, and a picture of it: ``python -m benchmarks.splats [FILE.ply]``.
+
+Draws docs/pictures/splats_bar.png by the renderer of the tests. A file of splats is read, written, and read again.
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+import numpy as np
+from matplotlib.image import imsave
+from scipy.spatial.transform import Rotation
+
+import core
+from benchmarks.samplings import bar, bent_end, fibonacci_sphere
+from core.splats.ellipsoids import quaternions_of
+from tests.splat_renderer import render
+
+PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "splats_bar.png"
+LENGTH, CELLS = 4.0, 24
+FRONT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # to the right, upwards, to the viewer
+LARGE = 2_000_000
+FOLLOWED = 20_000, 100_000
+
+
+def splats_on(laplacian, degree=3, seed=3):
+    """Return flat splats in the tangent planes of a cloud, that cover it, with colors of a degree."""
+    points, normals = laplacian.points, laplacian.normals
+    tangent = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    frames = np.stack([tangent, np.cross(normals, tangent), normals], axis=2)
+    rng = np.random.default_rng(seed)
+    sizes = np.column_stack([rng.uniform(0.5, 0.8, (len(points), 2)), np.full(len(points), 0.05)])
+    waves = np.sin(points @ rng.standard_normal((3, 3)) * 4.0)
+    rest = np.repeat(0.25 * rng.standard_normal((1, (degree + 1) ** 2 - 1, 3)), len(points), axis=0)
+    scales, rotations = np.sqrt(laplacian.areas)[:, None] * sizes, quaternions_of(np.moveaxis(frames, 0, 2))
+    return core.Splats(points, scales, rotations, rng.uniform(0.7, 1.0, len(points)), 1.6 * waves, rest)
+
+
+def bent_bar():
+    """Return the splats of a bar, straight and bent by a right angle."""
+    points = bar(CELLS, 4 * CELLS)[0]
+    laplacian = core.build_laplacian(points)
+    reach = 2.5 * LENGTH / (4 * CELLS)
+    deformer = core.Deformer(laplacian, points[:, 0] > LENGTH - reach, points[:, 0] < reach)
+    moved = deformer.solve(bent_end(points[deformer.handles], 0.5 * np.pi))
+    splats = splats_on(laplacian)
+    return splats, splats.deformed(moved, deformer.gradients(moved))
+
+
+def draw(before, after):
+    """Draw the bar, straight and bent."""
+    camera = FRONT @ Rotation.from_euler("zx", [25.0, 20.0], degrees=True).as_matrix()
+    shown = (before, [2.0, 0.0, 0.0]), (after, [1.3, 0.0, 1.2])
+    pictures = [render(splats, camera, middle, 4.8, (300, 360)) for splats, middle in shown]
+    imsave(PICTURE, np.clip(np.hstack(pictures), 0.0, 1.0))
+
+
+def timed(name, function, times=3):
+    """Print the least time that a function takes, and return what it does."""
+    took = []
+    for _ in range(times):
+        began = perf_counter()
+        result = function()
+        took.append(perf_counter() - began)
+    print(f"{name:60} {1e3 * min(took):8.0f} ms", flush=True)
+    return result
+
+
+def follow(count):
+    """Time what a drag of splats on a sphere computes."""
+    points = fibonacci_sphere(count)
+    laplacian = core.build_laplacian(points)
+    splats = splats_on(laplacian)
+    quick = replace(splats, harmonics=splats.harmonics[:, :0])
+    z = points[:, 2]
+    deformer = core.CoarseDeformer(laplacian, z > 0.8, z < -0.8)
+    goal = points[deformer.handles] + [0.1, 0.0, 0.5]
+    moved = timed(f"{count:,} splats: points", lambda: deformer.solve(goal, steps=1))
+    gradients = timed(f"{count:,} splats: gradients", lambda: deformer.gradients(moved))
+    timed(f"{count:,} splats: sizes and rotations", lambda: quick.deformed(moved, gradients))
+    timed(f"{count:,} splats: with harmonics of degree 3", lambda: splats.deformed(moved, gradients))
+
+
+def main():
+    """Measure and draw."""
+    before, after = bent_bar()
+    for name, volume in (
+        ("ellipses", lambda each: np.sort(each.scales, axis=1)[:, 1:].prod(axis=1).sum()),
+        ("ellipsoids", lambda each: each.scales.prod(axis=1).sum()),
+    ):
+        print(f"volume of {name} after a bend by 90 degrees: {100 * (volume(after) / volume(before) - 1):+.2f} %")
+    draw(before, after)
+    for count in FOLLOWED:
+        follow(count)
+    points = np.random.default_rng(0).standard_normal((LARGE, 3))
+    ones = np.ones(LARGE)
+    many = core.Splats(
+        points, np.exp(points), np.tile([1.0, 0, 0, 0], (LARGE, 1)), 0.5 * ones, points, np.zeros((LARGE, 15, 3))
+    )
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "many.ply"
+        timed(f"{LARGE:,} splats of degree 3: write", lambda: core.write_splats(path, many), 1)
+        timed(f"{LARGE:,} splats of degree 3: read", lambda: core.read_splats(path), 1)
+        for name in sys.argv[1:]:
+            splats = timed(f"{Path(name).name}: read", lambda name=name: core.read_splats(name))
+            timed(f"{Path(name).name}: write", lambda splats=splats: core.write_splats(path, splats))
+            print(f"{Path(name).name}: bit for bit the same: {path.read_bytes() == Path(name).read_bytes()}")
+
+
+if __name__ == "__main__":
+    main()
