@@ -306,7 +306,8 @@ def _thin(path):
 def take(path, legend, view=VIEW, size=WIDE):
     """Render all that is in the scene into a picture of the manual."""
     scene = bpy.context.scene
-    set_up(scene, [obj for obj in scene.objects if obj.type == "MESH"], size, SAMPLES, view, legend is not None)
+    shown = [obj for obj in scene.objects if obj.type in ("MESH", "POINTCLOUD")]
+    set_up(scene, shown, size, SAMPLES, view, legend is not None)
     if legend is not None:
         part("ui.legend").make_legend(scene, legend, scene.camera)
     render(scene, path)

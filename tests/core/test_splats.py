@@ -205,7 +205,7 @@ def test_files_that_hold_no_splats_are_refused(tmp_path):
         core.write_splats(tmp_path / "splats.txt", some_splats(2))
     with pytest.raises(core.PointCloudError, match="no name of a file"):
         core.read_splats(5)
-    with pytest.raises(core.PointCloudError, match="not list"):
+    with pytest.raises(core.PointCloudError, match="not Splats"):
         core.write_splats(tmp_path / "splats.ply", [1.0])
     rows = written_ply(tmp_path / "bad.ply", 0)
     rows["x"][3] = np.nan
