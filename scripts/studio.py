@@ -83,6 +83,7 @@ def set_up(scene, obj, size=(1280, 800), samples=16, view=VIEW, legend=True):
     scene.cycles.samples = samples
     scene.cycles.use_denoising = False
     scene.cycles.max_bounces = 0  # objects shed none of their colour on each other
+    scene.cycles.transparent_max_bounces = 128  # splats lie behind each other
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.image_settings.compression = 100
