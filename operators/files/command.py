@@ -21,6 +21,7 @@ from ..tools.minimal import MinimalSurface
 from ..tools.segment import Segment, Signature
 from ..tools.sequence import continue_modes
 from ..tools.smooth import ModeShape, Smooth
+from . import bending
 from . import objects as files
 
 # Tools that need nothing picked, beside the analysis, by the names of their operators.
@@ -32,6 +33,11 @@ VERBS = {
     "segment": Segment,
     "signature": Signature,
     "minimal_surface": MinimalSurface,
+}
+# Others, which take no object: what they do and how they are called there.
+PLAIN = {
+    "splat_info": (bending.splat_info, "what files of Gaussian splats hold"),
+    "deform": (bending.deform, "move points or Gaussian splats by handles that a JSON file names"),
 }
 _SETTINGS = (*options.ALL_NAMES, "make_single_user")  # of the object
 _handles = []
@@ -109,6 +115,29 @@ def _parse(argv):
         for setting in _choices(verb):
             _add_setting(parsers[verb], setting)
         _add_files(parsers[verb])
+
+    for verb, (_, text) in PLAIN.items():
+        parsers[verb] = commands.add_parser(
+            verb.replace("_", "-"),
+            help=text,
+            description=f"{text.capitalize()}. Writes one JSON line per input. The exit code is 1 if any input failed.",
+        )
+        parsers[verb].add_argument("inputs", nargs="+", type=Path, metavar="IN", help="files of points or splats")
+        if verb == "deform":
+            parsers[verb].add_argument(
+                "--handles",
+                type=Path,
+                required=True,
+                metavar="JSON",
+                help='{"handles": [{"center": [x, y, z], "radius": r, "shift": [x, y, z]}], "anchors": [...]}: points'
+                ' in balls or by "indices", moved by "shift", "matrix" (4 x 4) or "positions"',
+            )
+            target = parsers[verb].add_mutually_exclusive_group()
+            target.add_argument("--out", type=Path, metavar="FILE", help="output of one input")
+            target.add_argument("--out-dir", type=Path, metavar="DIR", help="folder for the outputs of all inputs")
+            parsers[verb].add_argument("--format", choices=("ply", "xyz", "csv"), default="ply", help="in the folder")
+        else:
+            parsers[verb].set_defaults(out=None, out_dir=None)
 
     arguments = parser.parse_args(argv)
     arguments.command = arguments.command.replace("-", "_")
@@ -207,6 +236,9 @@ def _process(path, arguments) -> dict:
     output = _output_path(path, arguments)
     if output is not None and output.resolve() == path.resolve():
         raise PointCloudError(f"The output {output} would overwrite its input. Choose another name.")
+    if arguments.command in PLAIN:
+        result = PLAIN[arguments.command][0](path, arguments, output)
+        return {**result, "output": None if output is None else str(output)}
     obj, notices = files.load(path, arguments.object)
     reason = obstacle(obj)
     if reason:

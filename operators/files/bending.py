@@ -1,0 +1,128 @@
+"""Verbs of the command line that need no object: what a file of splats holds, and bending of points and splats."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...core import CoarseDeformer, PointCloudError, build_laplacian, read_splats, write_splats
+from ...core.files import WRITABLE, read_points, write_points
+from ...core.splats import holds_splats
+
+_SHARES = (0.01, 0.5, 0.99)  # quantiles that are told
+_FLAT = 0.3  # of the middle axis, below which the shortest one makes a splat flat
+
+
+def splat_info(path, arguments, output) -> dict:
+    """Tell what a file of splats holds."""
+    splats = read_splats(path)
+    axes = np.sort(splats.scales, axis=1)
+
+    def quantiles(values):
+        return [float(f"{value:.6g}") for value in np.quantile(values, _SHARES)]
+
+    return {
+        "splats": len(splats),
+        "degree": round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1,
+        "low": splats.positions.min(axis=0).tolist(),
+        "high": splats.positions.max(axis=0).tolist(),
+        "longest_axis": quantiles(axes[:, 2]),
+        "opacity": quantiles(splats.opacities),
+        "flat": float(np.mean(axes[:, 0] < _FLAT * axes[:, 1])),
+        "notices": splats.notices,
+    }
+
+
+def deform(path, arguments, output) -> dict:
+    """Move the points, or the splats, of a file by handles that a JSON file names, and write them."""
+    if output is None:
+        raise PointCloudError("Nothing would be written. Give --out or --out-dir.")
+    wanted = _read_handles(arguments.handles)
+    splats = read_splats(path) if holds_splats(path) else None
+    if splats is not None and output.suffix.lower() != ".ply":
+        raise PointCloudError(f"Splats cannot be written to {output}. Let its name end in .ply.")
+    if splats is None and output.suffix.lower() not in WRITABLE:
+        raise PointCloudError(f"Points cannot be written to {output}. Let its name end in {', '.join(WRITABLE)}.")
+    table = read_points(path) if splats is None else None
+    points = table.points if splats is None else splats.positions
+    handles, goal = _moves(wanted, points)
+    anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
+    deformer = CoarseDeformer(
+        build_laplacian(points), handles, np.unique(np.concatenate(anchors)) if anchors else [], rotation_aware=True
+    )
+    moved = deformer.solve(goal)
+    if splats is None:
+        write_points(output, replace(table, points=moved), double=not table.single)
+    else:
+        write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
+    notices = (table if splats is None else splats).notices
+    farthest = float(np.linalg.norm(moved - points, axis=1).max())
+    return {"points": len(points), "farthest": farthest, "notices": [*notices, *deformer.notices]}
+
+
+def _read_handles(path):
+    """Read what a JSON file says of handles and anchors."""
+    try:
+        wanted = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise PointCloudError(f"{path} cannot be read: {error.strerror or error}. Check its name.") from error
+    except ValueError as error:
+        raise PointCloudError(f"{path} is no JSON: {error}. Mend it.") from error
+    listed = isinstance(wanted, dict) and all(
+        isinstance(wanted.get(name, []), list) and all(isinstance(one, dict) for one in wanted.get(name, []))
+        for name in ("handles", "anchors")
+    )
+    if not listed or not wanted.get("handles"):
+        raise PointCloudError(f'{path} names no handles. Give {{"handles": [{{...}}], "anchors": [{{...}}]}}.')
+    return wanted
+
+
+def _moves(wanted, points):
+    """Return the indices of the points that are moved, and where to."""
+    members = [_members(one, points, "handles") for one in wanted["handles"]]
+    goals = [_goal(one, points[rows]) for one, rows in zip(wanted["handles"], members, strict=True)]
+    rows = np.concatenate(members)
+    if len(np.unique(rows)) < len(rows):
+        raise PointCloudError("Some points are in two handles. Make balls smaller, or name each point once.")
+    return rows, np.concatenate(goals)
+
+
+def _members(one, points, name):
+    """Return the indices of the points that a handle takes: named ones, or those in a ball."""
+    if "indices" in one:
+        rows = _numbers(one["indices"], (-1,), "indices")
+        if not np.isin(rows, np.arange(len(points))).all():
+            raise PointCloudError(f"The {name} name points that are not there. Give whole numbers below {len(points)}.")
+        return rows.astype(int)
+    if {"center", "radius"} <= one.keys():
+        center, radius = _numbers(one["center"], (3,), "center"), _numbers(one["radius"], (), "radius")
+        rows = np.flatnonzero(np.linalg.norm(points - center, axis=1) <= radius)
+        if not len(rows):
+            raise PointCloudError(f"No point is in a ball of the {name}. Give another center or a larger radius.")
+        return rows
+    raise PointCloudError(f'One of the {name} names no points. Give "indices", or "center" and "radius".')
+
+
+def _goal(one, points):
+    """Return where the points of a handle go."""
+    if "positions" in one:
+        return _numbers(one["positions"], points.shape, "positions")
+    if "matrix" in one:
+        matrix = _numbers(one["matrix"], (4, 4), "matrix")
+        return points @ matrix[:3, :3].T + matrix[:3, 3]
+    if "shift" in one:
+        return points + _numbers(one["shift"], (3,), "shift")
+    raise PointCloudError('One of the handles goes nowhere. Give "shift", "matrix" or "positions".')
+
+
+def _numbers(given, shape, name):
+    """Return numbers of a JSON file as an array; -1 in a shape stands for any length."""
+    try:
+        array = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    fits = array.ndim == len(shape) and all(size in (own, -1) for own, size in zip(array.shape, shape, strict=True))
+    if not fits or not np.isfinite(array).all():
+        raise PointCloudError(f'"{name}" must be {" x ".join(map(str, shape)) or "one"} finite numbers. Mend that.')
+    return array
