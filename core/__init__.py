@@ -90,7 +90,7 @@ from .operator import (
 )
 from .options import LaplacianOptions
 from .paper import Stability, check_stability
-from .splats import Splats, read_splats, write_splats
+from .splats import Splats, floaters, read_splats, write_splats
 
 __all__ = [
     "AreaError",
@@ -134,6 +134,7 @@ __all__ = [
     "exponential",
     "fair_points",
     "fairing",
+    "floaters",
     "geodesic_distance",
     "grow",
     "harmonic_field",

@@ -18,7 +18,14 @@ _TOOLS = (
     ("minimal_surface",),
     ("stop",),
 )
-_SELECTING = ("select_grow", "select_component", "select_front", "select_boundary", "select_by_range")
+_SELECTING = (
+    "select_grow",
+    "select_component",
+    "select_front",
+    "select_boundary",
+    "select_by_range",
+    "select_floaters",
+)
 
 
 class MESHFREE_MT_object(bpy.types.Menu):

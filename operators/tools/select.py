@@ -6,13 +6,14 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
-from ...core import PointCloudError, grow
+from ...core import PointCloudError, floaters, grow
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.counting import renew_counts
 from ..objects.groups import HANDLE, SOURCE, assign, check_assignable, chosen_members, is_chosen, role_group
 from ..objects.handlers import tell
 from ..objects.reading import obstacle, sharing_objects
+from ..objects.splats import read_splats
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
 from ..running.ready import reporting
@@ -316,6 +317,21 @@ class MESHFREE_OT_select_boundary(SelectionOperator, bpy.types.Operator):
         return lambda: select(context, obj, boundary)
 
 
+class MESHFREE_OT_select_floaters(SelectionOperator, bpy.types.Operator):
+    """Select the Gaussian splats that show no surface: hardly seen ones, huge ones, and such as float alone"""
+
+    bl_idname = "meshfree.select_floaters"
+    bl_label = "Select Floaters"
+    needs_selection = False
+    surface = False
+
+    def prepare(self, context, obj):
+        chosen = floaters(read_splats(obj.data))
+        if not chosen.any():
+            raise PointCloudError(f'None of the {len(chosen):,} splats of "{obj.name}" is a floater.')
+        return lambda: select(context, obj, chosen)
+
+
 class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
     """Select the points of a group that the tools take"""
 
@@ -336,6 +352,7 @@ CLASSES = (
     MESHFREE_OT_select_component,
     MESHFREE_OT_select_front,
     MESHFREE_OT_select_boundary,
+    MESHFREE_OT_select_floaters,
     MESHFREE_OT_select_group,
     MESHFREE_OT_group_from_selection,
 )

@@ -48,6 +48,7 @@ OPERATORS = (
     "segment",
     "select_by_range",
     "select_component",
+    "select_floaters",
     "select_front",
     "select_group",
     "select_grow",

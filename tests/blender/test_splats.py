@@ -278,6 +278,24 @@ def corners(obj):
     return places.reshape(-1, 3)
 
 
+def test_floaters_are_selected(core, rest):
+    opacities = np.array(rest.opacities)
+    opacities[[3, 700]] = 0.01
+    obj = add_splats(core.Splats(**{**vars(rest), "opacities": opacities}))
+    assert bpy.ops.meshfree.select_floaters() == {"FINISHED"}
+    if obj.type == "MESH":
+        chosen = [vertex.select for vertex in obj.data.vertices]
+    else:
+        chosen = [item.value for item in obj.data.attributes[".selection"].data]
+    assert set(np.flatnonzero(chosen)) == {3, 700}
+
+
+def test_where_no_splat_floats_that_is_told(rest):
+    add_splats(rest)
+    with pytest.raises(RuntimeError, match="is a floater"):
+        bpy.ops.meshfree.select_floaters()
+
+
 class FutureData:
     """What Blender 5.3 is said to give of a point cloud: a type, which the module here does not have yet."""
 

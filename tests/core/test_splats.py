@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import sph_harm_y
 
 import core
+from benchmarks.samplings import fibonacci_sphere
 from core.splats.ellipsoids import mapped, matrices_of, quaternions_of
 from core.splats.harmonics import COUNTS, harmonics, turned
 
@@ -231,3 +232,37 @@ def test_arrays_of_wrong_shapes_are_refused():
         splats.deformed(splats.positions, np.eye(3))
     with pytest.raises(core.InvalidPointsError, match="2 of 10"):
         splats.deformed(splats.positions, np.where(np.arange(10)[:, None, None] < 2, np.nan, np.eye(3)))
+
+
+def test_floaters_are_found_whatever_the_units_and_the_order():
+    """A sphere of flat splats, with faint ones, huge ones, and such as float above it."""
+    points = fibonacci_sphere(2000)
+    rng = np.random.default_rng(4)
+    frames = np.stack([np.cross(points, [0.3, 0.8, 0.1]), np.zeros_like(points), points], axis=2)
+    frames[:, :, 0] /= np.linalg.norm(frames[:, :, 0], axis=1)[:, None]
+    frames[:, :, 1] = np.cross(frames[:, :, 2], frames[:, :, 0])
+    opacities, scales = rng.uniform(0.3, 1.0, 2000), np.tile([0.05, 0.04, 0.003], (2000, 1))
+    wrong = rng.permutation(2000)[:90]
+    faint, huge, apart = wrong[:30], wrong[30:60], wrong[60:]
+    opacities[faint], scales[huge] = 0.01, 2.0
+    points[apart] *= 1.6
+    rotations = quaternions_of(np.moveaxis(frames, 0, 2))
+    splats = core.Splats(points, scales, rotations, opacities, points, np.zeros((2000, 0, 3)))
+    found = core.floaters(splats)
+    np.testing.assert_array_equal(np.flatnonzero(found), np.sort(wrong))
+    similar = 300.0 * TURNS.as_matrix()[0]
+    turned_ones = splats.deformed(points @ similar.T, np.tile(similar, (2000, 1, 1)))
+    np.testing.assert_array_equal(core.floaters(turned_ones), found)
+    order = rng.permutation(2000)
+    parts = (points[order], scales[order], rotations[order], opacities[order], points[order], np.zeros((2000, 0, 3)))
+    np.testing.assert_array_equal(core.floaters(core.Splats(*parts)), found[order])
+
+
+def test_floaters_need_splats_with_finite_numbers():
+    with pytest.raises(core.InvalidPointsError, match="not Splats"):
+        core.floaters(np.zeros((5, 3)))
+    splats = some_splats(20)
+    splats.scales[3] = np.nan
+    with pytest.raises(core.InvalidPointsError, match="1 of 20"):
+        core.floaters(splats)
+    assert core.floaters(some_splats(5)).shape == (5,)
