@@ -274,10 +274,9 @@ def test_change_while_computing_beside_the_window(fresh, reports, attended, tmp_
     rng = np.random.default_rng(seed)
     make, name, settings = ATTENDED[rng.integers(len(ATTENDED))]
     change = [*ENDING, *HARMLESS][rng.integers(len(ENDING) + len(HARMLESS))]
-    fresh(make)
-    seen = reports()
+    obj, seen = fresh(make), reports()
     getattr(bpy.ops.meshfree, name)(**settings)
-    undisturbed, count = everything(bpy.context.object)["attributes"], len(seen)
+    undisturbed, count = everything(obj)["attributes"], len(seen)  # Bind makes an empty the active one
 
     obj, threads = fresh(make), threading.active_count()
     reports()
@@ -292,11 +291,11 @@ def test_change_while_computing_beside_the_window(fresh, reports, attended, tmp_
     assert threading.active_count() <= threads
     if change in HARMLESS:
         assert result == {"FINISHED"}, run.reports
-        assert everything(bpy.context.object)["attributes"] == undisturbed
+        assert everything(obj)["attributes"] == undisturbed
     else:
         assert result == {"CANCELLED"}, run.reports
         assert len(run.reports) == 1
         assert not differences(scene(), before)
-    fresh(make)
+    obj = fresh(make)
     assert getattr(bpy.ops.meshfree, name)(**settings) == {"FINISHED"}
-    assert everything(bpy.context.object)["attributes"] == undisturbed
+    assert everything(obj)["attributes"] == undisturbed
