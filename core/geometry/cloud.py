@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import ComponentError
+from ..errors import ComponentError, TooFewPointsError
 from ..options import LaplacianOptions, check_options
 from .bandwidth import depth, mean_gaps, smoothing_lengths
 from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
@@ -16,7 +16,7 @@ from .noise import FILLING, LEFT, MOST, noise_level, project_points
 from .normals import covariance_normals, orient_outwards, unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
-from .points import ScaledPoints, check_boundary, check_distances, check_points, scale_points
+from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
 from .quadrics import Quadrics, check_surface
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
@@ -111,7 +111,7 @@ class Cloud:
     notices: list
 
 
-def read_cloud(points, options, normals=None, boundary=None, boundary_distance=None, progress=None):
+def read_cloud(points, options, normals=None, boundary=None, boundary_distance=None, progress=None, left_out=()):
     """Go from coordinates to pairs.
 
     Parameters
@@ -120,7 +120,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         Coordinates [L].
     options : LaplacianOptions
         Settings.
-    normals, boundary, boundary_distance, progress
+    normals, boundary, boundary_distance, progress, left_out
         See `build_laplacian`.
 
     Returns
@@ -136,7 +136,10 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     report("Normals", 0.0)
     check_options(options)
     points = check_points(points)
-    scaled, surface = read_surface(points, options, report)
+    kept = np.flatnonzero(~as_mask(left_out, len(points)))
+    if not len(kept):
+        raise TooFewPointsError(f"All {len(points)} points are named to be left out. Name fewer.")
+    scaled, surface = read_surface(points, options, report, kept)
     sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
 
     report("Normals", 0.18)
@@ -180,7 +183,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         boundary=boundary,
         pairs=pairs,
         notices=_notices(
-            duplicates=len(points) - len(scaled.points),
+            duplicates=len(kept) - len(scaled.points),
             left_out=len(scaled.points) - len(own),
             share=1.0 - len(own) / len(scaled.points),
             noise=sample.noise,
@@ -189,8 +192,8 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     )
 
 
-def read_surface(points, options, report):
-    """Go from coordinates, checked, to quadrics.
+def read_surface(points, options, report, kept=None):
+    """Go from coordinates, checked, to quadrics; of some rows of them alone, if these are named.
 
     Returns
     -------
@@ -200,7 +203,10 @@ def read_surface(points, options, report):
         Of those that take part.
     """
     needed = options.neighbors + 1
-    scaled = scale_points(points, needed)
+    if kept is None or len(kept) == len(points):
+        scaled = scale_points(points, needed)
+    else:
+        scaled = scale_points(points[kept], needed).among(kept, len(points))
     report("Normals", 0.02)
     sample = leave_outliers(scaled, needed, lambda: report("Normals", 0.04))
     report("Normals", 0.06)

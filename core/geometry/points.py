@@ -114,6 +114,12 @@ class ScaledPoints:
             self, points=self.points[kept], inverse=row[self.inverse], copies=self.copies[kept], first=self.first[kept]
         )
 
+    def among(self, rows, count):
+        """Return the same as some rows, (k,), of a caller's points, so many in all; the others were left out."""
+        inverse = np.full(count, -1)
+        inverse[rows] = self.inverse
+        return replace(self, inverse=inverse, first=rows[self.first])
+
 
 def scale_points(points, needed):
     """Centre, scale and merge duplicates, so that all that follows is free of units.

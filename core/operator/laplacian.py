@@ -296,7 +296,14 @@ class LaplaceBeltrami:
 
 
 def build_laplacian(
-    points, normals=None, options=LaplacianOptions(), *, boundary=None, boundary_distance=None, progress=None
+    points,
+    normals=None,
+    options=LaplacianOptions(),
+    *,
+    boundary=None,
+    boundary_distance=None,
+    left_out=(),
+    progress=None,
 ):
     """Build the operator from a point cloud.
 
@@ -313,6 +320,8 @@ def build_laplacian(
     boundary_distance : array_like, (n,), optional
         Distance of every point to the boundary along the surface [L], instead of a measured one; infinity where it is
         far. With `boundary`, measured ones stand next to corners, where there are two boundaries.
+    left_out : array_like, (k,) int or (n,) bool, optional
+        Points to leave out, such as `floaters`: on the others the operator is that of them alone.
     progress : callable, optional
         Called as ``progress(stage, fraction)`` in each stage; may raise `Cancelled`.
 
@@ -360,7 +369,7 @@ def build_laplacian(
     points = check_points(points)
     check_memory(len(points), options)
 
-    cloud = read_cloud(points, options, normals, boundary, boundary_distance, report)
+    cloud = read_cloud(points, options, normals, boundary, boundary_distance, report, left_out)
     scaled, pairs, notices = cloud.scaled, cloud.pairs, cloud.notices
     if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
         notices.append(
@@ -451,7 +460,8 @@ def narrow_laplacian(laplacian, neighbors=NARROW, *, rows=None, progress=None):
     if rows is None:
         if laplacian.options == options:
             return laplacian
-        return build_laplacian(points, normals, options, boundary=boundary, progress=progress)
+        left_out = laplacian.component < 0
+        return build_laplacian(points, normals, options, boundary=boundary, left_out=left_out, progress=progress)
     apart = move_apart(points[rows], laplacian.component[rows])
     built = build_laplacian(apart, normals[rows], options, boundary=boundary[rows], progress=progress)
     return replace(built, points=laplacian.points[rows], surface_points=points[rows])
