@@ -39,6 +39,7 @@ def floaters(splats):
 
     See Also
     --------
+    build_laplacian : Leaves them out, by ``left_out``.
     read_splats : Reads files of splats.
 
     References

@@ -174,7 +174,7 @@ def plan_factors(obj, rest, matrix, constraints):
     splats = read_splats(obj.data) if has_splats(obj.data) else None
 
     def operator(progress):
-        return cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress).laplacian
+        return cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress, splats=splats).laplacian
 
     def make_by(kind, known, progress):
         return kind(

@@ -144,7 +144,8 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
         name, place, count = obj.name, place_of(obj), len(read_eigenvalues(obj))
 
         def write(path, progress):
-            built = cache.build(reading.points, options, reading.boundary, progress, reading.orientation)
+            sides, splats = reading.orientation, reading.splats
+            built = cache.build(reading.points, options, reading.boundary, progress, sides, splats)
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
             save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))

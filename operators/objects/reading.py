@@ -8,12 +8,13 @@ import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core import PointCloudError, check_points
+from ...core import PointCloudError, Splats, check_points
 from ...core.geometry.boundary import FEWEST
 from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_attribute
 from .counting import members
 from .groups import chosen_members
 from .modifiers import is_own, is_sequence, modifier_settings
+from .splats import has_splats, read_splats
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 _MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
@@ -83,6 +84,8 @@ class Reading:
         What the user should know about how the object was read.
     orientation : ndarray, (n, 3) float64, or None
         Vectors whose side the normals take, where Orient Normals or the user chose it.
+    splats : Splats or None
+        Those in local space that the points are the middles of, if they are.
     """
 
     points: np.ndarray
@@ -90,6 +93,7 @@ class Reading:
     boundary: np.ndarray | None = None
     notices: list = field(default_factory=list)
     orientation: np.ndarray | None = None
+    splats: Splats | None = None
 
     def local(self, vectors):
         """Turn points or shifts as they were read into local ones."""
@@ -135,7 +139,8 @@ def read_points(context, obj) -> Reading:
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
         notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
-    reading = Reading(check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices)
+    splats = read_splats(obj.data) if has_splats(obj.data) else None
+    reading = Reading(check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)
     sides = chosen_sides(obj)
     return reading if sides is None else replace(reading, orientation=reading.placed_normals(sides))
 

@@ -126,9 +126,9 @@ class ShownOperator(ApplicationOperator):
 def _write_discs(context, obj):
     """Keep how the display is to draw the points of an object, where the operator of all of them is known."""
     reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
-    if DISC in obj.vertex_groups or not cache.holds(reading.points, options, reading.boundary):
+    if DISC in obj.vertex_groups or not cache.holds(reading.points, options, reading.boundary, reading.splats):
         return
-    laplacian = cache.build(reading.points, options, reading.boundary, lambda *_: None, reading.orientation).laplacian
+    laplacian = operator_of(reading, options, lambda *_: None)
     write_attribute(obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.reach, reading.points))
 
 
@@ -189,6 +189,12 @@ def operator_reader(context, obj):
     options = laplacian_options(obj.meshfree)
 
     def operator(progress):
-        return cache.build(reading.points, options, reading.boundary, progress, reading.orientation).laplacian
+        return operator_of(reading, options, progress)
 
     return reading, operator
+
+
+def operator_of(reading, options, progress):
+    """Return the operator of an object's points as they were read."""
+    sides, splats = reading.orientation, reading.splats
+    return cache.build(reading.points, options, reading.boundary, progress, sides, splats).laplacian

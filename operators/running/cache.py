@@ -2,6 +2,7 @@
 
 import hashlib
 from collections import OrderedDict
+from dataclasses import replace
 from threading import Lock
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -10,7 +11,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature, points_that_fit
+from ...core import LaplaceBeltrami, Spectrum, build_laplacian, floaters, mean_curvature, points_that_fit
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
 _FACTOR = 12  # bytes of each entry of sparse factors: a number and its row
@@ -26,7 +27,7 @@ class Built(NamedTuple):
     mean_curvature: np.ndarray
 
 
-def build(points, options, boundary, progress, orientation=None) -> Built:
+def build(points, options, boundary, progress, orientation=None, splats=None) -> Built:
     """Return the operator of these points, options and boundary, built only if it is not kept.
 
     Parameters
@@ -39,15 +40,19 @@ def build(points, options, boundary, progress, orientation=None) -> Built:
         Called as ``progress(stage, fraction)``.
     orientation : ndarray, (n, 3), or None
         Vectors whose side its normals take; None leaves it to core. The operator is not built anew for another one.
+    splats : Splats or None
+        Those that the points are the middles of: `floating` ones are left out.
     """
 
     def compute():
         fitting(len(points), options)
-        laplacian = build_laplacian(points, options=options, boundary=boundary, progress=progress)
+        out = floating(splats)
+        laplacian = build_laplacian(points, options=options, boundary=boundary, left_out=out, progress=progress)
         progress("Curvature", 1.0)
+        laplacian = replace(laplacian, notices=[*floating_notices(out), *laplacian.notices])
         return Built(laplacian, mean_curvature(laplacian))
 
-    key = content(points, options, boundary)
+    key = _key(points, options, boundary, splats)
     built = fetch(key, compute)
     if orientation is not None:
         key = content(key, orientation)
@@ -64,9 +69,32 @@ def _oriented(built, orientation):
     return Built(laplacian, np.where(kept, built.mean_curvature, -built.mean_curvature))
 
 
-def holds(points, options, boundary) -> bool:
+def holds(points, options, boundary, splats=None) -> bool:
     """Tell whether the operator that `build` returns is kept."""
-    return _get(content(points, options, boundary)) is not None
+    return _get(_key(points, options, boundary, splats)) is not None
+
+
+def floating(splats):
+    """Return the splats that operators leave out, as indices; none where these are most of them, or no splats."""
+    if splats is None:
+        return np.arange(0)
+    out = fetch(_key("floaters", splats), lambda: np.flatnonzero(floaters(splats)))
+    return out if 2 * len(out) < len(splats) else np.arange(0)
+
+
+def floating_notices(out):
+    """Say that splats were left out, if any were."""
+    told = (
+        "Floaters left out of the operator, splats that are hardly seen, huge or alone: {:,}. Select Floaters selects"
+    )
+    return [told.format(len(out)) + " them. They move with the splats next to them."] if len(out) else []
+
+
+def _key(*parts):
+    """Return the content of some parts, splats among them: that of what decides which of these float."""
+    splats = parts[-1]
+    last = () if splats is None else (splats.positions, splats.scales, splats.rotations, splats.opacities)
+    return content(*parts[:-1], *last)
 
 
 def fitting(count: int, options, modes: int = 0):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import LaplaceBeltrami, Prolongation, blue_noise_subset
+from ...core.operator.areas import NO_AREA
 from . import cache
 
 _ALL = np.arange(0)  # stands for all points
@@ -35,12 +36,15 @@ class Measured(NamedTuple):
         Of all points.
     prolongation : Prolongation or None
         From the subset to all.
+    left_out : ndarray, (m,) int
+        Floaters that the subset is chosen without.
     """
 
     laplacian: LaplaceBeltrami
     subset: np.ndarray
     measures: Measures
     prolongation: Prolongation | None
+    left_out: np.ndarray = _ALL
 
     def carried(self, vectors):
         """Return functions on the points of the operator, (k, m), as such on all points, (n, m)."""
@@ -55,24 +59,24 @@ class Measured(NamedTuple):
             f"Analyzed {len(self.subset):,} of {len(self.prolongation.nearest):,} points, evenly spread over the"
             " surface, and carried the results to all. The setting Point Budget decides how many."
         )
-        return [told, *self.laplacian.notices]
+        return [told, *cache.floating_notices(self.left_out), *self.laplacian.notices]
 
 
-def measure(points, options, boundary, budget, modes, progress, orientation=None) -> Measured:
+def measure(points, options, boundary, budget, modes, progress, orientation=None, splats=None) -> Measured:
     """Measure the surface at each point.
 
     Parameters
     ----------
-    points, options, boundary, progress, orientation
+    points, options, boundary, progress, orientation, splats
         See `cache.build`.
     budget : int or None
         How many points to build the operator on at most; 0 for as many as fit the memory, None for all.
     modes : int
         How many modes will be computed.
     """
-    subset = _subset(points, options, boundary, budget, modes, progress)
+    subset = _subset(points, options, boundary, splats, budget, modes, progress)
     if not len(subset):
-        laplacian, curvature = cache.build(points, options, boundary, progress, orientation)
+        laplacian, curvature = cache.build(points, options, boundary, progress, orientation, splats)
         return Measured(laplacian, subset, _measures(laplacian, curvature), None)
     chosen = points[subset]
     at_boundary, sides = (None if given is None else given[subset] for given in (boundary, orientation))
@@ -84,7 +88,9 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
 
     progress("All Points", 0.9)
     prolongation = cache.result(laplacian, "prolongation", points, compute=prolong)
-    return Measured(laplacian, subset, _carry(prolongation, _measures(laplacian, curvature)), prolongation)
+    carried = _carry(prolongation, _measures(laplacian, curvature))
+    out = cache.floating(splats)
+    return Measured(laplacian, subset, _leave_out(carried, out, prolongation.nearest), prolongation, out)
 
 
 def _within(progress, stage):
@@ -121,10 +127,19 @@ def _carry(prolongation, known):
     )
 
 
-def _subset(points, options, boundary, budget, modes, progress):
+def _leave_out(measures, out, nearest):
+    """Give the areas of some points, indices, to the others that belong to the same one of the subset."""
+    areas, trust, component = (values.copy() for values in (measures.areas, measures.trust, measures.component))
+    owned, gone = np.bincount(nearest), np.bincount(nearest[out], minlength=nearest.max() + 1)
+    areas *= (owned / np.maximum(owned - gone, 1))[nearest]
+    areas[out], trust[out], component[out] = NO_AREA, 0.0, -1
+    return measures._replace(areas=areas, trust=trust, component=component)
+
+
+def _subset(points, options, boundary, splats, budget, modes, progress):
     """Return the rows of the points to build the operator on; none for all. The same ones as long as they are kept."""
     count = len(points)
-    if budget is None or 0 < count <= budget or (not budget and cache.holds(points, options, boundary)):
+    if budget is None or 0 < count <= budget or (not budget and cache.holds(points, options, boundary, splats)):
         return _ALL
 
     def choose():
@@ -132,9 +147,10 @@ def _subset(points, options, boundary, budget, modes, progress):
         if most >= count:
             return _ALL
         progress("Subset", 0.0)
-        return blue_noise_subset(points, most, progress=_within(progress, "Subset"))
+        kept = np.delete(np.arange(count), cache.floating(splats))
+        return kept[blue_noise_subset(points[kept], most, progress=_within(progress, "Subset"))]
 
-    return cache.fetch(cache.content(points, options, boundary, "subset", budget), choose)
+    return cache.fetch(cache.content(points, options, boundary, cache.floating(splats), "subset", budget), choose)
 
 
 def _automatic(count, options, modes):

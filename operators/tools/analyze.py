@@ -59,9 +59,9 @@ def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, 
     def compute(progress):
         with StageTimes(progress) as times:
             given = reading.points, options, reading.boundary, budget, modes, times
-            measured = measure(*given, reading.orientation)
+            measured = measure(*given, reading.orientation, reading.splats)
             if orient is not None:
-                measured = measure(*given, orient(measured, times))
+                measured = measure(*given, orient(measured, times), reading.splats)
             spectrum, unresolved = resolved_modes(measured.laplacian, modes, times) if modes else (None, [])
             if spectrum is not None and len(measured.subset):
                 times("All Points", 1.0)

@@ -52,7 +52,9 @@ class MinimalSurface(Tool):
         def compute(progress):
             boundary = fixed
             if boundary is None:
-                boundary = cache.build(reading.points, options, None, progress).laplacian.boundary
+                boundary = cache.build(
+                    reading.points, options, None, progress, splats=reading.splats
+                ).laplacian.boundary
                 if not boundary.any():
                     raise PointCloudError(
                         f'"{name}" has no boundary, so that its surface would shrink to nothing. Assign the points'

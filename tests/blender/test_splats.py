@@ -296,6 +296,50 @@ def test_where_no_splat_floats_that_is_told(rest):
         bpy.ops.meshfree.select_floaters()
 
 
+@pytest.mark.parametrize("budget", ["ALL", "NUMBER"])
+def test_floaters_are_left_out_by_themselves(core, rest, budget):
+    names = "positions", "scales", "rotations", "opacities", "colors", "harmonics"
+    both = {name: np.concatenate([getattr(rest, name)] * 2) for name in names}
+    both["positions"][len(rest) :] += [5.0, 0.0, 0.0]
+    points, opacities = both["positions"].copy(), both["opacities"]
+    faint = np.arange(0, len(points), 6)
+    opacities[faint] = 0.01
+    points[faint] += 0.3 * np.random.default_rng(1).standard_normal((len(faint), 3))  # thick, if they took part
+    obj = add_splats(core.Splats(**{**both, "positions": points.astype(np.float32)}))
+    obj.meshfree.point_budget, obj.meshfree.most_points = budget, 1000
+    assert bpy.ops.meshfree.analyze() == {"FINISHED"}
+    component, areas = (
+        np.array([item.value for item in obj.data.attributes[name].data]) for name in ("lb_component", "lb_area")
+    )
+    assert set(faint) <= set(np.flatnonzero(component < 0))
+    assert obj.meshfree.left_out_count == np.count_nonzero(component < 0)
+    assert areas[component < 0].max() == 0.0
+    alone = np.delete(points, faint, axis=0).astype(float)
+    if budget == "NUMBER":
+        alone = alone[core.blue_noise_subset(alone, 1000)]
+    assert obj.meshfree.total_area == pytest.approx(core.build_laplacian(alone).areas.sum(), rel=1e-5)
+    assert areas.sum() == pytest.approx(obj.meshfree.total_area, rel=1e-5)
+
+
+def test_an_operator_by_floaters_is_not_taken_for_one_by_others(core, rest):
+    opacities = np.array(rest.opacities)
+    opacities[[3, 700]] = 0.01
+    obj = add_splats(core.Splats(**{**vars(rest), "opacities": opacities}))
+    bpy.ops.meshfree.analyze()
+    assert obj.meshfree.left_out_count == 2
+    base = obj.data.attributes["radiance:base"].data
+    for number in (3, 700):
+        base[number].color[3] = 1.0
+    bpy.ops.meshfree.analyze()
+    assert obj.meshfree.left_out_count == 0
+
+
+def test_splats_that_all_seem_to_float_take_part(core, rest):
+    obj = add_splats(core.Splats(**{**vars(rest), "opacities": np.full(len(rest), 0.01, np.float32)}))
+    bpy.ops.meshfree.analyze()
+    assert obj.meshfree.left_out_count == 0
+
+
 class FutureData:
     """What Blender 5.3 is said to give of a point cloud: a type, which the module here does not have yet."""
 
