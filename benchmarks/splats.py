@@ -84,8 +84,27 @@ def follow(count):
     timed(f"{count:,} splats: with harmonics of degree 3", lambda: splats.deformed(moved, gradients))
 
 
+def compare_normals(count=8000):
+    """Print what shortest axes, off by an angle, make of the operator on the unit sphere in place of its own normals."""
+    rng = np.random.default_rng(0)
+    sphere = rng.standard_normal((count, 3))
+    sphere /= np.linalg.norm(sphere, axis=1)[:, None]
+    spacing, exact = np.sqrt(4.0 * np.pi / count), np.repeat([2.0, 6.0, 12.0], [3, 5, 7])
+    for noise in 0.0, 0.1, 0.3:
+        points = sphere * (1.0 + noise * spacing * rng.standard_normal((count, 1)))
+        for angle in None, 2.0, 10.0, 25.0:
+            off = 0.0 if angle is None else np.tan(np.radians(angle)) * np.sqrt(0.5)
+            axes = None if angle is None else sphere + off * rng.standard_normal((count, 3))
+            laplacian = core.build_laplacian(points, axes)
+            area = abs(laplacian.areas.sum() / (4.0 * np.pi) - 1.0)
+            modes = np.abs(laplacian.eigenpairs(16).eigenvalues[1:] / exact - 1.0).mean()
+            name = "own normals" if angle is None else f"axes off by {angle:.0f} degrees"
+            print(f"noise of {noise} spacings, {name:24} area {area:.1e}, 15 eigenvalues {modes:.1e} off", flush=True)
+
+
 def main():
     """Measure and draw."""
+    compare_normals()
     before, after = bent_bar()
     for name, volume in (
         ("ellipses", lambda each: np.sort(each.scales, axis=1)[:, 1:].prod(axis=1).sum()),
