@@ -6,7 +6,7 @@ import bpy
 
 from ..operators.objects.attributes import CORNER, DISC
 from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, has_input, is_intact, new_group
-from ..operators.objects.splats import BASE, ROTATION, SCALE
+from ..operators.objects.splats import BASE, HARMONIC, ROTATION, SCALE
 from . import colormaps
 from .value_range import CLASSES, STEPPED
 
@@ -36,6 +36,7 @@ _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but
 _CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
 CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
 _DEVIATIONS = 2.0  # standard deviations at which the ellipsoid of a splat ends
+_UNSEEN = f"{HARMONIC}*", "ply_*", "lb_*"  # attributes of splats that do not show
 _SPLATTED, _CONSTANT = "SPLATS", 0.28209479  # the harmonic of degree 0
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
@@ -181,6 +182,15 @@ def _ellipsoids(group, points):
     rotation = add_node(group, "GeometryNodeInputNamedAttribute", 5, -2100, data_type="QUATERNION")
     rotation.inputs["Name"].default_value = ROTATION
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -1700)
+    for row, names in enumerate(_UNSEEN):  # or each corner would get a copy
+        removed = add_node(group, "GeometryNodeRemoveAttribute", 4, -1500 - 200 * row)
+        if "Pattern Mode" in removed.inputs:  # since Blender 5
+            removed.inputs["Pattern Mode"].default_value = "Wildcard"
+        else:
+            removed.pattern_mode = "WILDCARD"
+        removed.inputs["Name"].default_value = names
+        group.links.new(points, removed.inputs["Geometry"])
+        points = removed.outputs["Geometry"]
     for source, target in (
         (ball.outputs["Mesh"], smooth.inputs[0]),
         (points, placed.inputs["Points"]),
