@@ -85,7 +85,7 @@ def follow(count):
 
 
 def compare_normals(count=8000):
-    """Print what shortest axes, off by an angle, make of the operator on the unit sphere in place of its own normals."""
+    """Print what shortest axes, off by an angle, are worth as normals of the operator on the unit sphere."""
     rng = np.random.default_rng(0)
     sphere = rng.standard_normal((count, 3))
     sphere /= np.linalg.norm(sphere, axis=1)[:, None]

@@ -1,0 +1,105 @@
+"""How long Blender takes with Gaussian splats of degree 3: ``python splats_in_blender.py ZIP [splats]``.
+
+For a Python that has bpy. Installs the extension's zip into a folder of its own. Writes a file of random splats there,
+imports it and exports it again. Then lets splats on a sphere follow a handle, drawn as ellipsoids: the median from the
+move of an empty to the evaluated object, and the time of the settled result.
+"""
+
+import importlib
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+SPLATS = 2_000_000
+FOLLOWED = 20_000, 100_000
+MOVES = 15
+MODULE = "bl_ext.user_default.meshfree_laplacian"
+
+
+def random_splats(np, core, positions, size):
+    """Return splats of a size and of random colors at some places."""
+    rng, count = np.random.default_rng(0), len(positions)
+    return core.Splats(
+        positions=positions,
+        scales=size * np.exp(0.3 * rng.standard_normal((count, 3))),
+        rotations=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+        opacities=rng.uniform(0.1, 0.9, count),
+        colors=rng.standard_normal((count, 3)),
+        harmonics=0.1 * rng.standard_normal((count, 15, 3)),
+    )
+
+
+def in_and_out(bpy, np, core, folder, count):
+    """Print the seconds of an import and an export, and whether all bytes are the same."""
+    given, written = folder / "given.ply", folder / "written.ply"
+    core.write_splats(given, random_splats(np, core, np.random.default_rng(1).standard_normal((count, 3)), 0.01))
+    began = time.perf_counter()
+    bpy.ops.meshfree.import_points(filepath=str(given))
+    between = time.perf_counter()
+    bpy.ops.meshfree.export_splats(filepath=str(written))
+    ended = time.perf_counter()
+    same = given.read_bytes() == written.read_bytes()
+    megabytes = given.stat().st_size / 1e6
+    print(
+        f"{count:,} splats, {megabytes:.0f} MB: import {between - began:.1f} s, export {ended - between:.1f} s, {same=}"
+    )
+
+
+def follow(bpy, np, core, folder, count):
+    """Print how long splats on a sphere take to follow a handle."""
+    live = importlib.import_module(f"{MODULE}.operators.deform.live")
+    z = 1.0 - (np.arange(count) + 0.5) / (0.5 * count)
+    ring = np.sqrt(1.0 - z**2) * np.exp(2.39996j * np.arange(count))
+    path = folder / "ball.ply"
+    core.write_splats(path, random_splats(np, core, np.column_stack([ring.real, ring.imag, z]), count**-0.5))
+    bpy.ops.meshfree.import_points(filepath=str(path), up="Z")
+    obj = bpy.context.object
+    for name, members in (("Handle", z > 0.8), ("Anchor", z < -0.8)):
+        if obj.type == "MESH":
+            obj.vertex_groups.new(name=name).add(np.flatnonzero(members).tolist(), 1.0, "REPLACE")
+        else:
+            obj.data.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", members.astype(np.float32))
+    bpy.ops.meshfree.deform_bind()
+    empty, view_layer = obj.meshfree.deform.handle_items[0].empty, bpy.context.view_layer
+    (handler,) = (each for each in bpy.app.handlers.depsgraph_update_post if each.__module__ == live.__name__)
+
+    def moved():
+        empty.location.z += 0.02
+        began = time.perf_counter()
+        view_layer.update()
+        return 1e3 * (time.perf_counter() - began)
+
+    def dragged(scene, depsgraph):
+        live.update_all(scene, depsgraph, quick=True)
+
+    handlers = bpy.app.handlers.depsgraph_update_post
+    handlers.remove(handler)  # without a window it settles at once
+    handlers.append(dragged)
+    quick = np.median([moved() for _ in range(MOVES)])
+    handlers.remove(dragged)
+    handlers.append(handler)
+    print(f"{count:,} splats follow a handle in {quick:.0f} ms, settled in {moved():.0f} ms")
+    bpy.data.objects.remove(obj)
+
+
+def main(archive, count):
+    """Print the seconds."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["BLENDER_USER_RESOURCES"] = folder  # before bpy
+        import bpy
+        import numpy as np
+
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.extensions.package_install_files(filepath=archive, repo="user_default", enable_on_install=True)
+        core = importlib.import_module(f"{MODULE}.core")
+        in_and_out(bpy, np, core, Path(folder), count)
+        bpy.data.objects.remove(bpy.context.object)
+        for few in FOLLOWED:
+            follow(bpy, np, core, Path(folder), few)
+        bpy.ops.preferences.addon_disable(module=MODULE)  # Blender does not exit well with its classes
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else SPLATS)
