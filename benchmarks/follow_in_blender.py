@@ -37,8 +37,19 @@ def bound_object(points, handles, anchors):
 
 def follow(points, handles, anchors):
     """Return the seconds of each quick update, and those of two settled ones."""
-    live = importlib.import_module(f"{MODULE}.operators.deform.live")
     obj = bound_object(points, handles, anchors)
+
+    def check(empty):
+        moved = np.empty(3 * len(points), np.float32)
+        obj.data.attributes["lb_displacement"].data.foreach_get("vector", moved)
+        assert np.isclose(moved[2::3][handles], empty.matrix_local.translation.z - points[handles, 2].mean()).all()
+
+    return drag(obj, check)
+
+
+def drag(obj, check=lambda empty: None):
+    """Return the seconds of quick updates of a bound object, and of two settled ones; a check follows each."""
+    live = importlib.import_module(f"{MODULE}.operators.deform.live")
     empty, view_layer = obj.meshfree.deform.handle_items[0].empty, bpy.context.view_layer
     (handler,) = (each for each in bpy.app.handlers.depsgraph_update_post if each.__module__ == live.__name__)
     bpy.app.handlers.depsgraph_update_post.remove(handler)  # without a window it settles at once
@@ -51,9 +62,7 @@ def follow(points, handles, anchors):
         began = time.perf_counter()
         view_layer.update()
         seconds = time.perf_counter() - began
-        moved = np.empty(3 * len(points), np.float32)
-        obj.data.attributes["lb_displacement"].data.foreach_get("vector", moved)
-        assert np.isclose(moved[2::3][handles], empty.matrix_local.translation.z - points[handles, 2].mean()).all()
+        check(empty)
         return seconds
 
     bpy.app.handlers.depsgraph_update_post.append(dragged)

@@ -6,19 +6,19 @@ move of an empty to the evaluated object, and the time of the settled result.
 """
 
 import importlib
-import os
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
+from follow_in_blender import MODULE, bpy, drag  # chooses the folder before it imports bpy
+
 SPLATS = 2_000_000
 FOLLOWED = 20_000, 100_000
-MOVES = 15
-MODULE = "bl_ext.user_default.meshfree_laplacian"
 
 
-def random_splats(np, core, positions, size):
+def random_splats(core, positions, size):
     """Return splats of a size and of random colors at some places."""
     rng, count = np.random.default_rng(0), len(positions)
     return core.Splats(
@@ -31,10 +31,10 @@ def random_splats(np, core, positions, size):
     )
 
 
-def in_and_out(bpy, np, core, folder, count):
+def in_and_out(core, folder, count):
     """Print the seconds of an import and an export, and whether all bytes are the same."""
     given, written = folder / "given.ply", folder / "written.ply"
-    core.write_splats(given, random_splats(np, core, np.random.default_rng(1).standard_normal((count, 3)), 0.01))
+    core.write_splats(given, random_splats(core, np.random.default_rng(1).standard_normal((count, 3)), 0.01))
     began = time.perf_counter()
     bpy.ops.meshfree.import_points(filepath=str(given))
     between = time.perf_counter()
@@ -47,13 +47,12 @@ def in_and_out(bpy, np, core, folder, count):
     )
 
 
-def follow(bpy, np, core, folder, count):
+def follow(core, folder, count):
     """Print how long splats on a sphere take to follow a handle."""
-    live = importlib.import_module(f"{MODULE}.operators.deform.live")
     z = 1.0 - (np.arange(count) + 0.5) / (0.5 * count)
     ring = np.sqrt(1.0 - z**2) * np.exp(2.39996j * np.arange(count))
     path = folder / "ball.ply"
-    core.write_splats(path, random_splats(np, core, np.column_stack([ring.real, ring.imag, z]), count**-0.5))
+    core.write_splats(path, random_splats(core, np.column_stack([ring.real, ring.imag, z]), count**-0.5))
     bpy.ops.meshfree.import_points(filepath=str(path), up="Z")
     obj = bpy.context.object
     for name, members in (("Handle", z > 0.8), ("Anchor", z < -0.8)):
@@ -62,42 +61,22 @@ def follow(bpy, np, core, folder, count):
         else:
             obj.data.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", members.astype(np.float32))
     bpy.ops.meshfree.deform_bind()
-    empty, view_layer = obj.meshfree.deform.handle_items[0].empty, bpy.context.view_layer
-    (handler,) = (each for each in bpy.app.handlers.depsgraph_update_post if each.__module__ == live.__name__)
-
-    def moved():
-        empty.location.z += 0.02
-        began = time.perf_counter()
-        view_layer.update()
-        return 1e3 * (time.perf_counter() - began)
-
-    def dragged(scene, depsgraph):
-        live.update_all(scene, depsgraph, quick=True)
-
-    handlers = bpy.app.handlers.depsgraph_update_post
-    handlers.remove(handler)  # without a window it settles at once
-    handlers.append(dragged)
-    quick = np.median([moved() for _ in range(MOVES)])
-    handlers.remove(dragged)
-    handlers.append(handler)
-    print(f"{count:,} splats follow a handle in {quick:.0f} ms, settled in {moved():.0f} ms")
+    *quick, settled, _ = drag(obj)
+    quick = np.median(quick)
+    print(f"{count:,} splats follow a handle in {1e3 * quick:.0f} ms, settled in {1e3 * settled:.0f} ms")
     bpy.data.objects.remove(obj)
 
 
 def main(archive, count):
     """Print the seconds."""
     with tempfile.TemporaryDirectory() as folder:
-        os.environ["BLENDER_USER_RESOURCES"] = folder  # before bpy
-        import bpy
-        import numpy as np
-
         bpy.ops.wm.read_factory_settings(use_empty=True)
         bpy.ops.extensions.package_install_files(filepath=archive, repo="user_default", enable_on_install=True)
         core = importlib.import_module(f"{MODULE}.core")
-        in_and_out(bpy, np, core, Path(folder), count)
+        in_and_out(core, Path(folder), count)
         bpy.data.objects.remove(bpy.context.object)
         for few in FOLLOWED:
-            follow(bpy, np, core, Path(folder), few)
+            follow(core, Path(folder), few)
         bpy.ops.preferences.addon_disable(module=MODULE)  # Blender does not exit well with its classes
 
 
