@@ -203,10 +203,9 @@ def read_surface(points, options, report, kept=None):
         Of those that take part.
     """
     needed = options.neighbors + 1
-    if kept is None or len(kept) == len(points):
-        scaled = scale_points(points, needed)
-    else:
-        scaled = scale_points(points[kept], needed).among(kept, len(points))
+    scaled = scale_points(points if kept is None else points[kept], needed)
+    if kept is not None:
+        scaled = scaled.among(kept, len(points))
     report("Normals", 0.02)
     sample = leave_outliers(scaled, needed, lambda: report("Normals", 0.04))
     report("Normals", 0.06)

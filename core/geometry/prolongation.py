@@ -8,7 +8,7 @@ from ..arguments import as_array
 from ..blocks import blocks, on_all_cores
 from ..errors import InvalidPointsError
 from .nearest import SMOOTH
-from .points import check_points, check_values
+from .points import as_mask, check_points, check_values
 from .quadrics import frames
 from .subset import voxel_numbers
 
@@ -126,19 +126,22 @@ class Prolongation:
         on_all_cores(carry, blocks(len(result), _BLOCK))
         return result
 
-    def shares(self, areas):
+    def shares(self, areas, left_out=()):
         """Share areas, or masses, evenly over the points that belong to each point of the subset: sums are kept.
 
         Parameters
         ----------
         areas : array_like, (k,)
+        left_out : array_like, (m,) int or (n,) bool, optional
+            Points that get nothing; none of the subset.
 
         Returns
         -------
         ndarray, (n,)
         """
-        owned = np.bincount(self.nearest, minlength=len(areas))
-        return (np.asarray(areas) / np.maximum(owned, 1))[self.nearest]
+        takes = ~as_mask(left_out, len(self.nearest))
+        owned = np.bincount(self.nearest[takes], minlength=len(areas))
+        return np.where(takes, (np.asarray(areas) / np.maximum(owned, 1))[self.nearest], 0.0)
 
     def labels(self, values):
         """Give each point what the point of the subset has that it belongs to: truth values, numbers of components.

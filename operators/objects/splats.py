@@ -39,8 +39,8 @@ def harmonic_names(data) -> list:
     return names[: max(known for known in COUNTS if known <= len(names))]
 
 
-def read_splats(data) -> Splats:
-    """Read the splats of a mesh or a point cloud, in local space.
+def read_splats(data, with_harmonics=True) -> Splats:
+    """Read the splats of a mesh or a point cloud, in local space, without harmonics as if they were of degree 0.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def read_splats(data) -> Splats:
             f'"{data.name}" holds no Gaussian splats: its points need the attributes {SCALE}, {ROTATION} and {BASE}.'
             " Import a file of splats."
         )
-    base, names = read_attribute(data, BASE), harmonic_names(data)
+    base, names = read_attribute(data, BASE), harmonic_names(data) if with_harmonics else []
     harmonics = np.empty((len(base), len(names), 3), np.float32)
     for number, name in enumerate(names):
         harmonics[:, number] = read_attribute(data, name)

@@ -15,6 +15,7 @@ from ...core import LaplaceBeltrami, Spectrum, build_laplacian, floaters, mean_c
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
 _FACTOR = 12  # bytes of each entry of sparse factors: a number and its row
+_NONE = np.arange(0)  # splats that are left out
 _kept = OrderedDict()  # value and bytes, by what it was computed from; what was used last at the end
 _sources = WeakKeyDictionary()  # what each operator was built from
 _lock = Lock()  # computations run in threads
@@ -46,13 +47,13 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
 
     def compute():
         fitting(len(points), options)
-        out = floating(splats)
         laplacian = build_laplacian(points, options=options, boundary=boundary, left_out=out, progress=progress)
         progress("Curvature", 1.0)
         laplacian = replace(laplacian, notices=[*floating_notices(out), *laplacian.notices])
         return Built(laplacian, mean_curvature(laplacian))
 
-    key = _key(points, options, boundary, splats)
+    out = floating(splats)
+    key = content(points, options, boundary, out)
     built = fetch(key, compute)
     if orientation is not None:
         key = content(key, orientation)
@@ -71,30 +72,26 @@ def _oriented(built, orientation):
 
 def holds(points, options, boundary, splats=None) -> bool:
     """Tell whether the operator that `build` returns is kept."""
-    return _get(_key(points, options, boundary, splats)) is not None
+    return _get(content(points, options, boundary, floating(splats))) is not None
 
 
 def floating(splats):
     """Return the splats that operators leave out, as indices; none where these are most of them, or no splats."""
     if splats is None:
-        return np.arange(0)
-    out = fetch(_key("floaters", splats), lambda: np.flatnonzero(floaters(splats)))
-    return out if 2 * len(out) < len(splats) else np.arange(0)
+        return _NONE
+    key = content("floaters", splats.positions, splats.scales, splats.rotations, splats.opacities)
+    out = fetch(key, lambda: np.flatnonzero(floaters(splats)))
+    return out if 2 * len(out) < len(splats) else _NONE
 
 
 def floating_notices(out):
     """Say that splats were left out, if any were."""
-    told = (
-        "Floaters left out of the operator, splats that are hardly seen, huge or alone: {:,}. Select Floaters selects"
-    )
-    return [told.format(len(out)) + " them. They move with the splats next to them."] if len(out) else []
-
-
-def _key(*parts):
-    """Return the content of some parts, splats among them: that of what decides which of these float."""
-    splats = parts[-1]
-    last = () if splats is None else (splats.positions, splats.scales, splats.rotations, splats.opacities)
-    return content(*parts[:-1], *last)
+    if not len(out):
+        return []
+    return [
+        f"Floaters left out of the operator, splats that are hardly seen, huge or alone: {len(out):,}. Select Floaters"
+        " selects them. They move with the splats next to them."
+    ]
 
 
 def fitting(count: int, options, modes: int = 0):

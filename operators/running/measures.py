@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import LaplaceBeltrami, Prolongation, blue_noise_subset
-from ...core.operator.areas import NO_AREA
 from . import cache
 
 _ALL = np.arange(0)  # stands for all points
@@ -37,14 +36,14 @@ class Measured(NamedTuple):
     prolongation : Prolongation or None
         From the subset to all.
     left_out : ndarray, (m,) int
-        Floaters that the subset is chosen without.
+        Splats that take no part.
     """
 
     laplacian: LaplaceBeltrami
     subset: np.ndarray
     measures: Measures
     prolongation: Prolongation | None
-    left_out: np.ndarray = _ALL
+    left_out: np.ndarray
 
     def carried(self, vectors):
         """Return functions on the points of the operator, (k, m), as such on all points, (n, m)."""
@@ -74,10 +73,11 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
     modes : int
         How many modes will be computed.
     """
+    out = cache.floating(splats)
     subset = _subset(points, options, boundary, splats, budget, modes, progress)
     if not len(subset):
         laplacian, curvature = cache.build(points, options, boundary, progress, orientation, splats)
-        return Measured(laplacian, subset, _measures(laplacian, curvature), None)
+        return Measured(laplacian, subset, _measures(laplacian, curvature), None, out)
     chosen = points[subset]
     at_boundary, sides = (None if given is None else given[subset] for given in (boundary, orientation))
     laplacian, curvature = cache.build(chosen, options, at_boundary, progress, sides)
@@ -88,9 +88,8 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
 
     progress("All Points", 0.9)
     prolongation = cache.result(laplacian, "prolongation", points, compute=prolong)
-    carried = _carry(prolongation, _measures(laplacian, curvature))
-    out = cache.floating(splats)
-    return Measured(laplacian, subset, _leave_out(carried, out, prolongation.nearest), prolongation, out)
+    carried = _carry(prolongation, _measures(laplacian, curvature), out)
+    return Measured(laplacian, subset, carried, prolongation, out)
 
 
 def _within(progress, stage):
@@ -110,30 +109,23 @@ def _measures(laplacian, curvature):
     )
 
 
-def _carry(prolongation, known):
-    """Carry what is known of a subset to all points."""
+def _carry(prolongation, known, out):
+    """Carry what is known of a subset to all points but those that take no part."""
     smooth = np.column_stack([known.normals, known.mean_curvature, known.gaussian_curvature, known.trust])
     smooth = prolongation.interpolate(smooth)
     normals = smooth[:, :3]
     length = np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
+    component, trust = prolongation.labels(known.component), np.clip(smooth[:, 5], 0.0, 1.0)
+    component[out], trust[out] = -1, 0.0
     return Measures(
-        areas=prolongation.shares(known.areas),
+        areas=prolongation.shares(known.areas, out),
         normals=np.divide(normals, length, out=prolongation.labels(known.normals), where=length > 0.5),
         mean_curvature=smooth[:, 3],
         gaussian_curvature=smooth[:, 4],
         boundary=prolongation.labels(known.boundary),
-        component=prolongation.labels(known.component),
-        trust=np.clip(smooth[:, 5], 0.0, 1.0),
+        component=component,
+        trust=trust,
     )
-
-
-def _leave_out(measures, out, nearest):
-    """Give the areas of some points, indices, to the others that belong to the same one of the subset."""
-    areas, trust, component = (values.copy() for values in (measures.areas, measures.trust, measures.component))
-    owned, gone = np.bincount(nearest), np.bincount(nearest[out], minlength=nearest.max() + 1)
-    areas *= (owned / np.maximum(owned - gone, 1))[nearest]
-    areas[out], trust[out], component[out] = NO_AREA, 0.0, -1
-    return measures._replace(areas=areas, trust=trust, component=component)
 
 
 def _subset(points, options, boundary, splats, budget, modes, progress):

@@ -88,6 +88,15 @@ def test_areas_keep_their_total(sphere, subset, prolongation):
     assert shared.min() > 0.0
 
 
+def test_areas_go_to_no_points_that_are_left_out(sphere, subset, prolongation):
+    areas = core.build_laplacian(sphere[subset]).areas
+    out = np.setdiff1d(np.arange(0, len(sphere), 5), subset)
+    shared = prolongation.shares(areas, out)
+    assert (shared[out] == 0.0).all()
+    assert np.delete(shared, out).min() > 0.0
+    np.testing.assert_allclose(np.bincount(prolongation.nearest, shared), areas, rtol=1e-12)
+
+
 def test_functions_are_carried_to_second_order(sphere, subset, prolongation):
     """Of modes of degree 1 and 2 a linear function misses about l (l + 1) spacing^2 / 8 within the spacing."""
     for degree, mode in ((1, sphere[:, 2]), (2, sphere[:, 0] * sphere[:, 1])):
