@@ -14,6 +14,7 @@ from ..objects.reading import read_points
 from ..objects.result import read_eigenvalues
 from ..objects.splats import has_splats
 from ..running import cache
+from ..running.application import build_operator
 from ..running.job import JobOperator
 from ..running.ready import reporting
 from .objects import analysis_arrays, file_filter, place_of, point_table, save_arrays
@@ -144,8 +145,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
         name, place, count = obj.name, place_of(obj), len(read_eigenvalues(obj))
 
         def write(path, progress):
-            sides, splats = reading.orientation, reading.splats
-            built = cache.build(reading.points, options, reading.boundary, progress, sides, splats)
+            built = build_operator(reading, options, progress)
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
             save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))

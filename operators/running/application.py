@@ -128,7 +128,7 @@ def _write_discs(context, obj):
     reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
     if DISC in obj.vertex_groups or not cache.holds(reading.points, options, reading.boundary, reading.splats):
         return
-    laplacian = operator_of(reading, options, lambda *_: None)
+    laplacian = build_operator(reading, options, lambda *_: None).laplacian
     write_attribute(obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.reach, reading.points))
 
 
@@ -189,12 +189,13 @@ def operator_reader(context, obj):
     options = laplacian_options(obj.meshfree)
 
     def operator(progress):
-        return operator_of(reading, options, progress)
+        return build_operator(reading, options, progress).laplacian
 
     return reading, operator
 
 
-def operator_of(reading, options, progress):
-    """Return the operator of an object's points as they were read."""
-    sides, splats = reading.orientation, reading.splats
-    return cache.build(reading.points, options, reading.boundary, progress, sides, splats).laplacian
+def build_operator(reading, options, progress) -> cache.Built:
+    """Return the operator of an object's points as they were read, with the mean curvature."""
+    return cache.build(
+        reading.points, options, reading.boundary, progress, orientation=reading.orientation, splats=reading.splats
+    )

@@ -11,7 +11,7 @@ from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.reading import read_points
 from ..objects.result import area_text
 from ..running import cache
-from ..running.application import ApplicationOperator, Tool
+from ..running.application import ApplicationOperator, Tool, build_operator
 
 HISTORY = "lb_area_history"  # custom property of the object: area after each step
 
@@ -52,9 +52,7 @@ class MinimalSurface(Tool):
         def compute(progress):
             boundary = fixed
             if boundary is None:
-                boundary = cache.build(
-                    reading.points, options, None, progress, splats=reading.splats
-                ).laplacian.boundary
+                boundary = build_operator(reading, options, progress).laplacian.boundary
                 if not boundary.any():
                     raise PointCloudError(
                         f'"{name}" has no boundary, so that its surface would shrink to nothing. Assign the points'
