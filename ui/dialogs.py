@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..operators.deform.bake import MESHFREE_OT_deform_bake
 from ..operators.files.exporting import MESHFREE_OT_export_points
 from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.objects.groups import ROLES, has_group
@@ -46,4 +47,5 @@ def _draw(operator, context, names):
 
 # Here, and not when they are registered: it is then that Blender looks whether a class has a layout of its own.
 ApplicationOperator.draw = _draw_tool
-MESHFREE_OT_export_points.draw = MESHFREE_OT_import_points.draw = _draw_asked
+for kind in (MESHFREE_OT_export_points, MESHFREE_OT_import_points, MESHFREE_OT_deform_bake):
+    kind.draw = _draw_asked

@@ -7,7 +7,7 @@ import gpu
 import numpy as np
 
 from ..operators.deform.binding import positions_now
-from ..operators.deform.nodes import find_deform
+from ..operators.deform.nodes import find_deform, is_baked, show_live, turns_discs
 from ..operators.objects.attributes import (
     ALONG_SURFACE,
     DEVIATION,
@@ -210,17 +210,19 @@ def resize(obj):
 
 
 def reshape(obj):
-    """Draw discs and strokes where chosen and known; while handles move the points, dots, which need no turn."""
-    modifier = find_display(obj)
+    """Draw discs and strokes where chosen and known; strokes not while handles move the points, as they do not turn."""
+    modifier, deform = find_display(obj), find_deform(obj)
+    if deform is not None and not is_baked(obj):
+        show_live(deform)  # discs may be new
     if modifier is not None:
-        group, turned = modifier.node_group, DISC in obj.data.attributes and find_deform(obj) is None
+        group, known = modifier.node_group, DISC in obj.data.attributes
         formed = obj.meshfree.point_shape == "DISCS"
         if has_input(group, DISCS):
-            set_input(modifier, DISCS, turned and formed)
+            set_input(modifier, DISCS, known and formed and (deform is None or turns_discs(deform)))
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
         if has_input(group, STROKES):
-            stroked = turned and _has_strokes(obj)
+            stroked = known and deform is None and _has_strokes(obj)
             set_input(modifier, STROKES, shown_attribute(obj) if stroked else "")
             if stroked and get_input(modifier, INK) is None:  # else one of the user's choice stays
                 set_input(modifier, INK, stroke_material())

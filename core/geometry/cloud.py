@@ -17,7 +17,7 @@ from .normals import covariance_normals, orient_outwards, unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
-from .quadrics import Quadrics, check_surface
+from .quadrics import Quadrics, check_surface, frames
 from .sheets import fit_sheets, label_sheets, separate_sheets
 
 _DRAWN = 20  # points that a surface needs at least, to be drawn
@@ -476,6 +476,28 @@ class Discs:
 
     normals: np.ndarray
     radii: np.ndarray
+
+    def deformed(self, gradients):
+        """Return these discs carried along by a deformation, as large as it stretches the surface at most.
+
+        Parameters
+        ----------
+        gradients : ndarray, (n, 3, 3)
+            How it maps small steps around each point, of `deformation_gradients` or any other.
+
+        Returns
+        -------
+        Discs
+            With the normals of the mapped tangent planes; where such a plane is lost, the normal stays as it is.
+        """
+        along = gradients @ frames(self.normals)[:, :, 1:]
+        across = np.cross(along[:, :, 1], along[:, :, 0])  # as `frames` orders them
+        area = np.linalg.norm(across, axis=1)
+        normals = np.where(area[:, None] > 0.0, across / np.where(area > 0.0, area, 1.0)[:, None], self.normals)
+        squares = np.einsum("nak,nak->nk", along, along)
+        product = np.einsum("na,na->n", along[:, :, 0], along[:, :, 1])
+        longest = 0.5 * (squares.sum(axis=1) + np.hypot(squares[:, 0] - squares[:, 1], 2.0 * product))
+        return Discs(normals, self.radii * np.sqrt(longest))
 
 
 def surface_discs(points, *, progress=None):

@@ -2,26 +2,21 @@
 
 import bpy
 import numpy as np
-from bpy.props import IntProperty
+from bpy.props import BoolProperty, IntProperty
 
-from ...core import PointCloudError
+from ...core import NotEnoughMemoryError, PointCloudError
+from ...core.memory import available_memory
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import (
-    DISPLACEMENT,
-    SPLAT_ROTATION,
-    SPLAT_SCALE,
-    point_count,
-    read_attribute,
-    write_attribute,
-)
+from ..objects.attributes import DISPLACEMENT, point_count, read_attribute, write_attribute
+from ..objects.carried import carried, carries, moved_names
 from ..objects.reading import find_object
-from ..objects.splats import ROTATION, SCALE, carried_names, has_splats
+from ..objects.splats import HARMONIC, harmonic_names
 from ..running.job import Job, JobOperator, SteppedJob, all_steps
 from ..running.ready import reporting
 from ..running.stages import Stages
 from . import live
 from .binding import POSE, stale_reason, write_displacement
-from .nodes import BAKED_ROTATION, BAKED_SCALE, find_deform, is_baked, show_baked
+from .nodes import baked_suffix, find_deform, is_baked, show_baked
 from .tools import BoundOperator, check_fresh, delete_bake
 
 _LAST = 1048574  # frame of Blender
@@ -42,10 +37,18 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         max=_LAST,
     )
     last: IntProperty(name="Last Frame", description="Last frame to bake", default=0, min=0, max=_LAST)
+    harmonics: BoolProperty(
+        name="View-Dependent Colors",
+        description="Of Gaussian splats, let the harmonics turn in each frame, which takes 12 bytes for each of them",
+        default=True,
+    )
+    asks = ("first", "last")
 
     def invoke(self, context, event):
         self._attended = True
         self.first, self.last = context.scene.frame_start, context.scene.frame_end
+        if harmonic_names(self.subject(context).data):
+            self.asks = (*self.asks, "harmonics")
         return context.window_manager.invoke_props_dialog(self)
 
     @reporting
@@ -56,7 +59,10 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         check_fresh(obj)
         if self.last < self.first:
             raise PointCloudError(f"The last frame, {self.last}, comes before the first one, {self.first}. Swap them.")
-        self._kept = _Kept(scene, obj)
+        along = carried(obj.data) if carries(obj) else ()
+        along = [item for item in along if self.harmonics or not item.name.startswith(HARMONIC)]
+        _check_memory(self.last - self.first + 1, point_count(obj.data), along)
+        self._kept = _Kept(scene, obj, along)
         if attended:
             return self.start(context, [obj], self._prepared_frames, SteppedJob)
         try:
@@ -98,7 +104,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
             reason = stale_reason(obj, glance=True, trusting=True)
             if reason:
                 raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
-            frames.append(_read_frame(obj.data))
+            frames.append(_read_frame(obj.data, self._kept.along))
             yield
         return frames
 
@@ -116,31 +122,45 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
                 for suffix, (values, data_type) in frame.items():
                     write_attribute(mesh, f"{number}{suffix}", values, data_type)
             cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
-            show_baked(find_deform(obj), cache, self.first, len(results))
+            show_baked(find_deform(obj), cache, self.first, len(results), self._kept.along)
         size = len(results) * sum(values.nbytes for values, _ in results[0].values()) / 2**20
         self.report({"INFO"}, f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file")
         return {"FINISHED"}
 
 
-def _read_frame(data):
-    """Return what is shown of a frame, with types, by what follows the number in the names of its attributes."""
+def _check_memory(frames, points, along):
+    """Refuse what would not fit the memory, which holds all frames before they are written and after that."""
+    numbers = 3 + sum(4 if item.data_type == "QUATERNION" else 3 for item in along)
+    each, free = 2 * 4 * numbers * points, available_memory()
+    if free is not None and frames * each > free:
+        harmonics = any(item.name.startswith(HARMONIC) for item in along)
+        raise NotEnoughMemoryError(
+            f"{frames:,} frames of {points:,} points would take {frames * each / 2**30:.1f} GB of memory, and"
+            f" {free / 2**30:.1f} GB are free: enough for {free // each:,} frames. Bake fewer"
+            f"{', or turn off View-Dependent Colors' if harmonics else ''}.",
+            fitting=free // each,
+        )
+
+
+def _read_frame(data, along):
+    """Return what is shown of a frame, `Carried` included, with types, by the ends of the names of its attributes."""
     frame = {"": (read_attribute(data, DISPLACEMENT), "FLOAT_VECTOR")}
-    if has_splats(data):
-        scale, rotation = (SPLAT_SCALE, SPLAT_ROTATION) if SPLAT_SCALE in data.attributes else (SCALE, ROTATION)
-        frame[BAKED_SCALE] = read_attribute(data, scale), "FLOAT_VECTOR"
-        frame[BAKED_ROTATION] = read_attribute(data, rotation), "QUATERNION"
+    for item in along:
+        shown = item.moved if item.moved in data.attributes else item.name
+        frame[baked_suffix(item.name)] = read_attribute(data, shown), item.data_type
     return frame
 
 
 class _Kept:
     """The frame, the handles and the displacements that are shown while others are looked at."""
 
-    def __init__(self, scene, obj):
+    def __init__(self, scene, obj, along=()):
+        self.along = along  # `Carried` that is baked
         self._scene, self._uid = scene.session_uid, obj.session_uid
         self._time = scene.frame_current, scene.frame_subframe
         self._places = self._expected = self._now()
         self._displacement = read_attribute(obj.data, DISPLACEMENT)
-        self._splats = {name: read_attribute(obj.data, name) for name in carried_names(obj.data)}
+        self._moved = {name: read_attribute(obj.data, name) for name in moved_names(obj.data)}
         self._pose = obj.data[POSE].to_list()
 
     def find(self):
@@ -190,9 +210,7 @@ class _Kept:
                 if tuple(getattr(thing, name)) != value:  # it had been moved since its keyframe
                     setattr(thing, name, value)
         settled, *pose = self._pose
-        write_displacement(obj, self._displacement, np.array(pose), bool(settled))
-        for name, values in self._splats.items():
-            write_attribute(obj.data, name, values)
+        write_displacement(obj, self._displacement, np.array(pose), bool(settled), self._moved)
 
 
 class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):

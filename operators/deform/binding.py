@@ -22,12 +22,12 @@ from ..objects.attributes import (
     tag_changed,
     write_attribute,
 )
+from ..objects.carried import carries, moved_names, write_moved
 from ..objects.counting import members, summarize
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
 from ..objects.handlers import tell
 from ..objects.options import settings_values
 from ..objects.reading import TYPES, fingerprint, sharing_objects
-from ..objects.splats import carried_names, write_carried
 from .nodes import find_deform, is_baked
 
 WRITES = DISPLACEMENT, REST
@@ -267,7 +267,8 @@ def read_pose(obj, depsgraph=None):
     """
     settings = obj.meshfree.deform
     positions = zlib.crc32(positions_now(obj)) if moves_in_edit_mode(obj) else 0
-    numbers = [zlib.crc32(repr((solver_settings(settings), settings.steps)).encode()), positions]
+    asked = (solver_settings(settings), settings.steps, *(["carried"] if carries(obj) else []))
+    numbers = [zlib.crc32(repr(asked).encode()), positions]
     for item in settings.handle_items:
         there = item.has_empty and is_there(item.empty)
         numbers += empty_change(obj, item, depsgraph).ravel().tolist() if there else []
@@ -346,7 +347,7 @@ def forget(obj):
     settings = obj.meshfree.deform
     settings.is_bound = False
     settings.handle_items.clear()
-    for name in (*WRITES, *carried_names(obj.data)):
+    for name in (*WRITES, *moved_names(obj.data)):
         if obj.data.attributes.get(name) is not None:
             obj.data.attributes.remove(obj.data.attributes[name])
     obj.data.pop(POSE, None)
@@ -396,17 +397,20 @@ def same_pose(one, other) -> bool:
     )
 
 
-def write_displacement(obj, displacement, pose, settled: bool, splats=None):
-    """Write displacements in local space, (n, 3), in Edit Mode too, splats carried along, and what both are for."""
+def write_displacement(obj, displacement, pose, settled: bool, moved):
+    """Write displacements in local space, (n, 3), what was carried along, by name, and what both are for.
+
+    In Edit Mode displacements alone are in reach.
+    """
     data = obj.data
     if in_edit_mesh(obj):
         edited = bmesh.from_edit_mesh(data)
         layer = edited.verts.layers.float_vector[DISPLACEMENT]
-        for vertex, moved in zip(edited.verts, displacement.tolist(), strict=True):
-            vertex[layer] = moved
+        for vertex, step in zip(edited.verts, displacement.tolist(), strict=True):
+            vertex[layer] = step
         bmesh.update_edit_mesh(data, loop_triangles=False, destructive=False)
     else:
         write_attribute(data, DISPLACEMENT, displacement)
-        write_carried(data, splats)
+        write_moved(data, moved)
         tag_changed(data)
     data[POSE] = [float(settled), *pose.tolist()]

@@ -20,6 +20,8 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core import Cancelled, CoarseDeformer, Deformer, Splats
+from ..objects.attributes import MOVED_DISC
+from ..objects.carried import discs_at_rest, moved_discs, moved_splats
 from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import laplacian_options
 from ..objects.reading import boundary_points
@@ -81,13 +83,13 @@ class Moved(NamedTuple):
         As `Live.matrix` places them.
     displacement : ndarray, (n, 3)
         In local space.
-    splats : Splats or None
-        In local space, where the points are splats that are not at rest; without harmonics if the result is quick.
+    carried : dict of str to ndarray
+        What goes along, by the names of its attributes: nothing at rest, and no harmonics if the result is quick.
     """
 
     points: np.ndarray
     displacement: np.ndarray
-    splats: Splats | None
+    carried: dict
 
 
 @dataclass
@@ -201,14 +203,14 @@ def is_at_rest(live, goal) -> bool:
     return np.allclose(goal, live.rest[live.constraints.moved], rtol=0.0, atol=1e-6 * np.ptp(live.rest, axis=0).max())
 
 
-def displaced(live, goal, steps=None, start=None, progress=None):
-    """Solve for handles in local space, (h, 3); return a `Moved`.
+def displaced(live, goal, discs, steps=None, start=None, progress=None):
+    """Solve for handles in local space, (h, 3), with discs at rest, (n, 3), or none; return a `Moved`.
 
     With a number of steps the result is exact, otherwise it is a quick one.
     """
     rest = live.follower.points
     if is_at_rest(live, goal):
-        return Moved(rest, np.zeros_like(rest), None)
+        return Moved(rest, np.zeros_like(rest), {})
     if steps is None:
         solver = live.follower
         points = solver.solve(goal @ live.matrix.T, steps=1, start=start)
@@ -217,13 +219,15 @@ def displaced(live, goal, steps=None, start=None, progress=None):
         points = solver.solve(goal @ live.matrix.T, steps=steps, progress=progress)
     inverse = np.linalg.inv(live.matrix)
     displacement = (points - rest) @ inverse.T
-    if live.splats is None:
-        return Moved(points, displacement, None)
     splats = live.splats
+    if splats is None and discs is None:
+        return Moved(points, displacement, {})
+    gradients = inverse @ solver.gradients(points) @ live.matrix
+    if splats is None:
+        return Moved(points, displacement, {MOVED_DISC: moved_discs(discs, gradients)})
     if steps is None:  # harmonics take longer than all else, and can wait
         splats = replace(splats, harmonics=splats.harmonics[:, :0])
-    gradients = inverse @ solver.gradients(points) @ live.matrix
-    return Moved(points, displacement, splats.deformed(live.rest + displacement, gradients))
+    return Moved(points, displacement, moved_splats(splats.deformed(live.rest + displacement, gradients)))
 
 
 def plan_prepared(obj):
@@ -259,11 +263,12 @@ def plan_settled(obj, depsgraph=None, waits=True):
     else:
         rest, constraints = known.rest, known.constraints
     goal, steps = binding.goal(obj, constraints, rest, depsgraph), obj.meshfree.deform.steps
+    discs = discs_at_rest(obj)
 
     def compute(progress):
         live = known or make(progress)
         settled = waits or known is not None or live.exact is not None
-        return live, displaced(live, goal, steps if settled else None, progress=progress), settled
+        return live, displaced(live, goal, discs, steps if settled else None, progress=progress), settled
 
     return compute, binding.read_pose(obj, depsgraph)
 
@@ -278,7 +283,7 @@ def _plan_bound(obj):
 def write(obj, live, moved, pose, settled=True):
     """Write where an object is moved, and keep what the next result starts from."""
     live.last[obj.session_uid] = moved.points
-    binding.write_displacement(obj, moved.displacement, pose, settled, moved.splats)
+    binding.write_displacement(obj, moved.displacement, pose, settled, moved.carried)
     _troubles.pop(obj.session_uid, None)
 
 
@@ -311,7 +316,8 @@ def update(obj, depsgraph=None, quick=False, waits=True):
         return
     if live is not None:
         goal = binding.goal(obj, live.constraints, live.rest, depsgraph)
-        write(obj, live, displaced(live, goal, start=live.last.get(obj.session_uid)), pose, settled=False)
+        start = live.last.get(obj.session_uid)
+        write(obj, live, displaced(live, goal, discs_at_rest(obj), start=start), pose, settled=False)
     settle_later(obj)
 
 

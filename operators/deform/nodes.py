@@ -2,13 +2,12 @@
 
 import bpy
 
-from ..objects.attributes import DISPLACEMENT, REST, SPLAT_HARMONIC, SPLAT_ROTATION, SPLAT_SCALE
+from ..objects.attributes import DISC, DISPLACEMENT, REST
+from ..objects.carried import carried
 from ..objects.modifiers import DEFORM_TAG, add_input, add_node, is_deform, is_display, is_intact, new_group, set_input
-from ..objects.splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats
 
 NAME = "Mesh-Free Deform"
 _LIVE, _BAKED = "live", "baked"  # how the custom property of the node groups begins
-BAKED_SCALE, BAKED_ROTATION = " scale", " rotation"  # what follows the number of a frame in names of attributes
 _KINDS = {"FLOAT_VECTOR": "VECTOR", "QUATERNION": "ROTATION"}  # of attributes, as nodes call them
 
 
@@ -43,13 +42,13 @@ def add_deform(obj):
 
 def show_live(modifier):
     """Let a modifier show where the handles have moved the points."""
-    data = modifier.id_data.data
-    carried = _live_splats(len(harmonic_names(data))) if has_splats(data) else ()
-    kind = f"{_LIVE} {len(carried)}" if carried else _LIVE
-    modifier.node_group = _group(kind) or _live_group(kind, carried)
+    kept = carried(modifier.id_data.data)
+    kind = _kind(_LIVE, kept)
+    if modifier.node_group is None or modifier.node_group.get(DEFORM_TAG) != kind:
+        modifier.node_group = _group(kind) or _live_group(kind, kept)
 
 
-def show_baked(modifier, cache, first: int, frames: int):
+def show_baked(modifier, cache, first: int, frames: int, kept):
     """Let a modifier show a baked animation.
 
     Parameters
@@ -57,15 +56,31 @@ def show_baked(modifier, cache, first: int, frames: int):
     modifier : bpy.types.NodesModifier
     cache : bpy.types.Object
         Its attributes "0", "1" and so on hold the displacements of all points from the first frame on, those named
-        "0 scale" and "0 rotation" the splats.
+        by `baked_suffix` after these what goes along.
     first, frames : int
         The first frame, and how many there are.
+    kept : sequence of Carried
+        What goes along.
     """
-    splats = has_splats(modifier.id_data.data)
-    kind = f"{_BAKED} splats" if splats else _BAKED
-    modifier.node_group = _group(kind) or _baked_group(kind, _BAKED_SPLATS if splats else ())
+    kind = _kind(_BAKED, kept)
+    modifier.node_group = _group(kind) or _baked_group(kind, kept)
     for name, value in (("Cache", cache), ("First Frame", first), ("Frames", frames)):
         set_input(modifier, name, value)
+
+
+def baked_suffix(name) -> str:
+    """Return what follows the number of a frame in the name of the attribute that another one is baked to."""
+    return f" {name}"
+
+
+def turns_discs(modifier) -> bool:
+    """Whether the discs of the display go along where a modifier moves the points."""
+    return modifier.node_group[DEFORM_TAG].endswith(f" {DISC}")
+
+
+def _kind(begin, kept):
+    """Return how the nodes for a kind of deformation are marked: by that, and by the last of what goes along."""
+    return f"{begin} {kept[-1].name}" if kept else begin
 
 
 def _group(kind):
@@ -74,23 +89,14 @@ def _group(kind):
     return next((item for item in known if is_intact(item)), None)
 
 
-def _live_splats(harmonics):
-    """Return which attributes of splats take the place of which, and their types."""
-    numbered = ((f"{SPLAT_HARMONIC}{number}", f"{HARMONIC}{number}", "FLOAT_VECTOR") for number in range(harmonics))
-    return (SPLAT_SCALE, SCALE, "FLOAT_VECTOR"), (SPLAT_ROTATION, ROTATION, "QUATERNION"), *numbered
-
-
-_BAKED_SPLATS = (BAKED_SCALE, SCALE, "FLOAT_VECTOR"), (BAKED_ROTATION, ROTATION, "QUATERNION")
-
-
-def _live_group(kind, carried):
+def _live_group(kind, kept):
     group, given = _new(NAME, kind)
     displacement = add_node(group, "GeometryNodeInputNamedAttribute", 0, -200, data_type="FLOAT_VECTOR")
     displacement.inputs["Name"].default_value = DISPLACEMENT
     strength, geometry = given.outputs["Strength"], given.outputs["Geometry"]
-    for number, (source, target, data_type) in enumerate(carried, 1):
+    for number, (target, moved, data_type) in enumerate(kept, 1):
         y = -400 * number
-        stored = _attribute(group, source, data_type, 7, y)
+        stored = _attribute(group, moved, data_type, 7, y)
         at_rest = _attribute(group, target, data_type, 7, y - 150)
         ends = at_rest.outputs["Attribute"], stored.outputs["Attribute"]
         value = _choose(group, stored.outputs["Exists"], *ends, data_type, 8, y)
@@ -99,7 +105,7 @@ def _live_group(kind, carried):
     return group
 
 
-def _baked_group(kind, carried):
+def _baked_group(kind, kept):
     group, given = _new(f"{NAME} Baked", kind)
     for name, kind in (("Cache", "Object"), ("First Frame", "Int"), ("Frames", "Int")):
         add_input(group, name, kind, f"{name} of the baked animation")
@@ -136,9 +142,10 @@ def _baked_group(kind, carried):
     ends = list(enumerate((whole, after)))
     displacement, strength = now("", "FLOAT_VECTOR", 100), given.outputs["Strength"]
     geometry = _store(group, given.outputs["Geometry"], DISPLACEMENT, "FLOAT_VECTOR", displacement, 0)
-    for number, (suffix, target, data_type) in enumerate(carried, 1):
+    for number, (target, _, data_type) in enumerate(kept, 1):
         y = -900 * number
-        geometry = _replace(group, geometry, target, data_type, now(suffix, data_type, y), strength, y)
+        value = now(baked_suffix(target), data_type, y)
+        geometry = _replace(group, geometry, target, data_type, value, strength, y)
     _place(group, geometry, strength, displacement)
     return group
 

@@ -8,6 +8,7 @@ from mathutils import Matrix, Vector
 from ...core import PointCloudError, opposite_ends
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import REST, own_positions, point_count, read_attribute, write_own_positions
+from ..objects.carried import apply_discs
 from ..objects.groups import ANCHOR, HANDLE, assign, check_assignable, group_weights, handle_names, has_group
 from ..objects.handlers import tell
 from ..objects.modifiers import get_input
@@ -138,7 +139,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         context.scene.render.use_lock_interface = True
         live.keep(obj, made)
         obj.data.pop(POSE, None)
-        write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False)
+        write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False, moved={})
         live.update(obj, waits=bpy.app.background)
         moved, stay = len(made.constraints.moved), len(made.constraints.kept)
         press = "Press G or R to move" if self.at_once else "Move"
@@ -302,8 +303,9 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
             write_splats(obj.data, shown_splats(obj))
         else:
             write_own_positions(obj.data, positions)
+            apply_discs(obj.data, get_input(find_deform(obj), "Strength"))
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
-        write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True)
+        write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True, moved={})
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"
 
 
@@ -398,7 +400,7 @@ def put_back(context, obj):
         write_own_positions(obj.data, positions)
     context.view_layer.update()
     if same:
-        write_displacement(obj, np.zeros((point_count(data), 3)), read_pose(obj), settled=True)
+        write_displacement(obj, np.zeros((point_count(data), 3)), read_pose(obj), settled=True, moved={})
 
 
 def delete_bake(obj):

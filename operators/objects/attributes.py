@@ -52,6 +52,7 @@ UV = "lb_uv"  # texture coordinates around a point
 DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
 SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of splats that are carried along
+MOVED_DISC = "lb_moved_disc"  # what a deformation makes of the disc
 SPLAT_HARMONIC = "lb_splat_sh_"  # followed by the number of the harmonic, from 0
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
@@ -60,7 +61,8 @@ ALONG_SURFACE = DIRECTION, DIRECTION_1
 RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT, TRUST
 APPLICATIONS = SEGMENT, FIELD, DISTANCE, DISPLACEMENT
 _TYPES = {  # all others are FLOAT
-    **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DIRECTION, DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
+    **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DIRECTION), "FLOAT_VECTOR"),
+    **dict.fromkeys((DISC, MOVED_DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
     **dict.fromkeys((COMPONENT, SEGMENT, CELL), "INT"),
     **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
     UV: "FLOAT2",

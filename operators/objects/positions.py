@@ -4,7 +4,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core import PointCloudError
-from .attributes import check_size, own_positions, write_own_positions
+from .attributes import DISC, check_size, own_positions, write_attribute, write_own_positions
 from .modifiers import is_own
 from .reading import key_positions, shape_keys
 from .splats import has_splats, read_splats, write_splats
@@ -49,7 +49,7 @@ def check_movable(obj, target: str):
         )
 
 
-def write_positions(obj, reading, points, target: str, name: str, gradients=None):
+def write_positions(obj, reading, points, target: str, name: str, gradients=None, discs=None):
     """Move the points to given places.
 
     Parameters
@@ -65,6 +65,8 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
         Of the shape key; Blender adds a number if there is one already.
     gradients : ndarray, (n, 3, 3), optional
         Of the deformation, as `reading.points`, with which splats go.
+    discs : ndarray, (n, 3), optional
+        Of the moved points, as the display takes them, even if a shape key moves them.
 
     Returns
     -------
@@ -77,6 +79,8 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
         local = np.linalg.inv(matrix) @ gradients @ matrix
         write_splats(obj.data, read_splats(obj.data).deformed(own_positions(obj.data) + moved, local))
         return None
+    if discs is not None:
+        write_attribute(obj.data, DISC, discs)
     if target == "IN_PLACE" or obj.type != "MESH":
         write_own_positions(obj.data, own_positions(obj.data) + moved)
         return None

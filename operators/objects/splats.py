@@ -76,23 +76,6 @@ def write_splats(data, splats):
     tag_changed(data)
 
 
-def write_carried(data, splats):
-    """Keep how splats are carried, those harmonics that they have here; None for as they are at rest."""
-    if splats is None:
-        for name in carried_names(data):
-            data.attributes.remove(data.attributes[name])
-        return
-    write_attribute(data, SPLAT_SCALE, splats.scales)
-    write_attribute(data, SPLAT_ROTATION, splats.rotations)
-    for number in range(splats.harmonics.shape[1]):
-        write_attribute(data, f"{SPLAT_HARMONIC}{number}", splats.harmonics[:, number])
-
-
-def carried_names(data) -> list:
-    """Return the names of the attributes that are there for splats carried along."""
-    return [name for name in (item.name for item in data.attributes) if name.startswith("lb_splat_")]
-
-
 def shown_splats(obj) -> Splats:
     """Return the splats of an object as its deformation shows them: in between those at rest and those carried."""
     data = obj.data

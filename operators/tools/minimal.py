@@ -5,6 +5,7 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ...core import Cancelled, PointCloudError
 from ...core.applications import minimal_surface
+from ..objects.carried import disc_finder
 from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen
 from ..objects.options import laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
@@ -47,7 +48,7 @@ class MinimalSurface(Tool):
         if is_chosen(obj, self.group, FIXED):
             fixed = chosen_members(obj, self.group, "Fixed")
         tolerance, steps, name = self.tolerance, self.steps, obj.name
-        kind = group_kind(obj)
+        kind, find_discs = group_kind(obj), disc_finder(obj, reading)
 
         def compute(progress):
             boundary = fixed
@@ -59,14 +60,15 @@ class MinimalSurface(Tool):
                         f' that stay to the {kind} "{FIXED}".'
                     )
             settings = (reading.points, boundary, tolerance, steps, options)
-            return reading, cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
+            film = cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
+            return reading, film, find_discs(film.points)
 
         return compute
 
     def write(self, context, obj, result):
-        reading, film = result
+        reading, film, discs = result
         if film.steps:
-            write_positions(obj, reading, film.points, self.target, "Minimal Surface")
+            write_positions(obj, reading, film.points, self.target, "Minimal Surface", discs=discs)
         obj[HISTORY] = film.area_history.tolist()
         area = film.area_history[-1] if film.steps else film.initial_area
         areas = f"from {area_text(film.initial_area)} to {area_text(float(area))}"

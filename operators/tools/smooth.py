@@ -16,6 +16,7 @@ from ...core import (
     smooth_points,
     smoothing_base,
 )
+from ..objects.carried import disc_finder
 from ..objects.groups import chosen_weights
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.result import length_text
@@ -96,11 +97,12 @@ class Smooth(Tool):
         method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
         shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
         keep_boundary, name, carries = self.keep_boundary, obj.name, has_splats(obj.data)
+        find_discs = disc_finder(obj, reading)
 
         def compute(progress):
             laplacian = operator(progress)
             points = smoothed(laplacian, progress)
-            return reading, points, deformation_gradients(laplacian, points) if carries else None
+            return reading, points, deformation_gradients(laplacian, points) if carries else None, find_discs(points)
 
         def smoothed(laplacian, progress):
             dirichlet = keep_boundary and bool(laplacian.boundary.any())
@@ -139,8 +141,8 @@ class Smooth(Tool):
         return compute
 
     def write(self, context, obj, result):
-        reading, points, gradients = result
-        write_positions(obj, reading, points, self.target, "Smooth", gradients)
+        reading, points, gradients, discs = result
+        write_positions(obj, reading, points, self.target, "Smooth", gradients, discs)
         moved = np.sqrt(np.mean(np.sum((points - reading.points) ** 2, axis=1)))
         return [f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"]
 
@@ -223,6 +225,7 @@ class ModeShape(Tool):
         reading, operator = operator_reader(context, obj)
         mode, amplitude, phase = self.mode, self.amplitude or None, self.phase
         repeated, carries = self.is_repeated(context), has_splats(obj.data) and not self.animate
+        find_discs = (lambda points: None) if self.animate else disc_finder(obj, reading)
 
         def compute(progress):
             laplacian = operator(progress)
@@ -234,14 +237,15 @@ class ModeShape(Tool):
                 cache.lowest_modes(laplacian, several, progress, raw=True)
             vector = cache.lowest_modes(laplacian, number, progress).eigenvectors[:, number - 1]
             points = displace_by_mode(laplacian, vector, amplitude, phase=phase)
-            return reading, points, number, deformation_gradients(laplacian, points) if carries else None
+            gradients = deformation_gradients(laplacian, points) if carries else None
+            return reading, points, number, gradients, find_discs(points)
 
         return compute
 
     def write(self, context, obj, result):
-        reading, points, mode, gradients = result
+        reading, points, mode, gradients, discs = result
         target = "SHAPE_KEY" if self.animate else self.target
-        key = write_positions(obj, reading, points, target, f"Mode {mode}", gradients)
+        key = write_positions(obj, reading, points, target, f"Mode {mode}", gradients, discs)
         if self.animate:
             key.slider_min = -1.0
             scene, quarter = context.scene, 0.25 * self.period

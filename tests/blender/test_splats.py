@@ -140,9 +140,30 @@ def test_a_bake_shows_the_splats_of_each_frame(core, rest):
         found = splats_of(core, shown(obj))
         np.testing.assert_allclose(found.covariances, seen[frame].covariances, atol=1e-7)
         np.testing.assert_allclose(found.positions, seen[frame].positions, atol=1e-5)
+        np.testing.assert_allclose(found.harmonics, seen[frame].harmonics, atol=1e-6)
     assert np.abs(seen[3].covariances - seen[1].covariances).max() > 1e-3
+    assert np.abs(seen[3].harmonics - seen[1].harmonics).max() > 1e-2
     assert bpy.ops.meshfree.deform_free() == {"FINISHED"}
     close(splats_of(core, shown(obj)), seen[3])
+
+
+def test_a_bake_without_harmonics_leaves_them(core, rest):
+    obj, empty = bound(rest, anchors=False)
+    empty.rotation_euler = (1.0, 0.0, 0.0)
+    bpy.ops.meshfree.deform_update()
+    moved = splats_of(core, shown(obj))
+    assert bpy.ops.meshfree.deform_bake(first=1, last=2, harmonics=False) == {"FINISHED"}
+    found = splats_of(core, shown(obj))
+    np.testing.assert_allclose(found.covariances, moved.covariances, atol=1e-7)
+    np.testing.assert_allclose(found.harmonics, rest.harmonics, atol=1e-6)
+
+
+def test_a_bake_that_does_not_fit_the_memory_is_refused(rest):
+    obj, _ = bound(rest)
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match="frames of 960 points would take .* or turn off View-Dependent Colors"):
+        bpy.ops.meshfree.deform_bake(first=1, last=1_000_000)
+    assert everything(obj) == before
 
 
 @pytest.mark.parametrize("name", ["smooth", "mode_shape"])

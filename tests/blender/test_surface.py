@@ -3,10 +3,11 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Euler, Matrix
 from mathutils.bvhtree import BVHTree
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import add_object, attribute, local_points, sphere_points
+from tests.blender.clouds import add_group, add_object, attribute, local_points, sphere_points
 
 
 @pytest.fixture
@@ -124,15 +125,125 @@ def test_an_analysis_finds_discs_too(obj):
     assert_allclose(cosine, np.linalg.norm(normals, axis=1), rtol=0.05)
 
 
-def test_points_that_follow_handles_are_dots(obj, extension):
-    bpy.ops.meshfree.analyze()
-    for name, chosen in (("Handle", local_points(obj)[:, 2] > 0.9), ("Anchor", local_points(obj)[:, 2] < -0.9)):
-        obj.vertex_groups.new(name=name).add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
-    bpy.ops.meshfree.deform_bind()
-    graph = bpy.context.evaluated_depsgraph_get()
-    assert len(obj.evaluated_get(graph).to_mesh().vertices) == 0
-    bpy.ops.meshfree.deform_unbind()
-    assert drawn(obj).shape[1] == 9
+class TestDeformed:
+    """Discs of points that a deformation moves."""
+
+    TURN = Euler((0.4, -0.3, 0.8)).to_matrix()
+
+    def bound(self, obj, anchors=False):
+        for name, sign in (("Handle", 1.0), ("Anchor", -1.0))[: 1 + anchors]:
+            add_group(obj, name, sign * local_points(obj)[:, 2] > 0.8)
+        assert bpy.ops.meshfree.deform_bind() == {"FINISHED"}
+        return next(child for child in obj.children if child.type == "EMPTY")
+
+    def turned(self, obj):
+        """Bind without anchors, and turn all."""
+        empty = self.bound(obj)
+        empty.matrix_world = Matrix.Translation((1.0, 2.0, 3.0)) @ self.TURN.to_4x4() @ empty.matrix_world
+        assert bpy.ops.meshfree.deform_update() == {"FINISHED"}
+
+    def check(self, rest, moved):
+        """Compare places and spreads of the corners of discs, which tell nothing of their turn about their normals."""
+        turn = np.array(self.TURN)
+        one, other = rest.mean(axis=1), moved.mean(axis=1)
+        assert_allclose(other, one @ turn.T + [1.0, 2.0, 3.0], atol=1e-5)
+        spreads = [np.einsum("nka,nkb->nab", each, each) for each in (rest - one[:, None], moved - other[:, None])]
+        assert_allclose(spreads[1], turn @ spreads[0] @ turn.T, atol=1e-5)
+
+    @pytest.mark.parametrize("first", ["analyze", "deform_bind"])
+    def test_they_turn_with_the_points(self, obj, first):
+        if first == "analyze":
+            bpy.ops.meshfree.analyze()
+            rest = drawn(obj)
+            self.turned(obj)
+        else:  # discs that come later go along, too
+            self.turned(obj)
+            bpy.ops.meshfree.analyze()
+            bpy.ops.meshfree.deform_reset()
+            rest = drawn(obj)
+            self.bound_again(obj)
+        self.check(rest, drawn(obj))
+
+    def bound_again(self, obj):
+        empty = next(child for child in obj.children if child.type == "EMPTY")
+        empty.matrix_world = Matrix.Translation((1.0, 2.0, 3.0)) @ self.TURN.to_4x4() @ empty.matrix_world
+        bpy.context.view_layer.update()
+
+    def test_those_found_while_points_are_moved_turn_at_once(self, obj):
+        self.turned(obj)
+        bpy.ops.meshfree.show_surface()
+        found = drawn(obj)
+        bpy.ops.meshfree.deform_reset()
+        self.check(drawn(obj), found)
+
+    def test_they_stretch_with_the_surface(self, obj, core):
+        bpy.ops.meshfree.analyze()
+        empty = self.bound(obj, anchors=True)
+        empty.location.z += 1.0
+        bpy.ops.meshfree.deform_update()
+        points = local_points(obj).astype(float)
+        laplacian = core.build_laplacian(points)
+        moved = points + attribute(obj, "lb_displacement")
+        normals, radii = attribute(obj, "lb_disc").astype(float), np.linalg.norm(attribute(obj, "lb_disc"), axis=1)
+        gradients = core.deformation_gradients(laplacian, moved)
+        wanted = core.Discs(normals / radii[:, None], radii).deformed(gradients)
+        found = attribute(obj, "lb_moved_disc")
+        sizes = np.linalg.norm(found, axis=1)
+        assert np.median(np.einsum("ij,ij->i", found / sizes[:, None], wanted.normals)) > 0.999
+        assert_allclose(np.median(sizes / wanted.radii), 1.0, atol=0.02)
+        assert sizes.max() > 1.2 * radii.max()
+        assert bpy.ops.meshfree.deform_apply() == {"FINISHED"}
+        assert_allclose(attribute(obj, "lb_disc"), found, rtol=1e-5)
+        assert "lb_moved_disc" not in obj.data.attributes
+
+    def test_dots_leave_them_alone(self, obj):
+        bpy.ops.meshfree.analyze()
+        obj.meshfree.point_shape = "DOTS"
+        self.turned(obj)
+        assert "lb_moved_disc" not in obj.data.attributes
+        obj.meshfree.point_shape = "DISCS"
+        bpy.context.view_layer.update()
+        assert "lb_moved_disc" in obj.data.attributes
+
+    @pytest.mark.parametrize("way", ["deform_reset", "deform_unbind"])
+    def test_they_go_back_to_rest(self, obj, way):
+        bpy.ops.meshfree.analyze()
+        rest = drawn(obj)
+        self.turned(obj)
+        assert getattr(bpy.ops.meshfree, way)() == {"FINISHED"}
+        assert_allclose(drawn(obj), rest, atol=1e-6)
+        assert "lb_moved_disc" not in obj.data.attributes
+
+    def test_a_bake_shows_those_of_each_frame(self, obj):
+        bpy.ops.meshfree.analyze()
+        empty = self.bound(obj)
+        for frame, angle in ((1, 0.0), (3, 1.0)):
+            empty.rotation_euler = (angle, 0.0, 0.0)
+            empty.keyframe_insert("rotation_euler", frame=frame)
+        seen = []
+        for frame in (1, 2, 3):
+            bpy.context.scene.frame_set(frame)
+            seen.append(drawn(obj))
+        assert bpy.ops.meshfree.deform_bake(first=1, last=3) == {"FINISHED"}
+        for frame in (3, 2, 1):
+            bpy.context.scene.frame_set(frame)
+            assert_allclose(drawn(obj), seen[frame - 1], atol=1e-5)
+        assert np.abs(seen[2] - seen[0]).max() > 0.1
+
+    @pytest.mark.parametrize("target", ["IN_PLACE", "SHAPE_KEY"])
+    def test_smoothed_points_take_theirs_along(self, core, target):
+        points = sphere_points(600)
+        noise = 0.1 * 0.14 * np.random.default_rng(2).standard_normal(points.shape)
+        obj = add_object(points + noise)
+        bpy.ops.meshfree.show_surface()
+
+        def off():
+            discs = attribute(obj, "lb_disc")
+            return np.linalg.norm(np.cross(discs, points), axis=1) / np.linalg.norm(discs, axis=1)
+
+        before = off().mean()
+        assert bpy.ops.meshfree.smooth(method="NOISE", target=target) == {"FINISHED"}
+        assert off().mean() < 0.8 * before
 
 
 def brightness(path, below):

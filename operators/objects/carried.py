@@ -1,0 +1,121 @@
+"""What goes along with points that a deformation moves: the discs that the display draws, or splats."""
+
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+from ...core import Discs, surface_discs
+from ...core.geometry import toward
+from .attributes import (
+    DISC,
+    MOVED_DISC,
+    SPLAT_HARMONIC,
+    SPLAT_ROTATION,
+    SPLAT_SCALE,
+    read_attribute,
+    write_attribute,
+)
+from .reading import discs
+from .splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats
+
+
+class Carried(NamedTuple):
+    """An attribute that a deformation changes.
+
+    Attributes
+    ----------
+    name : str
+        Of the attribute at rest, whose place is taken where the deformation is shown.
+    moved : str
+        Of the attribute that holds it after the deformation; there is none where that changes nothing.
+    data_type : str
+    """
+
+    name: str
+    moved: str
+    data_type: str
+
+
+def carried(data) -> tuple:
+    """Return what goes along with the points of a mesh or a point cloud, as `Carried`."""
+    if has_splats(data):
+        harmonics = range(len(harmonic_names(data)))
+        numbered = (Carried(f"{HARMONIC}{number}", _harmonic(number), "FLOAT_VECTOR") for number in harmonics)
+        return (
+            Carried(SCALE, SPLAT_SCALE, "FLOAT_VECTOR"),
+            Carried(ROTATION, SPLAT_ROTATION, "QUATERNION"),
+            *numbered,
+        )
+    return (Carried(DISC, MOVED_DISC, "FLOAT_VECTOR"),) if DISC in data.attributes else ()
+
+
+def carries(obj) -> bool:
+    """Whether more than places has to follow a deformation; in Edit Mode that is out of reach."""
+    data = obj.data
+    if isinstance(data, bpy.types.Mesh) and data.is_editmode:
+        return False
+    return has_splats(data) or (DISC in data.attributes and obj.meshfree.point_shape == "DISCS")
+
+
+def discs_at_rest(obj):
+    """Read the discs that the display of an object draws at rest, normals times radii, (n, 3); None for none."""
+    return read_attribute(obj.data, DISC) if carries(obj) and not has_splats(obj.data) else None
+
+
+def disc_finder(obj, reading):
+    """Read what discs an object draws, if it does; return a function that finds them anew for moved points.
+
+    It takes points as `reading.points`, and returns normals times radii, (n, 3), in local space, or None.
+    """
+    before = discs_at_rest(obj)
+
+    def find(points):
+        if before is None:
+            return None
+        local = reading.local(points)
+        found = surface_discs(local)
+        return discs(toward(found.normals, before), found.radii, local)
+
+    return find
+
+
+def moved_discs(vectors, gradients):
+    """Return discs, normals times radii, (n, 3), after a deformation with these gradients, (n, 3, 3)."""
+    radii = np.linalg.norm(vectors, axis=1)
+    known = radii > 0.0  # of points that were added since, nothing is known
+    moved = Discs(vectors[known] / radii[known, None], radii[known]).deformed(gradients[known])
+    result = np.zeros(vectors.shape)
+    result[known] = moved.normals * moved.radii[:, None]
+    return result
+
+
+def moved_splats(splats) -> dict:
+    """Return splats after a deformation, those harmonics that they have, by the names of their attributes."""
+    harmonics = {_harmonic(number): splats.harmonics[:, number] for number in range(splats.harmonics.shape[1])}
+    return {SPLAT_SCALE: splats.scales, SPLAT_ROTATION: splats.rotations, **harmonics}
+
+
+def apply_discs(data, strength):
+    """Take the discs after a deformation, of which such a share is shown, as those at rest, if there are any."""
+    if MOVED_DISC in data.attributes:
+        rest, moved = read_attribute(data, DISC), read_attribute(data, MOVED_DISC)
+        write_attribute(data, DISC, rest + strength * (moved - rest))
+
+
+def write_moved(data, moved):
+    """Keep what was carried, by the names of the attributes; nothing for as it is at rest."""
+    if not moved:
+        for name in moved_names(data):
+            data.attributes.remove(data.attributes[name])
+    for name, values in moved.items():
+        write_attribute(data, name, values)
+
+
+def moved_names(data) -> list:
+    """Return the names of the attributes that hold what was carried."""
+    return [item.moved for item in carried(data) if item.moved in data.attributes]
+
+
+def _harmonic(number):
+    return f"{SPLAT_HARMONIC}{number}"
