@@ -15,6 +15,7 @@ from ..operators.objects.attributes import (
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
+from ..operators.objects.splats import has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
 from .display import find_display, label, range_node, shown_attribute, step_colors
@@ -81,6 +82,8 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
         _draw_summary(layout, obj)
+        if has_splats(obj.data):
+            _draw_splats(layout, obj.meshfree)
         if DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
         row = layout.row(align=True)
@@ -141,6 +144,16 @@ def _draw_summary(layout, obj):
     if sharing_objects(obj):
         column.label(text="Other objects share this mesh", icon="INFO")
         column.prop(obj.meshfree, "make_single_user")
+
+
+def _draw_splats(layout, settings):
+    """Draw what is there for Gaussian splats alone."""
+    column = layout.column(align=True)
+    column.operator("meshfree.show_splats")
+    column.operator("meshfree.select_floaters")
+    column.operator("meshfree.apply_to_splats")
+    column.operator("meshfree.export_splats", text="Export Splats...")
+    layout.prop(settings, "leave_out_floaters")
 
 
 class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):

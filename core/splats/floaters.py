@@ -64,6 +64,12 @@ def floaters(splats):
     return ~kept
 
 
+def floating_rows(splats):
+    """Return the floaters that operators leave out, as indices: all, or none where these are the larger part."""
+    rows = np.flatnonzero(floaters(splats))
+    return rows if 2 * len(rows) < len(splats) else rows[:0]
+
+
 def _gaps(positions, covariances):
     """Return the third of the Mahalanobis distances from each splat to its neighbors, (m,)."""
     result = np.empty(len(positions))

@@ -182,7 +182,9 @@ def moves_in_edit_mode(obj) -> bool:
 
 def settings_text(obj) -> str:
     """Text of the settings of the operator that deformations depend on."""
-    return repr((settings_values(obj.meshfree), obj.meshfree.boundary_group, obj.meshfree.use_modifiers))
+    settings = obj.meshfree
+    floaters = () if settings.leave_out_floaters else ("floaters",)
+    return repr((settings_values(settings), settings.boundary_group, settings.use_modifiers, *floaters))
 
 
 def stale_reason(obj, glance=False, trusting=False) -> str:

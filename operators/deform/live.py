@@ -174,9 +174,10 @@ def plan_factors(obj, rest, matrix, constraints):
     softness = settings.weight if settings.soft else None
     options, boundary, aware = laplacian_options(obj.meshfree), boundary_points(obj), settings.rotation_aware
     splats = read_splats(obj.data) if has_splats(obj.data) else None
+    judged = splats if obj.meshfree.leave_out_floaters else None
 
     def operator(progress):
-        return cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress, splats=splats).laplacian
+        return cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress, splats=judged).laplacian
 
     def make_by(kind, known, progress):
         return kind(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import CoarseDeformer, PointCloudError, build_laplacian, read_splats, write_splats
 from ...core.files import WRITABLE, read_points, write_points
-from ...core.splats import holds_splats
+from ...core.splats import floating_rows, holds_splats
 
 _SHARES = (0.01, 0.5, 0.99)  # quantiles that are told
 _FLAT = 0.3  # of the middle axis, below which the shortest one makes a splat flat
@@ -48,9 +48,9 @@ def deform(path, arguments, output) -> dict:
     points = table.points if splats is None else splats.positions
     handles, goal = _moves(wanted, points)
     anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
-    deformer = CoarseDeformer(
-        build_laplacian(points), handles, np.unique(np.concatenate(anchors)) if anchors else [], rotation_aware=True
-    )
+    out = floating_rows(splats) if splats is not None else ()
+    laplacian = build_laplacian(points, left_out=out)
+    deformer = CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
     moved = deformer.solve(goal)
     if splats is None:
         write_points(output, replace(table, points=moved), double=not table.single)
@@ -58,7 +58,7 @@ def deform(path, arguments, output) -> dict:
         write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
     notices = (table if splats is None else splats).notices
     farthest = float(np.linalg.norm(moved - points, axis=1).max())
-    return {"points": len(points), "farthest": farthest, "notices": [*notices, *deformer.notices]}
+    return {"points": len(points), "farthest": farthest, "left_out": len(out), "notices": [*notices, *deformer.notices]}
 
 
 def _read_handles(path):

@@ -12,7 +12,7 @@ DEFAULTS = LaplacianOptions()
 NAMES = tuple(option.name for option in fields(LaplacianOptions) if option.name != "orient")
 
 # Those, and the settings that say what of the object is read.
-ALL_NAMES = (*NAMES, "boundary_group", "use_modifiers", "point_budget", "most_points")
+ALL_NAMES = (*NAMES, "boundary_group", "use_modifiers", "leave_out_floaters", "point_budget", "most_points")
 
 # Options for kinds of points.
 PRESETS = {

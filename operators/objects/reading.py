@@ -85,7 +85,7 @@ class Reading:
     orientation : ndarray, (n, 3) float64, or None
         Vectors whose side the normals take, where Orient Normals or the user chose it.
     splats : Splats or None
-        Those in local space that the points are the middles of, if they are, without harmonics.
+        Those in local space that the points are the middles of, without harmonics, if floaters are to be left out.
     """
 
     points: np.ndarray
@@ -139,7 +139,8 @@ def read_points(context, obj) -> Reading:
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
         notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
-    splats = read_splats(obj.data, with_harmonics=False) if has_splats(obj.data) else None
+    judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)
+    splats = read_splats(obj.data, with_harmonics=False) if judged else None
     reading = Reading(check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)
     sides = chosen_sides(obj)
     return reading if sides is None else replace(reading, orientation=reading.placed_normals(sides))

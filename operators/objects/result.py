@@ -105,6 +105,7 @@ def _settings(obj):
         repr(settings_values(kept))
         + (f" {budget}" if budget and budget < point_count(obj.data) else "")
         + ("" if sides is None else f" {zlib.crc32(sides):08x}")
+        + ("" if kept.leave_out_floaters else " floaters")
     )
 
 

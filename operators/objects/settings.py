@@ -158,6 +158,12 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         description="Take the points where the modifiers put them; the modifiers must keep their number and order",
         default=False,
     )
+    leave_out_floaters: BoolProperty(
+        name="Leave Out Floaters",
+        description="Keep Gaussian splats out of the operator that are hardly seen, huge or alone; they go along where"
+        " others are moved",
+        default=True,
+    )
     point_budget: EnumProperty(
         name="Point Budget",
         description="How many points Analyze Points and Compute Modes work on; results of a subset, evenly spread over"

@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import LaplaceBeltrami, Spectrum, build_laplacian, floaters, mean_curvature, points_that_fit
+from ...core import LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature, points_that_fit
+from ...core.splats import floating_rows
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
 _FACTOR = 12  # bytes of each entry of sparse factors: a number and its row
@@ -76,12 +77,11 @@ def holds(points, options, boundary, splats=None) -> bool:
 
 
 def floating(splats):
-    """Return the splats that operators leave out, as indices; none where these are most of them, or no splats."""
+    """Return the splats that operators leave out, as indices; see `floating_rows`. Without splats there are none."""
     if splats is None:
         return _NONE
     key = content("floaters", splats.positions, splats.scales, splats.rotations, splats.opacities)
-    out = fetch(key, lambda: np.flatnonzero(floaters(splats)))
-    return out if 2 * len(out) < len(splats) else _NONE
+    return fetch(key, lambda: floating_rows(splats))
 
 
 def floating_notices(out):

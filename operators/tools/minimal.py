@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
-from ...core import Cancelled, PointCloudError
+from ...core import Cancelled, PointCloudError, deformation_gradients
 from ...core.applications import minimal_surface
 from ..objects.carried import disc_finder
 from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen
@@ -11,6 +11,7 @@ from ..objects.options import laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.reading import read_points
 from ..objects.result import area_text
+from ..objects.splats import has_splats
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, build_operator
 
@@ -48,7 +49,7 @@ class MinimalSurface(Tool):
         if is_chosen(obj, self.group, FIXED):
             fixed = chosen_members(obj, self.group, "Fixed")
         tolerance, steps, name = self.tolerance, self.steps, obj.name
-        kind, find_discs = group_kind(obj), disc_finder(obj, reading)
+        kind, find_discs, carries = group_kind(obj), disc_finder(obj, reading), has_splats(obj.data)
 
         def compute(progress):
             boundary = fixed
@@ -61,14 +62,18 @@ class MinimalSurface(Tool):
                     )
             settings = (reading.points, boundary, tolerance, steps, options)
             film = cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
-            return reading, film, find_discs(film.points)
+            gradients = None
+            if carries:
+                laplacian = build_operator(reading, options, progress).laplacian
+                gradients = deformation_gradients(laplacian, film.points)
+            return reading, film, gradients, find_discs(film.points)
 
         return compute
 
     def write(self, context, obj, result):
-        reading, film, discs = result
+        reading, film, gradients, discs = result
         if film.steps:
-            write_positions(obj, reading, film.points, self.target, "Minimal Surface", discs=discs)
+            write_positions(obj, reading, film.points, self.target, "Minimal Surface", gradients, discs)
         obj[HISTORY] = film.area_history.tolist()
         area = film.area_history[-1] if film.steps else film.initial_area
         areas = f"from {area_text(film.initial_area)} to {area_text(float(area))}"

@@ -50,6 +50,24 @@ def test_splats_are_turned_with_their_handles(core, run, bar, tmp_path):  # noqa
     np.testing.assert_allclose(after.harmonics, moved.harmonics, atol=1e-5)
 
 
+def test_floaters_go_with_the_splats_next_to_them(core, run, bar, tmp_path):  # noqa: F811
+    splats = core.read_splats(bar)
+    opacities, positions = splats.opacities.copy(), splats.positions.copy()
+    rows = np.argsort(np.abs(positions[:, 2] - 9.0))[:3]
+    opacities[rows] = 0.01
+    positions[rows, :2] *= 3.0  # off the surface
+    given = tmp_path / "given.ply"
+    core.write_splats(given, core.Splats(**{**vars(splats), "opacities": opacities, "positions": positions}))
+    wanted = handles(tmp_path, handles=[{**TOP, "shift": [0.0, 0.0, 2.0]}], anchors=[LOW])
+    code, [line] = run("deform", given, "--handles", wanted, "--out", tmp_path / "out.ply")
+    assert code == 0, line
+    assert line["left_out"] == 3
+    moved = core.read_splats(tmp_path / "out.ply").positions
+    near = np.argsort(np.linalg.norm(splats.positions - splats.positions[rows[0]], axis=1))[1:6]
+    shifts = moved - core.read_splats(given).positions
+    np.testing.assert_allclose(shifts[rows[0]], shifts[near].mean(axis=0), atol=0.3)
+
+
 def test_many_files_of_points_are_bent(run, tmp_path):  # noqa: F811
     points = sphere_points()
     for name in ("a.xyz", "b.xyz"):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_object, grid_points, sphere_points
+from tests.blender.splats import add_splats, bar_splats
 
 OPERATORS = (
     "add_preset",
@@ -196,6 +197,14 @@ def test_panel_of_a_new_object():
     texts = draw()
     assert "Cloud: 1,000 points" in texts
     assert "Total Area" not in texts
+
+
+def test_panel_of_splats_has_what_is_for_them(core):
+    add_object(sphere_points())
+    assert "Show Splats" not in draw()
+    add_splats(bar_splats(core))
+    names = {"Show Splats", "Select Floaters", "Apply Transform to Splats", "Export Splats...", "leave_out_floaters"}
+    assert names <= set(draw())
 
 
 def test_panel_follows_the_order_of_work():

@@ -355,6 +355,37 @@ def test_an_operator_by_floaters_is_not_taken_for_one_by_others(core, rest):
     assert obj.meshfree.left_out_count == 0
 
 
+def test_floaters_take_part_where_that_is_chosen(core, rest, extension):
+    opacities = np.array(rest.opacities)
+    opacities[[3, 700]] = 0.01
+    obj = add_splats(core.Splats(**{**vars(rest), "opacities": opacities}))
+    bpy.ops.meshfree.analyze()
+    obj.meshfree.leave_out_floaters = False
+    result = importlib.import_module(f"{extension.__name__}.operators.objects.result")
+    assert result.is_stale(obj)
+    bpy.ops.meshfree.analyze()
+    assert obj.meshfree.left_out_count == 0
+    assert not result.is_stale(obj)
+
+
+def test_a_binding_is_stale_where_other_splats_take_part(rest):
+    obj, _ = bound(rest)
+    obj.meshfree.leave_out_floaters = False
+    with pytest.raises(RuntimeError, match="Settings changed. Bind again"):
+        bpy.ops.meshfree.deform_update()
+
+
+def test_a_minimal_surface_carries_its_splats(core, rest):
+    """An open bar becomes slimmer, and its ellipsoids with it."""
+    obj = add_splats(rest)
+    assert bpy.ops.meshfree.minimal_surface(steps=1, target="IN_PLACE") == {"FINISHED"}
+    found = splats_of(core, obj.data)
+    assert np.abs(found.positions - rest.positions).max() > 1e-2
+    laplacian = core.build_laplacian(rest.positions.astype(float))
+    wanted = rest.deformed(found.positions, core.deformation_gradients(laplacian, found.positions.astype(float)))
+    close(found, wanted, 1e-4)
+
+
 def test_splats_that_all_seem_to_float_take_part(core, rest):
     obj = add_splats(core.Splats(**{**vars(rest), "opacities": np.full(len(rest), 0.01, np.float32)}))
     bpy.ops.meshfree.analyze()
