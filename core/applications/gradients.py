@@ -37,11 +37,14 @@ class DeformationGradients:
         rest = rest - rest.mean(axis=0) if len(own) else rest
         self._products = _step_products(laplacian.stiffness[own][:, own].tocoo(), rest)
         self._at_rest = self._pairs(rest)
-        self._frames = np.moveaxis(frames(laplacian.normals[own]), 0, 2)  # normal, then two tangents, as columns
+        # Normal, then two tangents, as columns. Sums over strided arrays take ten times as long.
+        self._frames = np.ascontiguousarray(np.moveaxis(frames(laplacian.normals[own]), 0, 2))
+        self._tangents = np.ascontiguousarray(self._frames[:, 1:])
 
     def _pairs(self, points):
         """Return the sums over neighbours of w_ij (x_j - x_i)(p_j - p_i)^T, (3, 3, m), p the points at rest."""
-        return np.ascontiguousarray((self._products @ points).reshape(3, len(points), 3).transpose(2, 0, 1))
+        # Column by column: half of the time that three at once take.
+        return np.array([(self._products @ column).reshape(3, -1) for column in np.ascontiguousarray(points.T)])
 
     def at(self, positions):
         """Return the gradients, (n, 3, 3), for the points after the deformation, (n, 3) [L]."""
@@ -55,7 +58,7 @@ class DeformationGradients:
         size = np.einsum("abn,abn->n", turn, after) / np.where(spread > 0.0, spread, 1.0)
         alike = size * turn  # the similarity that fits best
         # What is left of it along the surface: the linear fit in the tangent plane, to steps less those by similarity.
-        tangents = self._frames[:, 1:]
+        tangents = self._tangents
         left = np.einsum("abn,bcn->acn", after - np.einsum("abn,bcn->acn", alike, before), tangents)
         inner = np.einsum("abn,bdn->adn", np.einsum("ban,bcn->acn", tangents, before), tangents)
         slopes = np.einsum("abn,bcn->acn", left, _inverse(inner))
@@ -64,7 +67,7 @@ class DeformationGradients:
         area = np.sqrt(np.einsum("an,an->n", across, across))
         across /= np.sqrt(np.where(area > 0.0, area, 1.0))  # as thick as the root of the area is wide
         columns = np.stack([across, stretched[:, 0], stretched[:, 1]], axis=1)
-        return np.einsum("abn,cbn->nac", columns, self._frames)[self._near]
+        return np.moveaxis(np.einsum("abn,cbn->acn", columns, self._frames), 2, 0)[self._near]
 
 
 def deformation_gradients(laplacian, positions):
