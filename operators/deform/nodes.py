@@ -4,9 +4,20 @@ import bpy
 
 from ..objects.attributes import DISC, DISPLACEMENT, REST
 from ..objects.carried import carried
-from ..objects.modifiers import DEFORM_TAG, add_input, add_node, is_deform, is_display, is_intact, new_group, set_input
+from ..objects.modifiers import (
+    DEFORM_TAG,
+    SHAPE_TAG,
+    add_input,
+    add_node,
+    is_deform,
+    is_display,
+    is_intact,
+    new_group,
+    set_input,
+)
 
 NAME = "Mesh-Free Deform"
+VALUE = "Value"  # input of the nodes of a stored deformation
 _LIVE, _BAKED = "live", "baked"  # how the custom property of the node groups begins
 _KINDS = {"FLOAT_VECTOR": "VECTOR", "QUATERNION": "ROTATION"}  # of attributes, as nodes call them
 
@@ -226,14 +237,61 @@ def _value(node):
     return next(item for item in node.inputs if item.name == "Value" and item.enabled)
 
 
+def add_shape(obj, name, kept):
+    """Give an object a modifier that shows a stored deformation by its value, as a shape key does, which is 0 at first.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name : str
+        Of the attribute with the displacements; by `stored_name` of those with what goes along.
+    kept : sequence of Carried
+        What goes along.
+    """
+    group = new_group(name, SHAPE_TAG)
+    _add_share(group, VALUE, "Share of the stored deformation that is shown").default_value = 0.0
+    given = add_node(group, "NodeGroupInput", 0, 0)
+    value, geometry = given.outputs[VALUE], given.outputs["Geometry"]
+    for number, item in enumerate(kept, 1):
+        y = -400 * number
+        stored = _attribute(group, stored_name(name, item.name), item.data_type, 7, y).outputs["Attribute"]
+        geometry = _replace(group, geometry, item.name, item.data_type, stored, value, y)
+    scaled = add_node(group, "ShaderNodeVectorMath", 11, -200, operation="SCALE")
+    placed = add_node(group, "GeometryNodeSetPosition", 13, 0)
+    result = add_node(group, "NodeGroupOutput", 14, 0)
+    for source, target in (
+        (_attribute(group, name, "FLOAT_VECTOR", 10, -200).outputs["Attribute"], scaled.inputs[0]),
+        (value, scaled.inputs["Scale"]),
+        (geometry, placed.inputs["Geometry"]),
+        (scaled.outputs["Vector"], placed.inputs["Offset"]),
+        (placed.outputs["Geometry"], result.inputs["Geometry"]),
+    ):
+        group.links.new(source, target)
+    modifier = obj.modifiers.new(name, "NODES")
+    modifier.node_group = group
+    modifier.show_expanded = False
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)  # shape keys come before modifiers, too
+
+
+def stored_name(name, carried_name) -> str:
+    """Return the name of the attribute that holds what goes along with a stored deformation."""
+    return f"{name} {carried_name}"
+
+
 def _new(name, kind):
     """Add a node group with its strength; return it and the node of what it is given."""
     group = new_group(name, DEFORM_TAG)
     group[DEFORM_TAG] = kind
-    strength = add_input(group, "Strength", "Float", "Share of the deformation that is shown")
-    strength.subtype = "FACTOR"
-    strength.default_value, strength.min_value, strength.max_value = 1.0, 0.0, 1.0
+    _add_share(group, "Strength", "Share of the deformation that is shown")
     return group, add_node(group, "NodeGroupInput", 0, 0)
+
+
+def _add_share(group, name, description):
+    """Add an input from 0 to 1, which is 1 at first; return its socket."""
+    share = add_input(group, name, "Float", description)
+    share.subtype = "FACTOR"
+    share.default_value, share.min_value, share.max_value = 1.0, 0.0, 1.0
+    return share
 
 
 def _place(group, geometry, strength, displacement):

@@ -7,8 +7,15 @@ from mathutils import Matrix, Vector
 
 from ...core import PointCloudError, opposite_ends
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import REST, own_positions, point_count, read_attribute, write_own_positions
-from ..objects.carried import apply_discs
+from ..objects.attributes import (
+    REST,
+    own_positions,
+    point_count,
+    read_attribute,
+    write_attribute,
+    write_own_positions,
+)
+from ..objects.carried import apply_discs, carried
 from ..objects.groups import ANCHOR, HANDLE, assign, check_assignable, group_weights, handle_names, has_group
 from ..objects.handlers import tell
 from ..objects.modifiers import get_input
@@ -39,7 +46,7 @@ from .binding import (
     stale_reason,
     write_displacement,
 )
-from .nodes import add_deform, find_deform, is_baked, show_live
+from .nodes import add_deform, add_shape, find_deform, is_baked, show_live, stored_name
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -310,17 +317,14 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
 
 
 class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
-    """Keep the deformation as a shape key of value zero, and put the handles back"""
+    """Keep the deformation as a shape key of value zero, or as a modifier like one, and put the handles back"""
 
     bl_idname = "meshfree.deform_to_shape_key"
     bl_label = "To Shape Key"
 
-    @classmethod
-    def obstacle(cls, context):
-        keyless = "Point clouds have no shape keys. Apply the deformation, or bake it"
-        return super().obstacle(context) or ("" if cls.subject(context).type == "MESH" else keyless)
-
     def change(self, context, obj):
+        if obj.type != "MESH" or has_splats(obj.data):  # keys hold places alone
+            return self._store(context, obj)
         check_movable(obj, "SHAPE_KEY")
         constraints = read_constraints(obj)
         if edited_rows(obj, constraints).any():
@@ -335,6 +339,24 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
         if known is not None:
             live.keep(obj, known)
         return f'{obj.name}: the deformation is the shape key "{key.name}"'
+
+    def _store(self, context, obj):
+        """Keep the deformation as attributes that a modifier shows."""
+        data, kept = obj.data, [item for item in carried(obj.data) if item.moved in obj.data.attributes]
+        name = _free_name(obj, "Deform")
+        write_attribute(data, name, shown_displacement(obj), "FLOAT_VECTOR")
+        for item in kept:
+            write_attribute(data, stored_name(name, item.name), read_attribute(data, item.moved), item.data_type)
+        put_back(context, obj)
+        add_shape(obj, name, kept)
+        return f'{obj.name}: the deformation is the modifier "{name}", shown by its Value'
+
+
+def _free_name(obj, name):
+    """Return a name, with a number if need be, that no attribute, vertex group or modifier of an object has."""
+    taken = {item.name for items in (obj.data.attributes, obj.vertex_groups, obj.modifiers) for item in items}
+    names = [name, *(f"{name}.{number:03d}" for number in range(1, len(taken) + 2))]
+    return next(each for each in names if each not in taken)
 
 
 class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):

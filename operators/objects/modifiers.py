@@ -6,6 +6,7 @@ from ...core import PointCloudError
 
 DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
 DEFORM_TAG = "meshfree_deform"  # the same of our own deformation
+SHAPE_TAG = "meshfree_shape"  # the same of a deformation that is stored, where there are no shape keys
 SEQUENCE_TAG = "meshfree_sequence"  # the same of what shows one object a frame
 COLLECTION = "Frames"  # input of that: the collection
 _INPUTS = "meshfree_inputs"  # custom property of the nodes: identifiers of the inputs by the names that we gave them

@@ -1071,10 +1071,26 @@ class TestPointCloud:
             bpy.context.scene.frame_set(frame)
             assert_allclose(self.shown(cloud)[ends, 2], height, atol=1e-4)
 
-    def test_no_shape_keys(self, cloud):
-        bind()
-        with pytest.raises(RuntimeError, match="no shape keys"):
-            bpy.ops.meshfree.deform_to_shape_key()
+    def test_a_modifier_takes_the_place_of_a_shape_key(self, cloud, modifiers, binding):
+        before, empty = local_points(cloud), bind()
+        lift(empty, 1.0)
+        seen = self.shown(cloud)
+        assert bpy.ops.meshfree.deform_to_shape_key() == {"FINISHED"}
+        assert empty.location.z == pytest.approx(0.0, abs=1e-6)
+        assert_allclose(self.shown(cloud), before, atol=1e-6)
+        assert binding.stale_reason(cloud) == ""
+        modifiers.set_input(cloud.modifiers["Deform"], "Value", 0.5)
+        cloud.update_tag()
+        bpy.context.view_layer.update()
+        assert_allclose(self.shown(cloud), 0.5 * (before + seen), atol=1e-5)
+        lift(empty, -0.5)
+        bpy.ops.meshfree.deform_to_shape_key()
+        assert [item.name for item in cloud.modifiers][:2] == ["Deform.001", "Deform"]
+        bpy.ops.meshfree.deform_unbind()
+        modifiers.set_input(cloud.modifiers["Deform"], "Value", 1.0)
+        cloud.update_tag()
+        bpy.context.view_layer.update()
+        assert_allclose(self.shown(cloud), seen, atol=1e-5)
 
 
 class TestPanel:

@@ -147,6 +147,20 @@ def test_a_bake_shows_the_splats_of_each_frame(core, rest):
     close(splats_of(core, shown(obj)), seen[3])
 
 
+def test_a_stored_deformation_shows_splats_as_they_were(core, rest, modifiers):
+    obj, empty = bound(rest)
+    empty.location += Vector((0.0, 1.0, 0.5))
+    bpy.ops.meshfree.deform_update()
+    moved = splats_of(core, shown(obj))
+    assert bpy.ops.meshfree.deform_to_shape_key() == {"FINISHED"}
+    assert bpy.ops.meshfree.deform_unbind() == {"FINISHED"}
+    close(splats_of(core, shown(obj)), rest)
+    for value, wanted in ((1.0, moved), (0.0, rest)):
+        modifiers.set_input(obj.modifiers["Deform"], "Value", value)
+        obj.update_tag()
+        close(splats_of(core, shown(obj)), wanted)
+
+
 def test_a_bake_without_harmonics_leaves_them(core, rest):
     obj, empty = bound(rest, anchors=False)
     empty.rotation_euler = (1.0, 0.0, 0.0)
