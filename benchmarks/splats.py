@@ -1,6 +1,7 @@
 """Gaussian splats: times, what a bend keeps, and a picture of it: ``python -m benchmarks.splats [FILE.ply]``.
 
-Draws docs/pictures/splats_bar.png by the renderer of the tests. A file of splats is read, written, and read again.
+Draws docs/pictures/splats_bar.png by the renderer of the tests. A file of splats is read, written, and read again; with
+colors of degree 3 from a field of ours its splats are turned by a handle.
 """
 
 import sys
@@ -15,7 +16,9 @@ from scipy.spatial.transform import Rotation
 
 import core
 from benchmarks.samplings import bar, bent_end, fibonacci_sphere
+from core.splats import floating_rows
 from core.splats.ellipsoids import quaternions_of
+from core.splats.harmonics import harmonics
 from tests.splat_renderer import render
 
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "splats_bar.png"
@@ -84,6 +87,45 @@ def follow(count):
     timed(f"{count:,} splats: with harmonics of degree 3", lambda: splats.deformed(moved, gradients))
 
 
+def with_field(splats, degree=3):
+    """Return splats with colors that depend on the direction of view, smoothly from place to place."""
+    rng, count = np.random.default_rng(5), (degree + 1) ** 2 - 1
+    places = (splats.positions - splats.positions.mean(axis=0)) / splats.positions.std()
+    waves = np.sin(places @ rng.standard_normal((3, 3 * count)) + rng.uniform(0.0, 6.0, 3 * count))
+    return replace(splats, harmonics=0.2 * waves.reshape(-1, count, 3).astype(np.float32), file=None)
+
+
+def turn_rigidly(splats):
+    """Print what is left of exactness where handles of trained splats are turned, and how long a drag of them takes."""
+    points = splats.positions.astype(np.float64)
+    laplacian = timed(
+        "operator, floaters left out", lambda: core.build_laplacian(points, left_out=floating_rows(splats)), 1
+    )
+    along = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0] @ points.T
+    deformer = timed("binding", lambda: core.CoarseDeformer(laplacian, along > np.quantile(along, 0.95)), 1)
+    turn, shift = Rotation.from_rotvec([0.5, 1.0, -2.0]).as_matrix(), np.array([1.0, 2.0, 3.0])
+    goal = points[deformer.handles] @ turn.T + shift
+    moved = timed("points of a quick result", lambda: deformer.solve(goal, steps=1))
+    gradients = timed("gradients", lambda: deformer.gradients(moved))
+    quick = replace(splats, harmonics=splats.harmonics[:, :0])
+    timed("sizes and rotations", lambda: quick.deformed(moved, gradients))
+    found = timed("with harmonics", lambda: splats.deformed(moved, gradients))
+    held = np.flatnonzero(np.isin(laplacian.component, np.unique(laplacian.component[deformer.handles])))
+    print(f"{len(held):,} of {len(splats):,} splats are of a surface with a handle; of these at most off:")
+    wanted = turn @ splats.covariances @ turn.T
+    size = np.abs(wanted).max(axis=(1, 2))
+    ways = np.random.default_rng(2).standard_normal((200, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    count, off = splats.harmonics.shape[1], 0.0
+    for part in np.array_split(held, 20):
+        now = np.einsum("dk,nkc->ndc", harmonics(ways, count), found.harmonics[part])
+        before = np.einsum("dk,nkc->ndc", harmonics(ways @ turn, count), splats.harmonics[part])
+        off = max(off, np.abs(now - before).max())
+    print(f"places {np.abs(moved - points @ turn.T - shift)[held].max():.1e}")
+    print(f"covariances {(np.abs(found.covariances - wanted).max(axis=(1, 2)) / size)[held].max():.1e} of their size")
+    print(f"colors in 200 directions {off:.1e}")
+
+
 def compare_normals(count=8000):
     """Print what shortest axes, off by an angle, are worth as normals of the operator on the unit sphere."""
     rng = np.random.default_rng(0)
@@ -127,6 +169,12 @@ def main():
             splats = timed(f"{Path(name).name}: read", lambda name=name: core.read_splats(name))
             timed(f"{Path(name).name}: write", lambda splats=splats: core.write_splats(path, splats))
             print(f"{Path(name).name}: bit for bit the same: {path.read_bytes() == Path(name).read_bytes()}")
+            colored = with_field(splats)
+            core.write_splats(path, colored)
+            again = core.read_splats(path)
+            same = all((getattr(again, each) == getattr(colored, each)).all() for each in ("positions", "harmonics"))
+            print(f"with a field of degree 3: places and harmonics come back the same: {same}")
+            turn_rigidly(colored)
 
 
 if __name__ == "__main__":
