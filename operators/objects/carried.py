@@ -5,8 +5,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ...core import Discs, surface_discs
-from ...core.geometry import toward
+from ...core import Discs
 from .attributes import (
     DISC,
     MOVED_DISC,
@@ -16,7 +15,6 @@ from .attributes import (
     read_attribute,
     write_attribute,
 )
-from .reading import discs
 from .splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats
 
 
@@ -61,23 +59,6 @@ def carries(obj) -> bool:
 def discs_at_rest(obj):
     """Read the discs that the display of an object draws at rest, normals times radii, (n, 3); None for none."""
     return read_attribute(obj.data, DISC) if carries(obj) and not has_splats(obj.data) else None
-
-
-def disc_finder(obj, reading):
-    """Read what discs an object draws, if it does; return a function that finds them anew for moved points.
-
-    It takes points as `reading.points`, and returns normals times radii, (n, 3), in local space, or None.
-    """
-    before = discs_at_rest(obj)
-
-    def find(points):
-        if before is None:
-            return None
-        local = reading.local(points)
-        found = surface_discs(local)
-        return discs(toward(found.normals, before), found.radii, local)
-
-    return find
 
 
 def moved_discs(vectors, gradients):

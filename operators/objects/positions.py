@@ -4,7 +4,8 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core import PointCloudError
-from .attributes import DISC, check_size, own_positions, write_attribute, write_own_positions
+from .attributes import DISC, check_size, own_positions, read_attribute, write_attribute, write_own_positions
+from .carried import moved_discs
 from .modifiers import is_own
 from .reading import key_positions, shape_keys
 from .splats import has_splats, read_splats, write_splats
@@ -64,9 +65,9 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
     name : str
         Of the shape key; Blender adds a number if there is one already.
     gradients : ndarray, (n, 3, 3), optional
-        Of the deformation, as `reading.points`, with which splats go.
+        Of the deformation, as `reading.points`, with which splats go, and discs.
     discs : ndarray, (n, 3), optional
-        Of the moved points, as the display takes them, even if a shape key moves them.
+        Of the moved points, as the display takes them, even if a shape key moves them; without gradients.
 
     Returns
     -------
@@ -74,11 +75,12 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
     """
     moved = reading.local(points - reading.points)
     check_size("position", moved)
-    if has_splats(obj.data) and gradients is not None:
-        matrix = reading.matrix
-        local = np.linalg.inv(matrix) @ gradients @ matrix
-        write_splats(obj.data, read_splats(obj.data).deformed(own_positions(obj.data) + moved, local))
-        return None
+    if gradients is not None:
+        local = np.linalg.inv(reading.matrix) @ gradients @ reading.matrix
+        if has_splats(obj.data):
+            write_splats(obj.data, read_splats(obj.data).deformed(own_positions(obj.data) + moved, local))
+            return None
+        discs = moved_discs(read_attribute(obj.data, DISC), local)
     if discs is not None:
         write_attribute(obj.data, DISC, discs)
     if target == "IN_PLACE" or obj.type != "MESH":

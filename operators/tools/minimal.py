@@ -5,7 +5,6 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ...core import Cancelled, PointCloudError, deformation_gradients
 from ...core.applications import minimal_surface
-from ..objects.carried import disc_finder
 from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen
 from ..objects.options import laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
@@ -14,6 +13,7 @@ from ..objects.result import area_text
 from ..objects.splats import has_splats
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, build_operator
+from ..running.discs import disc_finder
 
 HISTORY = "lb_area_history"  # custom property of the object: area after each step
 
@@ -66,7 +66,7 @@ class MinimalSurface(Tool):
             if carries:
                 laplacian = build_operator(reading, options, progress).laplacian
                 gradients = deformation_gradients(laplacian, film.points)
-            return reading, film, gradients, find_discs(film.points)
+            return reading, film, gradients, find_discs(film.points, film.points)
 
         return compute
 

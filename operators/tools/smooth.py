@@ -16,13 +16,14 @@ from ...core import (
     smooth_points,
     smoothing_base,
 )
-from ..objects.carried import disc_finder
+from ..objects.carried import carries
 from ..objects.groups import chosen_weights
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.result import length_text
 from ..objects.splats import has_splats
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
+from ..running.discs import disc_finder
 
 _HEAT, _DETAIL = 6.0, 12.0  # smoothing lengths of a wavelength that suits a scan: finer ones the kernel does not see
 _READY = 20  # modes computed together at least, so that Adjust Last Operation can go through them
@@ -96,15 +97,17 @@ class Smooth(Tool):
         mask = chosen_weights(obj, self.group, "Vertex Group") if self.group else None
         method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
         shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
-        keep_boundary, name, carries = self.keep_boundary, obj.name, has_splats(obj.data)
+        keep_boundary, name, splats = self.keep_boundary, obj.name, has_splats(obj.data)
         find_discs = disc_finder(obj, reading)
 
         def compute(progress):
             laplacian = operator(progress)
-            points = smoothed(laplacian, progress)
-            return reading, points, deformation_gradients(laplacian, points) if carries else None, find_discs(points)
+            points, full = smoothed(laplacian, progress)
+            gradients = deformation_gradients(laplacian, points) if splats else None
+            return reading, points, gradients, find_discs(full, points)
 
         def smoothed(laplacian, progress):
+            """Return where the points go, and where they would at full strength."""
             dirichlet = keep_boundary and bool(laplacian.boundary.any())
             if dirichlet and shared["keep"]:
                 raise PointCloudError(
@@ -129,14 +132,14 @@ class Smooth(Tool):
                 )
 
             if not shared["keep"]:
-                return blend(filtered())
+                return blend(filtered()), filtered()
 
             def scaled():
                 places = filtered()
                 progress("Size", 0.9)
                 return blend(places)
 
-            return cache.result(laplacian, "scaled", *settings, *shared.values(), compute=scaled)
+            return cache.result(laplacian, "scaled", *settings, *shared.values(), compute=scaled), filtered()
 
         return compute
 
@@ -224,8 +227,7 @@ class ModeShape(Tool):
         check_movable(obj, target)
         reading, operator = operator_reader(context, obj)
         mode, amplitude, phase = self.mode, self.amplitude or None, self.phase
-        repeated, carries = self.is_repeated(context), has_splats(obj.data) and not self.animate
-        find_discs = (lambda points: None) if self.animate else disc_finder(obj, reading)
+        repeated, carried = self.is_repeated(context), carries(obj) and not self.animate
 
         def compute(progress):
             laplacian = operator(progress)
@@ -237,15 +239,14 @@ class ModeShape(Tool):
                 cache.lowest_modes(laplacian, several, progress, raw=True)
             vector = cache.lowest_modes(laplacian, number, progress).eigenvectors[:, number - 1]
             points = displace_by_mode(laplacian, vector, amplitude, phase=phase)
-            gradients = deformation_gradients(laplacian, points) if carries else None
-            return reading, points, number, gradients, find_discs(points)
+            return reading, points, number, deformation_gradients(laplacian, points) if carried else None
 
         return compute
 
     def write(self, context, obj, result):
-        reading, points, mode, gradients, discs = result
+        reading, points, mode, gradients = result
         target = "SHAPE_KEY" if self.animate else self.target
-        key = write_positions(obj, reading, points, target, f"Mode {mode}", gradients, discs)
+        key = write_positions(obj, reading, points, target, f"Mode {mode}", gradients)
         if self.animate:
             key.slider_min = -1.0
             scene, quarter = context.scene, 0.25 * self.period

@@ -48,6 +48,7 @@ COSTLY = {  # where each is called from
     "operators.tools.mesh": ("mesh_surface", "values_on_mesh"),
     "operators.tools.orient": ("orient_normals",),
     "operators.tools.surface": ("surface_discs",),
+    "operators.running.discs": ("surface_discs",),
     "core.operator.laplacian": ("build_laplacian",),
     "core.operator.cholesky": ("dpotrf",),
     "core.operator.solvers": ("conjugate_gradients",),
@@ -92,6 +93,22 @@ def test_a_second_run_computes_nothing(cache, calls, case):
     calls.clear()
     assert run(name, "EXEC_DEFAULT", True, **second) == {"FINISHED"}
     assert calls == []
+
+
+@pytest.mark.parametrize("name", ["smooth", "mode_shape"])
+def test_a_second_run_finds_no_discs_anew(cache, calls, name):
+    changed = {"smooth": {"strength": 0.5}, "mode_shape": {"mode": 3, "amplitude": 0.2}}[name]
+    obj = add_ready(wave())
+    bpy.ops.meshfree.show_surface()
+    bpy.ops.ed.undo_push(message="Before")
+    before = attribute(obj, "lb_disc")
+    assert run(name, "EXEC_DEFAULT", True) == {"FINISHED"}
+    assert "surface_discs" in calls or name == "mode_shape"
+    bpy.ops.ed.undo()
+    calls.clear()
+    assert run(name, "EXEC_DEFAULT", True, **changed) == {"FINISHED"}
+    assert calls == []
+    assert np.abs(attribute(bpy.context.object, "lb_disc") - before).max() > 1e-3
 
 
 def test_what_changes_results_is_computed(cache, calls):

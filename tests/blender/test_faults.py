@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 from numpy.linalg import LinAlgError
 
-from tests.blender.clouds import add_object, differences, everything, sphere_points
+from tests.blender.clouds import add_group, add_object, differences, everything, sphere_points
+from tests.blender.conftest import MODULE
+from tests.blender.splats import add_splats, bar_splats
 from tests.blender.test_all_or_nothing import film, handled, keyed, shared, unhandled
 
 COUNT = int(os.environ.get("MESHFREE_FAULTS", "25"))
@@ -61,6 +63,35 @@ def compared():
     return obj
 
 
+def splats():
+    """A bar of splats with groups of handles and anchors."""
+    obj = add_splats(bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1))
+    height = own_positions(obj)[:, 2]
+    for name, chosen in (("Handle", height > 9.0), ("Anchor", height < 1.0)):
+        if obj.type == "MESH":
+            add_group(obj, name, chosen)
+        else:
+            obj.data.attributes.new(name, "BOOLEAN", "POINT").data.foreach_set("value", chosen)
+    return obj
+
+
+def bound_splats():
+    obj = splats()
+    bpy.ops.meshfree.deform_bind()
+    empty = obj.meshfree.deform.handle_items[0].empty
+    for frame in (1, 3):
+        empty.location.z += 0.2
+        empty.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(2)
+    return obj
+
+
+def own_positions(obj):
+    positions = np.empty(3 * len(obj.data.attributes["position"].data), np.float32)
+    obj.data.attributes["position"].data.foreach_get("vector", positions)
+    return positions.reshape(-1, 3)
+
+
 RUNS = [
     (colored, "analyze", {"modes": 4}),
     (shared, "analyze", {}),
@@ -87,6 +118,13 @@ RUNS = [
     (bound, "deform_update", {}),
     (animated, "deform_bake", {"first": 1, "last": 3}),
     (film, "minimal_surface", {"target": "IN_PLACE", "steps": 3}),
+    (splats, "analyze", {"modes": 4}),
+    (splats, "smooth", {}),
+    (splats, "mode_shape", {}),
+    (splats, "deform_bind", {}),
+    (bound_splats, "deform_update", {}),
+    (bound_splats, "deform_bake", {"first": 1, "last": 3}),
+    (splats, "minimal_surface", {"steps": 2}),
 ]
 
 
@@ -230,7 +268,7 @@ def delete_object(obj, folder):
 
 
 def delete_data(obj, folder):
-    bpy.data.meshes.remove(obj.data)
+    (bpy.data.meshes if obj.type == "MESH" else bpy.data.pointclouds).remove(obj.data)
 
 
 def delete_scene(obj, folder):
