@@ -3,6 +3,10 @@
 import numpy as np
 from scipy import sparse
 
+from ..blocks import blocks, on_all_cores
+
+_BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
+
 
 def tangent_frames(normals):
     """Give each tangent plane a frame, so that a complex number is a tangent vector.
@@ -25,7 +29,7 @@ def tangent_frames(normals):
     return first + 1j * np.cross(normals, first)
 
 
-def connection_laplacian(stiffness, normals, frames):
+def connection_laplacian(stiffness, normals, frames, report=lambda: None):
     """Build the operator on tangent vectors from the one on functions.
 
     Parameters
@@ -36,6 +40,8 @@ def connection_laplacian(stiffness, normals, frames):
         Unit normals.
     frames : ndarray, (n, 3) complex
         As `tangent_frames` gives them.
+    report : callable
+        Called after each block of pairs; may raise `Cancelled`.
 
     Returns
     -------
@@ -48,16 +54,35 @@ def connection_laplacian(stiffness, normals, frames):
     ----------
     Sharp, Soliman, Crane. The Vector Heat Method. 2019.
     """
-    pairs = sparse.triu(stiffness, k=1).tocoo()
-    first, second = pairs.row, pairs.col
-    cosine = np.einsum("ij,ij->i", normals[first], normals[second])
-    kept = cosine > 0.0
-    first, second, weight = first[kept], second[kept], -pairs.data[kept]
-    # The smallest rotation takes a vector v at right angles to a to v - (v . b) / (1 + a . b) (a + b).
-    across = np.einsum("ij,ij->i", frames[second].real, normals[first]) / (1.0 + cosine[kept])
-    turned = frames[second].real - across[:, None] * (normals[first] + normals[second])
-    turn = np.einsum("ij,ij->i", turned, frames[first])
-    turn /= np.abs(turn)
-    half = sparse.coo_array((-weight * turn, (first, second)), shape=stiffness.shape).tocsr()
-    diagonal = np.bincount(first, weight, len(normals)) + np.bincount(second, weight, len(normals))
-    return (sparse.diags_array(diagonal.astype(complex), format="csr") + half + half.conj().T).tocsr()
+    count = len(normals)
+    first = np.repeat(np.arange(count, dtype=np.int32), np.diff(stiffness.indptr))
+    once = first < stiffness.indices
+    first, second, weight = first[once], stiffness.indices[once], -stiffness.data[once]
+    entries = np.empty(len(first), dtype=complex)
+    normal, real, imaginary = (np.ascontiguousarray(values.T) for values in (normals, frames.real, frames.imag))
+
+    def measure(block):
+        i, j = first[block], second[block]
+        left, right, axis = normal.take(i, axis=1), normal.take(j, axis=1), real.take(j, axis=1)
+        cosine = _dot(left, right)
+        # The smallest rotation takes a vector v at right angles to a to v - (v . b) / (1 + a . b) (a + b).
+        across = _dot(axis, left) / np.where(cosine > 0.0, 1.0 + cosine, 1.0)
+        axis -= across * right  # what it has along the other normal, the frame does not see
+        x, y = _dot(axis, real.take(i, axis=1)), _dot(axis, imaginary.take(i, axis=1))
+        size = np.where(cosine > 0.0, -weight[block] / np.maximum(np.hypot(x, y), 1e-300), 0.0)
+        entries[block].real, entries[block].imag = size * x, size * y
+
+    on_all_cores(measure, blocks(len(first), _BLOCK), report)
+    kept = np.flatnonzero(entries)
+    first, second, entries = first[kept], second[kept], entries[kept]
+    start = np.concatenate([[0], np.cumsum(np.bincount(first, minlength=count))]).astype(np.int32)
+    half = sparse.csr_array((entries, second, start), shape=(count, count))
+    report()
+    weight = np.abs(entries)
+    diagonal = np.bincount(first, weight, count) + np.bincount(second, weight, count)
+    return half + half.conj().T.tocsr() + sparse.diags_array(diagonal.astype(complex), format="csr")
+
+
+def _dot(left, right):
+    """Return the dot products of vectors, both (3, k)."""
+    return np.einsum("ak,ak->k", left, right)
