@@ -121,11 +121,11 @@ class Transport:
             _TIME * (areas @ laplacian.smoothing_lengths) / areas.sum(),
             np.linalg.norm(np.ptp(laplacian.points, axis=0)) / _FARTHEST,
         )
+        mass = areas / reach**2
         flow = connection_laplacian(
-            reach**2 * laplacian.stiffness, laplacian.normals, self.frames, lambda: report("Equations", 0.1)
+            laplacian.stiffness, laplacian.normals, self.frames, mass, lambda: report("Equations", 0.1)
         )
-        flow = (flow + sparse.diags_array(areas.astype(complex), format="csr")).tocsr()
-        self._flow = TwoGrid(flow, areas, laplacian.points, report)
+        self._flow = TwoGrid(flow, mass, laplacian.points, report)
 
     def extend(self, sources, directions, *, progress=None):
         """Carry directions to all points; see `transport`.

@@ -29,7 +29,7 @@ def tangent_frames(normals):
     return first + 1j * np.cross(normals, first)
 
 
-def connection_laplacian(stiffness, normals, frames, report=lambda: None):
+def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: None):
     """Build the operator on tangent vectors from the one on functions.
 
     Parameters
@@ -40,15 +40,18 @@ def connection_laplacian(stiffness, normals, frames, report=lambda: None):
         Unit normals.
     frames : ndarray, (n, 3) complex
         As `tangent_frames` gives them.
+    mass : float or ndarray, (n,)
+        Added to the diagonal.
     report : callable
         Called after each block of pairs; may raise `Cancelled`.
 
     Returns
     -------
     csr_array, (n, n) complex
-        Hermitian positive semi-definite: ``x* K x`` is the sum over pairs of ``w |x_i - r_ij x_j|^2``, where r_ij is
-        the smallest rotation that turns the tangent plane of j into that of i. Where all frames are parallel it is the
-        stiffness itself. Pairs whose normals point to opposite sides have no such rotation, and are left out.
+        Hermitian positive semi-definite: without a mass, ``x* K x`` is the sum over pairs of
+        ``w |x_i - r_ij x_j|^2``, where r_ij is the smallest rotation that turns the tangent plane of j into that of i.
+        Where all frames are parallel it is the stiffness itself. Pairs whose normals point to opposite sides have no
+        such rotation, and are left out.
 
     References
     ----------
@@ -79,8 +82,12 @@ def connection_laplacian(stiffness, normals, frames, report=lambda: None):
     half = sparse.csr_array((entries, second, start), shape=(count, count))
     report()
     weight = np.abs(entries)
-    diagonal = np.bincount(first, weight, count) + np.bincount(second, weight, count)
-    return half + half.conj().T.tocsr() + sparse.diags_array(diagonal.astype(complex), format="csr")
+    diagonal = mass + np.bincount(first, weight, count) + np.bincount(second, weight, count)
+    half = (half + sparse.diags_array(0.5 * diagonal.astype(complex), format="csr")).tocsr()
+    report()
+    other = half.conj().T.tocsr()
+    report()
+    return half + other
 
 
 def _dot(left, right):
