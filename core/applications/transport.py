@@ -1,7 +1,6 @@
 """Directions carried along the surface, and maps of it around a point."""
 
 import numpy as np
-from scipy import sparse
 
 from ..arguments import as_array, as_doubles
 from ..blocks import blocks, on_all_cores
@@ -77,8 +76,6 @@ class Transport:
     ----------
     laplacian : LaplaceBeltrami
         Of n points.
-    geodesics : Geodesics, optional
-        Of the same operator, for maps; if there is none, the first map makes it.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -111,10 +108,10 @@ class Transport:
     0.0
     """
 
-    def __init__(self, laplacian, *, geodesics=None, progress=None):
+    def __init__(self, laplacian, *, progress=None):
         report = progress or _silent
         report("Equations", 0.0)
-        self._laplacian, self._geodesics = laplacian, geodesics
+        self._laplacian, self._geodesics = laplacian, None
         self.frames = tangent_frames(laplacian.normals)
         areas = laplacian.areas
         reach = max(
@@ -176,7 +173,7 @@ class Transport:
         size = np.abs(found)
         return np.einsum("i,ij->ij", found.conj() / np.where(size > 0.0, size, 1.0), self.frames).real
 
-    def logarithmic_map(self, source, direction=None, *, progress=None):
+    def logarithmic_map(self, source, direction=None, *, geodesics=None, progress=None):
         """Lay the surface out flat around a point; see `logarithmic_map`.
 
         Parameters
@@ -185,6 +182,8 @@ class Transport:
             The point in the middle.
         direction : array_like, (3,), optional
             Where the first coordinate grows.
+        geodesics : Geodesics, optional
+            Of the same operator, if there is one; otherwise the first map makes it for all.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -206,8 +205,9 @@ class Transport:
             raise InvalidPointsError(f"There are {len(chosen)} sources. Name the one point in the middle of the map.")
         source = int(chosen[0])
         axis = self.extend([source], frames[source].real if direction is None else direction, progress=progress)
-        self._geodesics = self._geodesics or Geodesics(laplacian, progress=progress)
-        distance = self._geodesics.distance([source], progress=progress)
+        if geodesics is None:
+            geodesics = self._geodesics = self._geodesics or Geodesics(laplacian, progress=progress)
+        distance = geodesics.distance([source], progress=progress)
         reached = np.isfinite(distance)
         report = progress or _silent
         outwards = _gradient(laplacian, frames, np.where(reached, distance, 0.0), lambda: report("Map", 0.9))
