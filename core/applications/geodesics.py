@@ -17,6 +17,7 @@ from .graph import mean_spacing
 _BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
 _SQUARE = 0.1  # cosine of two normals below which they stand at a right angle
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
+_WITHIN = (1.5, 6.0, np.inf)  # times the straight distance: how far a way between two points is looked for, in turn
 _GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point: the surface is there
 
 
@@ -133,13 +134,15 @@ class Geodesics:
         result[chosen] = 0.0
         return result
 
-    def nearest_source(self, sources):
+    def nearest_source(self, sources, *, progress=None):
         """Tell which of some points is nearest; see `nearest_source`.
 
         Parameters
         ----------
         sources : array_like, (k,) int or (n,) bool
             Points to measure from, at least one.
+        progress : callable, optional
+            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
         Returns
         -------
@@ -155,10 +158,12 @@ class Geodesics:
         index = as_indices(sources, len(self._laplacian.points), "sources")
         label = np.full(len(self._laplacian.points) + 1, -1)  # one more for points that nothing reaches
         label[index] = np.arange(len(index))
+        if progress is not None:
+            progress("Distance", 0.5)
         nearest = dijkstra(self._graph, indices=known, min_only=True, return_predecessors=True)[2]
         return label[np.where(nearest < 0, -1, nearest)]
 
-    def signed_distance(self, curve, closed=False):
+    def signed_distance(self, curve, closed=False, *, progress=None):
         """Measure the distance from a curve, with a sign; see `signed_distance`.
 
         Parameters
@@ -167,6 +172,8 @@ class Geodesics:
             The points of the curve in their order, at least two.
         closed : bool
             Whether the last point is joined with the first.
+        progress : callable, optional
+            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
         Returns
         -------
@@ -183,11 +190,20 @@ class Geodesics:
         check_switches(closed=closed)
         given = as_indices(curve, count, "points of the curve")
         _check_curve(laplacian, given)
-        way = self._way(given, closed)
+        report = progress or (lambda stage, fraction: None)
+        way = self._way(given, closed, lambda done: report("Curve", 0.5 * done))
+        report("Distance", 0.5)
         band, away, side = self._beside(way)
         lengths = np.maximum(away, 1e-300)
-        start = sparse.csr_array((lengths, (np.zeros(len(band), dtype=int), band)), shape=(1, count + 1))
-        graph = sparse.vstack([sparse.hstack([self._graph, sparse.csr_array((count, 1))]), start]).tocsr()
+        pairs = self._graph  # and one more point, from which the ways to the band start
+        graph = sparse.csr_array(
+            (
+                np.concatenate([pairs.data, lengths]),
+                np.concatenate([pairs.indices, band.astype(pairs.indices.dtype)]),
+                np.append(pairs.indptr, pairs.indptr[-1:] + len(band)),
+            ),
+            shape=(count + 1, count + 1),
+        )
         distance, before = dijkstra(graph, indices=count, return_predecessors=True)
         # The side on which a way leaves the curve is that of all of it.
         root = np.where((before == count) | (before < 0), np.arange(count + 1), before)
@@ -199,16 +215,27 @@ class Geodesics:
         result[way] = 0.0
         return result
 
-    def _way(self, curve, closed):
+    def _way(self, curve, closed, report):
         """Join points by shortest ways, and return all points of these in their order, (m,), the first one twice."""
         ends = np.append(curve, curve[0]) if closed else curve
+        points = self._laplacian.surface_points
         pieces = [ends[:1]]
-        for first, last in pairwise(ends):
+        for number, (first, last) in enumerate(pairwise(ends)):
+            report(number / len(ends))
             row = self._graph.indices[self._graph.indptr[first] : self._graph.indptr[first + 1]]
             if last in row:
                 pieces.append([last])
                 continue
-            before = dijkstra(self._graph, indices=first, return_predecessors=True)[1]
+            # Points farther away than the end do not matter; how far that is along the surface is not known yet.
+            apart = max(np.linalg.norm(points[last] - points[first]), 1e-300)
+            for times in _WITHIN:
+                before = dijkstra(self._graph, indices=first, return_predecessors=True, limit=times * apart)[1]
+                if before[last] >= 0:
+                    break
+            else:
+                raise InvalidPointsError(
+                    f"No way along the surface joins the points {first} and {last} of the curve. Leave one of them out."
+                )
             piece = [last]
             while before[piece[-1]] != first:
                 piece.append(before[piece[-1]])
@@ -288,7 +315,7 @@ def nearest_source(laplacian, sources, *, progress=None):
     0 1
     """
     _known_sources(laplacian, sources)
-    return Geodesics(laplacian, progress=progress).nearest_source(sources)
+    return Geodesics(laplacian, progress=progress).nearest_source(sources, progress=progress)
 
 
 def signed_distance(laplacian, curve, closed=False, *, progress=None):
@@ -341,7 +368,7 @@ def signed_distance(laplacian, curve, closed=False, *, progress=None):
     -1.0
     """
     _check_curve(laplacian, as_indices(curve, len(laplacian.points), "points of the curve"))
-    return Geodesics(laplacian, progress=progress).signed_distance(curve, closed)
+    return Geodesics(laplacian, progress=progress).signed_distance(curve, closed, progress=progress)
 
 
 def _check_curve(laplacian, curve):
@@ -407,8 +434,15 @@ def _lengths_of_pairs(laplacian, report):
         start = np.concatenate([[0], np.cumsum(np.bincount(first[chosen], minlength=count))])
         return sparse.csr_array((arcs[chosen], second[chosen], start.astype(np.int32)), shape=(count, count))
 
-    # On few points all the ways from one may bend too much: a poor way is better than none.
-    label = connected_components(upper(kept), directed=False)[1]
-    kept |= label[first] != label[second]
-    half = upper(kept)
-    return half + half.T.tocsr()
+    report()
+    if kept.all():
+        half = upper(slice(None))
+    else:
+        # On few points all the ways from one may bend too much: a poor way is better than none.
+        label = connected_components(upper(kept), directed=False)[1]
+        kept |= label[first] != label[second]
+        half = upper(kept)
+    report()
+    other = half.T.tocsr()
+    report()
+    return half + other

@@ -1,19 +1,17 @@
 """Directions carried along the surface, and maps of it around a point."""
 
 import numpy as np
-from scipy import sparse
 
 from ..arguments import as_array, as_doubles
-from ..errors import InvalidPointsError, SolverError
+from ..blocks import blocks, on_all_cores
+from ..errors import InvalidPointsError
 from ..geometry import as_indices
-from ..operator import connection_laplacian, dissect, factorize, sparsify, tangent_frames
+from ..operator import TwoGrid, connection_laplacian, tangent_frames
 from .geodesics import Geodesics
 
 _TIME = 2.0  # smoothing lengths that heat spreads over: with fewer, the randomness of points is not averaged out
 _FARTHEST = 200.0  # times as far the object may reach, or the heat there is below the least number
-_FAINT = 1e-200  # of the largest value: less is not compared
-_ACCURACY = 1e-3  # largest change in the last step, relative to the value of each point
-_STEPS = 100
+_BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 
 
 def transport(laplacian, sources, directions, *, progress=None):
@@ -68,11 +66,11 @@ def transport(laplacian, sources, directions, *, progress=None):
     >>> print(np.abs(direction[ahead, 2]).round(1))
     1.0
     """
-    return Transport(laplacian, progress=progress).extend(sources, directions)
+    return Transport(laplacian, progress=progress).extend(sources, directions, progress=progress)
 
 
 class Transport:
-    """Parallel transport along a surface, factored once for several sets of directions.
+    """Parallel transport along a surface, prepared once for several sets of directions.
 
     Parameters
     ----------
@@ -92,9 +90,9 @@ class Transport:
 
     Notes
     -----
-    One step of heat flow by the connection Laplacian (Sharp, Soliman, Crane, 2019). The factors are those of an
-    operator with a third of the pairs; a few steps of refinement make the solution that of all pairs, so that far from
-    the sources too it is right relative to its own size, which is all that its direction asks for.
+    One step of heat flow by the connection Laplacian (Sharp, Soliman, Crane, 2019). The factors are those of a coarse
+    version of it; ten or so steps of refinement make the solution that of all points, so that far from the sources too
+    it is right relative to its own size, which is all that its direction asks for.
 
     Examples
     --------
@@ -111,28 +109,22 @@ class Transport:
     """
 
     def __init__(self, laplacian, *, progress=None):
-        report = progress or (lambda stage, fraction: None)
+        report = progress or _silent
         report("Equations", 0.0)
-        self._laplacian = laplacian
+        self._laplacian, self._geodesics = laplacian, None
         self.frames = tangent_frames(laplacian.normals)
-        mass = sparse.diags_array(laplacian.areas.astype(complex), format="csr")
-        share = laplacian.areas / laplacian.areas.sum()
+        areas = laplacian.areas
         reach = max(
-            _TIME * share @ laplacian.smoothing_lengths, np.linalg.norm(np.ptp(laplacian.points, axis=0)) / _FARTHEST
+            _TIME * (areas @ laplacian.smoothing_lengths) / areas.sum(),
+            np.linalg.norm(np.ptp(laplacian.points, axis=0)) / _FARTHEST,
         )
+        mass = areas / reach**2
+        flow = connection_laplacian(
+            laplacian.stiffness, laplacian.normals, self.frames, mass, lambda: report("Equations", 0.1)
+        )
+        self._flow = TwoGrid(flow, mass, laplacian.points, report)
 
-        def flow(stiffness):
-            return (mass + reach**2 * connection_laplacian(stiffness, laplacian.normals, self.frames)).tocsr()
-
-        self._flow = flow(laplacian.stiffness)
-        coarse = sparsify(laplacian.stiffness)
-        self._order, starts = dissect(coarse, laplacian.points, lambda: report("Equations", 0.2))
-        coarse = flow(coarse)[self._order][:, self._order]
-        # Complex numbers as pairs of real ones.
-        real = sparse.kron(coarse.real, np.eye(2)) + sparse.kron(coarse.imag, [[0.0, -1.0], [1.0, 0.0]])
-        self._solve = factorize(real.tocsr(), 2 * starts, lambda share: report("Factors", 0.3 + 0.6 * share))
-
-    def extend(self, sources, directions):
+    def extend(self, sources, directions, *, progress=None):
         """Carry directions to all points; see `transport`.
 
         Parameters
@@ -141,6 +133,8 @@ class Transport:
             Points with known directions, at least one.
         directions : array_like, (k, 3) or (3,)
             Their directions, of any length.
+        progress : callable, optional
+            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
         Returns
         -------
@@ -173,31 +167,13 @@ class Transport:
                 f"{wrong} of {len(index)} directions are zero or stand at a right angle to the surface. Give ones"
                 " that lead along it."
             )
-        return np.einsum("i,ij->ij", self._extend(index, given / size).conj(), self.frames).real
-
-    def _extend(self, index, given):
-        """Carry unit complex numbers in the frames of some points to all, (n,) complex."""
         load = np.zeros(len(self.frames), dtype=complex)
-        load[index] = given
-        result = self._coarse(load)
-        for _ in range(_STEPS):
-            change = self._coarse(load - self._flow @ result)
-            result += change
-            size = np.abs(result)
-            seen = size > _FAINT * size.max()
-            if np.all(np.abs(change[seen]) < _ACCURACY * size[seen]):
-                return np.where(size > 0.0, result / np.where(size > 0.0, size, 1.0), 0.0)
-        raise SolverError(
-            f"Directions were not found in {_STEPS} steps of refinement. The points may be too uneven: analyze fewer"
-            " of them, or clean them."
-        )
+        load[index] = given / size
+        found = self._flow.solve(load, self._laplacian.component >= 0, progress or _silent)
+        size = np.abs(found)
+        return np.einsum("i,ij->ij", found.conj() / np.where(size > 0.0, size, 1.0), self.frames).real
 
-    def _coarse(self, load):
-        result = np.empty_like(load)
-        result[self._order] = self._solve(load[self._order].view(float)).view(complex)
-        return result
-
-    def logarithmic_map(self, source, direction=None, *, progress=None):
+    def logarithmic_map(self, source, direction=None, *, geodesics=None, progress=None):
         """Lay the surface out flat around a point; see `logarithmic_map`.
 
         Parameters
@@ -206,6 +182,8 @@ class Transport:
             The point in the middle.
         direction : array_like, (3,), optional
             Where the first coordinate grows.
+        geodesics : Geodesics, optional
+            Of the same operator, if there is one; otherwise the first map makes it for all.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -226,10 +204,13 @@ class Transport:
         if len(chosen) != 1:
             raise InvalidPointsError(f"There are {len(chosen)} sources. Name the one point in the middle of the map.")
         source = int(chosen[0])
-        axis = self.extend([source], frames[source].real if direction is None else direction)
-        distance = Geodesics(laplacian, progress=progress).distance([source], progress=progress)
+        axis = self.extend([source], frames[source].real if direction is None else direction, progress=progress)
+        if geodesics is None:
+            geodesics = self._geodesics = self._geodesics or Geodesics(laplacian, progress=progress)
+        distance = geodesics.distance([source], progress=progress)
         reached = np.isfinite(distance)
-        outwards = _gradient(laplacian, frames, np.where(reached, distance, 0.0))
+        report = progress or _silent
+        outwards = _gradient(laplacian, frames, np.where(reached, distance, 0.0), lambda: report("Map", 0.9))
         angle = np.angle(outwards * np.einsum("ij,ij->i", axis, frames).conj())
         # The distance has no gradient at the point itself: around it, the tangent plane tells the direction.
         near = laplacian.stiffness[[source]].tocoo().col
@@ -295,20 +276,31 @@ def logarithmic_map(laplacian, source, direction=None, *, progress=None):
     return Transport(laplacian, progress=progress).logarithmic_map(source, direction, progress=progress)
 
 
-def _gradient(laplacian, frames, values):
+def _gradient(laplacian, frames, values, report):
     """Return the gradient of a function, (n,) complex in the frames, by least squares over all pairs."""
-    pairs = laplacian.stiffness.tocoo()
-    apart = pairs.row != pairs.col
-    first, second, weight = pairs.row[apart], pairs.col[apart], -pairs.data[apart]
-    points, count = laplacian.surface_points, len(values)
-    offset = np.einsum("ij,ij->i", points[second] - points[first], frames[first])
-    rise = weight * (values[second] - values[first])
+    stiffness = laplacian.stiffness
+    places, axes = np.ascontiguousarray(laplacian.surface_points.T), np.ascontiguousarray(frames.T)
+    result = np.empty(len(values), dtype=complex)
 
-    def total(terms):
-        return np.bincount(first, terms, minlength=count)
+    def fit(rows):
+        start = stiffness.indptr[rows.start : rows.stop + 1]
+        second, weight = stiffness.indices[start[0] : start[-1]], -stiffness.data[start[0] : start[-1]]
+        own = np.repeat(np.arange(len(start) - 1), np.diff(start))  # a pair of a point with itself has no length
+        offset = places.take(second, axis=1) - places[:, rows].take(own, axis=1)
+        u, v = (np.einsum("ak,ak->k", offset, axis[:, rows].take(own, axis=1)) for axis in (axes.real, axes.imag))
+        rise = values[second] - values[rows][own]
 
-    u, v = offset.real, offset.imag
-    xx, xy, yy = total(weight * u * u), total(weight * u * v), total(weight * v * v)
-    x, y = total(rise * u), total(rise * v)
-    determinant = xx * yy - xy**2
-    return (yy * x - xy * y + 1j * (xx * y - xy * x)) / np.where(determinant > 0.0, determinant, 1.0)
+        def total(left, right):
+            return np.bincount(own, weight * left * right, minlength=len(start) - 1)
+
+        xx, xy, yy, x, y = total(u, u), total(u, v), total(v, v), total(rise, u), total(rise, v)
+        determinant = xx * yy - xy**2
+        result[rows] = (yy * x - xy * y + 1j * (xx * y - xy * x)) / np.where(determinant > 0.0, determinant, 1.0)
+
+    size = max(1, _BLOCK * len(values) // max(1, stiffness.nnz))
+    on_all_cores(fit, blocks(len(values), size), report)
+    return result
+
+
+def _silent(stage, fraction):
+    """Report nothing."""

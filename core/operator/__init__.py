@@ -10,3 +10,4 @@ from .implicit import ImplicitSurface
 from .laplacian import LaplaceBeltrami, build_laplacian, narrow_laplacian
 from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_symmetric
 from .spectrum import Spectrum, symmetric_form
+from .two_grid import TwoGrid

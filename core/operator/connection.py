@@ -3,6 +3,10 @@
 import numpy as np
 from scipy import sparse
 
+from ..blocks import blocks, on_all_cores
+
+_BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
+
 
 def tangent_frames(normals):
     """Give each tangent plane a frame, so that a complex number is a tangent vector.
@@ -25,7 +29,7 @@ def tangent_frames(normals):
     return first + 1j * np.cross(normals, first)
 
 
-def connection_laplacian(stiffness, normals, frames):
+def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: None):
     """Build the operator on tangent vectors from the one on functions.
 
     Parameters
@@ -36,28 +40,56 @@ def connection_laplacian(stiffness, normals, frames):
         Unit normals.
     frames : ndarray, (n, 3) complex
         As `tangent_frames` gives them.
+    mass : float or ndarray, (n,)
+        Added to the diagonal.
+    report : callable
+        Called after each block of pairs; may raise `Cancelled`.
 
     Returns
     -------
     csr_array, (n, n) complex
-        Hermitian positive semi-definite: ``x* K x`` is the sum over pairs of ``w |x_i - r_ij x_j|^2``, where r_ij is
-        the smallest rotation that turns the tangent plane of j into that of i. Where all frames are parallel it is the
-        stiffness itself. Pairs whose normals point to opposite sides have no such rotation, and are left out.
+        Hermitian positive semi-definite: without a mass, ``x* K x`` is the sum over pairs of
+        ``w |x_i - r_ij x_j|^2``, where r_ij is the smallest rotation that turns the tangent plane of j into that of i.
+        Where all frames are parallel it is the stiffness itself. Pairs whose normals point to opposite sides have no
+        such rotation, and are left out.
 
     References
     ----------
     Sharp, Soliman, Crane. The Vector Heat Method. 2019.
     """
-    pairs = sparse.triu(stiffness, k=1).tocoo()
-    first, second = pairs.row, pairs.col
-    cosine = np.einsum("ij,ij->i", normals[first], normals[second])
-    kept = cosine > 0.0
-    first, second, weight = first[kept], second[kept], -pairs.data[kept]
-    # The smallest rotation takes a vector v at right angles to a to v - (v . b) / (1 + a . b) (a + b).
-    across = np.einsum("ij,ij->i", frames[second].real, normals[first]) / (1.0 + cosine[kept])
-    turned = frames[second].real - across[:, None] * (normals[first] + normals[second])
-    turn = np.einsum("ij,ij->i", turned, frames[first])
-    turn /= np.abs(turn)
-    half = sparse.coo_array((-weight * turn, (first, second)), shape=stiffness.shape).tocsr()
-    diagonal = np.bincount(first, weight, len(normals)) + np.bincount(second, weight, len(normals))
-    return (sparse.diags_array(diagonal.astype(complex), format="csr") + half + half.conj().T).tocsr()
+    count = len(normals)
+    first = np.repeat(np.arange(count, dtype=np.int32), np.diff(stiffness.indptr))
+    once = first < stiffness.indices
+    first, second, weight = first[once], stiffness.indices[once], -stiffness.data[once]
+    entries = np.empty(len(first), dtype=complex)
+    normal, real, imaginary = (np.ascontiguousarray(values.T) for values in (normals, frames.real, frames.imag))
+
+    def measure(block):
+        i, j = first[block], second[block]
+        left, right, axis = normal.take(i, axis=1), normal.take(j, axis=1), real.take(j, axis=1)
+        cosine = _dot(left, right)
+        # The smallest rotation takes a vector v at right angles to a to v - (v . b) / (1 + a . b) (a + b).
+        across = _dot(axis, left) / np.where(cosine > 0.0, 1.0 + cosine, 1.0)
+        axis -= across * right  # what it has along the other normal, the frame does not see
+        x, y = _dot(axis, real.take(i, axis=1)), _dot(axis, imaginary.take(i, axis=1))
+        size = np.where(cosine > 0.0, -weight[block] / np.maximum(np.hypot(x, y), 1e-300), 0.0)
+        entries[block].real, entries[block].imag = size * x, size * y
+
+    on_all_cores(measure, blocks(len(first), _BLOCK), report)
+    kept = np.flatnonzero(entries)
+    first, second, entries = first[kept], second[kept], entries[kept]
+    start = np.concatenate([[0], np.cumsum(np.bincount(first, minlength=count))]).astype(np.int32)
+    half = sparse.csr_array((entries, second, start), shape=(count, count))
+    report()
+    weight = np.abs(entries)
+    diagonal = mass + np.bincount(first, weight, count) + np.bincount(second, weight, count)
+    half = (half + sparse.diags_array(0.5 * diagonal.astype(complex), format="csr")).tocsr()
+    report()
+    other = half.conj().T.tocsr()
+    report()
+    return half + other
+
+
+def _dot(left, right):
+    """Return the dot products of vectors, both (3, k)."""
+    return np.einsum("ak,ak->k", left, right)

@@ -12,7 +12,7 @@ from ..dense import product
 
 SMALL = 1000  # unknowns that are solved whole in a tenth of a second
 PART = 1 << 20  # entries of a matrix that are multiplied in one go: some hundredths of a second
-_STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
+STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
 # first about 20 become one, with the others fewer
 _SMOOTHED = 0.3  # smoothing takes out the errors whose eigenvalues are at least this share of the largest
 
@@ -30,7 +30,7 @@ class Rows:
     """
 
     def __init__(self, matrix, pool, report):
-        self._map, self._report, self._count = pool.map, report, matrix.shape[0]
+        self._map, self._report, self._count, self._dtype = pool.map, report, matrix.shape[0], matrix.dtype
         starts = np.append(np.arange(0, max(matrix.nnz, 1), PART), matrix.nnz)
         cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
         self._slices = [slice(first, last) for first, last in pairwise(cuts)]
@@ -47,7 +47,7 @@ class Rows:
         """Multiply with an array, (m, k), or a sparse one."""
         if sparse.issparse(other):
             return sparse.vstack(list(self.each(lambda rows, part: part @ other)), format="csr")
-        result = np.empty((self._count, other.shape[1]), dtype=other.dtype)
+        result = np.empty((self._count, other.shape[1]), dtype=np.result_type(self._dtype, other.dtype))
 
         def fill(rows, part):
             result[rows] = part @ other
@@ -121,8 +121,8 @@ def build_levels(matrix, slowest, least, enough, pool, report):
     levels, mass = [], None
     while matrix.shape[0] > least:
         n, diagonal, rows = matrix.shape[0], matrix.diagonal(), Rows(matrix, pool, report)
-        for share in _STRONG:
-            part = aggregates(rows, diagonal, share, report)
+        for share in STRONG:
+            part = aggregates(rows, diagonal, share, report)[0]
             if part.max() >= enough:
                 break
         norm = np.sqrt(np.bincount(part, slowest**2))
@@ -133,14 +133,13 @@ def build_levels(matrix, slowest, least, enough, pool, report):
         prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ (rows @ plain)).tocsr()
         restriction = prolongation.T.tocsr()
         back = Rows(restriction, pool, report)
-        middle, half = 0.5 * top * (1.0 + _SMOOTHED), 0.5 * top * (1.0 - _SMOOTHED) * np.sqrt(0.5)
         levels.append(
             Level(
                 matrix=rows,
                 rough=Rows(_single(matrix), pool, report),
                 mass=mass,
                 top=top * diagonal.max(),
-                steps=[(1.0 / (w * diagonal))[:, None].astype(np.float32) for w in (middle - half, middle + half)],
+                steps=[step[:, None].astype(np.float32) for step in smoothing_steps(top, diagonal)],
                 prolongation=Rows(prolongation, pool, report),
                 extension=Rows(_single(prolongation), pool, report),
                 restriction=Rows(_single(restriction), pool, report),
@@ -162,8 +161,10 @@ def aggregates(matrix, diagonal, share, report):
 
     Returns
     -------
-    ndarray, (n,) int
+    part : ndarray, (n,) int
         Number of each unknown's part.
+    roots : ndarray, (m,) int
+        The root of each part, which couples strongly with all of it.
     """
 
     def strong(rows, part):
@@ -186,7 +187,13 @@ def aggregates(matrix, diagonal, share, report):
     best = np.flatnonzero(weight == np.maximum.reduceat(weight, first)[row])
     chosen = np.empty(n, dtype=np.int32)
     chosen[row[best]] = column[best]
-    return (np.cumsum(root) - 1)[chosen]
+    return (np.cumsum(root) - 1)[chosen], np.flatnonzero(root)
+
+
+def smoothing_steps(top, diagonal):
+    """Return the lengths of the steps of smoothing, two (n,), from the largest eigenvalue over the diagonal."""
+    middle, half = 0.5 * top * (1.0 + _SMOOTHED), 0.5 * top * (1.0 - _SMOOTHED) * np.sqrt(0.5)
+    return [1.0 / (length * diagonal) for length in (middle - half, middle + half)]
 
 
 def largest_eigenvalue(matrix, diagonal):

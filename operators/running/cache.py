@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature, points_that_fit
+from ...core import Geodesics, LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature, points_that_fit
 from ...core.splats import floating_rows
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
@@ -146,15 +146,23 @@ def result(laplacian, *settings, compute):
         A name, and all else that the result depends on.
     compute : callable
     """
-    return fetch(content(_sources[laplacian], *settings), compute)
+    return fetch(content(_sources[laplacian], *settings), compute, laplacian)
 
 
-def fetch(key, compute):
-    """Return what is kept for a key; what the function computes, and keep it, if there is nothing."""
+def geodesics(laplacian, progress) -> Geodesics:
+    """Return what distances from any points have in common by an operator from `build`, computed only once."""
+    return result(laplacian, "geodesics", compute=lambda: Geodesics(laplacian, progress=progress))
+
+
+def fetch(key, compute, laplacian=None):
+    """Return what is kept for a key; what the function computes, and keep it, if there is nothing.
+
+    Of an operator that it was computed by, and holds, the bytes are not counted again.
+    """
     value = _get(key)
     if value is None:
         value = compute()
-        _put(key, value)
+        _put(key, value, laplacian)
     return value
 
 
@@ -199,20 +207,23 @@ def _get(key):
         return _kept[key][0]
 
 
-def _put(key, value):
+def _put(key, value, laplacian=None):
     """Keep a value; of the others, those that were used last as long as there is room."""
-    size = memory(value)
+    size = memory(value, laplacian)
     with _lock:
         _kept.pop(key, None)
         _kept[key] = value, size
+        source = _sources.get(laplacian) if laplacian is not None else None
+        if source in _kept:  # without the operator its results are not found, and hold its memory
+            _kept.move_to_end(source)
         total = sum(size for _, size in _kept.values())
         while total > LIMIT and len(_kept) > 1:
             total -= _kept.popitem(last=False)[1][1]
 
 
-def memory(value) -> int:
-    """Return the bytes of all arrays and factors that a value holds."""
-    total, found, pending = 0, set(), [value]
+def memory(value, known=None) -> int:
+    """Return the bytes of all arrays and factors that a value holds, but not those of an object that is known."""
+    total, found, pending = 0, {id(known)}, [value]
     while pending:
         item = pending.pop()
         if id(item) in found:

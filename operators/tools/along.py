@@ -5,7 +5,7 @@ import numpy as np
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 from scipy.spatial import cKDTree
 
-from ...core import PointCloudError, Transport, nearest_source, signed_distance
+from ...core import PointCloudError, Transport
 from ..objects.attributes import CELL, DIRECTION, SIGNED_DISTANCE, UV, tag_changed, write_attribute
 from ..objects.groups import SOURCE
 from ..objects.result import length_text
@@ -42,7 +42,10 @@ class MESHFREE_OT_nearest_source(ShownOperator, bpy.types.Operator):
         def compute(progress):
             laplacian = operator(progress)
             return cache.result(
-                laplacian, "cells", sources, compute=lambda: nearest_source(laplacian, sources, progress=progress)
+                laplacian,
+                "cells",
+                sources,
+                compute=lambda: cache.geodesics(laplacian, progress).nearest_source(sources, progress=progress),
             )
 
         return compute
@@ -99,7 +102,9 @@ class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
                 laplacian,
                 "map",
                 middle,
-                compute=lambda: _transport(laplacian, progress).logarithmic_map(middle, progress=progress),
+                compute=lambda: _transport(laplacian, progress).logarithmic_map(
+                    middle, geodesics=cache.geodesics(laplacian, progress), progress=progress
+                ),
             )
             reached = np.isfinite(place[:, 0])
             place = place @ [1.0, 1.0j]
@@ -152,7 +157,7 @@ class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
                 "directions",
                 sources,
                 direction,
-                compute=lambda: _transport(laplacian, progress).extend(sources, direction),
+                compute=lambda: _transport(laplacian, progress).extend(sources, direction, progress=progress),
             )
             reached = found.any(axis=1)
             result = np.zeros_like(found)
@@ -200,7 +205,9 @@ class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
                 "sides of a curve",
                 way,
                 closed,
-                compute=lambda: signed_distance(laplacian, way, closed and len(way) > 2, progress=progress),
+                compute=lambda: cache.geodesics(laplacian, progress).signed_distance(
+                    way, closed and len(way) > 2, progress=progress
+                ),
             )
 
         return compute

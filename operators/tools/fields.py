@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ...core import PointCloudError, geodesic_distance, harmonic_field, solve_poisson
+from ...core import PointCloudError, harmonic_field, solve_poisson
 from ..objects.attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind
 from ..objects.result import length_text
@@ -143,7 +143,7 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
                 laplacian,
                 "distance",
                 sources,
-                compute=lambda: geodesic_distance(laplacian, sources, progress=progress),
+                compute=lambda: cache.geodesics(laplacian, progress).distance(sources, progress=progress),
             )
 
         return compute

@@ -128,6 +128,15 @@ def test_what_changes_results_is_computed(cache, calls):
     assert "build_laplacian" in calls
 
 
+def test_lengths_are_made_once_for_all_that_is_measured_along_the_surface(cache, extension, monkeypatch):
+    add_ready(wave())
+    bpy.ops.meshfree.geodesic_distance()
+    module = importlib.import_module(f"{extension.__name__}.core.applications.geodesics")
+    monkeypatch.setattr(module, "_lengths_of_pairs", lambda *_: pytest.fail("made again"))
+    assert bpy.ops.meshfree.nearest_source() == {"FINISHED"}
+    assert bpy.ops.meshfree.unwrap() == {"FINISHED"}
+
+
 def test_kept_results_are_those_of_a_first_run(cache):
     def places(strength, **settings):
         bpy.ops.object.select_all(action="DESELECT")  # one object at a time
@@ -216,6 +225,17 @@ class TestMemory:
         get("large")
         assert made[4:] == ["large"]
         assert len(cache._kept) == 1
+
+    def test_an_operator_is_kept_before_what_it_computed(self, cache, monkeypatch):
+        laplacian = cache.build(sphere_points(500), options(cache), None, lambda stage, fraction: None).laplacian
+        before = list(cache._kept)
+        monkeypatch.setattr(cache, "LIMIT", sum(size for _, size in cache._kept.values()) + 1000)
+        made = []
+        for name in ("a", "b", "b", "a"):
+            cache.result(laplacian, name, compute=lambda name=name: made.append(name) or (laplacian, np.zeros(100)))
+        assert made == ["a", "b", "a"]  # the bytes of the operator do not count again, or none were kept
+        assert set(before) < set(cache._kept)
+        assert len(cache._kept) == len(before) + 1
 
     def test_another_file_gives_it_back(self, cache):
         add_object(sphere_points(300))

@@ -85,6 +85,24 @@ class TestSignedDistance:
         assert_allclose(core.signed_distance(square, line), side * (x - np.median(x)), atol=1e-2)
         assert_allclose(core.signed_distance(square, line[[0, -1]]), side * (x - np.median(x)), atol=1e-2)
 
+    def test_ends_that_are_near_each_other_but_far_along_the_surface(self):
+        """Around a cylinder with a slit, the straight distance of which is less than a tenth of the way."""
+        around, height = (
+            part.ravel() for part in np.meshgrid(np.linspace(0.3, 5.983, 114), np.linspace(-0.5, 0.5, 21))
+        )
+        laplacian = core.build_laplacian(np.column_stack([np.cos(around), np.sin(around), height]))
+        ends = [int(np.argmin(np.hypot(around - end, height))) for end in (0.3, 5.983)]
+        found = core.signed_distance(laplacian, ends)
+        assert_allclose(np.abs(found), np.abs(height), atol=1e-2)
+        assert abs(np.sum(np.sign(found) * np.sign(height))) == np.count_nonzero(height)
+
+    def test_it_reports_each_piece_of_the_curve(self, square):
+        reports = []
+        geodesics = core.Geodesics(square)
+        geodesics.signed_distance([0, 800, 1600], progress=lambda stage, fraction: reports.append((stage, fraction)))
+        assert [stage for stage, _ in reports] == ["Curve", "Curve", "Distance"]
+        assert reports == sorted(reports, key=lambda report: report[1])
+
     def test_inside_and_outside_of_sharp_corners(self, square):
         points = square.points[:, :2] - np.median(square.points[:, :2], axis=0)
         half = np.ptp(points[:, 0]) / 4.0

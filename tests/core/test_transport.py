@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse.linalg import splu
 
 import core
 from benchmarks.samplings import open_cylinder, random_sphere, square_grid, square_random, torus_points
-from core.operator import connection_laplacian, tangent_frames
+from core.applications.geodesics import Geodesics
+from core.operator import TwoGrid, connection_laplacian, tangent_frames
 
 
 def connection(laplacian):
@@ -55,6 +57,22 @@ def test_it_is_hermitian_and_positive_with_the_pairs_of_the_stiffness(sphere):
     assert_allclose(abs(matrix).toarray(), abs(pairs).toarray(), atol=1e-12)
 
 
+def test_a_mass_comes_onto_the_diagonal(sphere):
+    frames = tangent_frames(sphere.normals)
+    matrix = connection_laplacian(sphere.stiffness, sphere.normals, frames, sphere.areas)
+    change = (matrix - connection(sphere)).toarray()
+    assert_allclose(change, np.diag(sphere.areas), atol=1e-12)
+
+
+def test_pairs_that_face_opposite_ways_are_left_out(square):
+    normals = square.normals.copy()
+    turned = np.arange(1600) % 7 == 0
+    normals[turned] *= -1.0
+    matrix = connection_laplacian(square.stiffness, normals, tangent_frames(normals)).tocoo()
+    assert not np.any(turned[matrix.row] != turned[matrix.col])
+    assert abs(matrix).sum(axis=1).min() > 0.0
+
+
 def test_on_a_plane_it_is_the_stiffness(square):
     assert abs(connection(square) - square.stiffness).max() < 1e-12
 
@@ -74,6 +92,43 @@ def test_the_lowest_fields_on_the_sphere_have_the_eigenvalue_one(sphere):
     gradient = frames @ np.array([0.3, -0.5, 0.8])
     quotient = (gradient.conj() @ (connection(sphere) @ gradient)).real / (sphere.areas @ np.abs(gradient) ** 2)
     assert quotient == pytest.approx(1.0, abs=0.04)
+
+
+class TestTwoGrid:
+    @pytest.mark.parametrize("reach", [0.1, 0.3])
+    def test_each_value_is_right_to_a_share_of_itself(self, reach):
+        """Although the largest is many powers of ten larger than the least."""
+        laplacian = core.build_laplacian(torus_points(3000))
+        mass = laplacian.areas / reach**2
+        frames = tangent_frames(laplacian.normals)
+        matrix = connection_laplacian(laplacian.stiffness, laplacian.normals, frames, mass)
+        load = np.zeros(3000, dtype=complex)
+        load[[7, 900]] = 1.0, 1j
+        exact = splu(matrix.tocsc()).solve(load)
+        assert np.abs(exact).min() < 1e-3 * np.abs(exact).max()
+        solver = TwoGrid(matrix, mass, laplacian.points, lambda stage, fraction: None)
+        found = solver.solve(load, np.ones(3000, dtype=bool), lambda stage, fraction: None)
+        assert np.max(np.abs(found - exact) / np.abs(exact)) < 1e-3
+
+    def test_points_that_nothing_is_coupled_with_keep_their_own(self, square):
+        rows = np.r_[:1600, -1]  # a row of zeros after those of the square
+        stiffness = square.stiffness.copy()
+        stiffness.resize(1601, 1601)
+        normals, points = square.normals[rows], square.points[rows]
+        mass = np.append(square.areas, 1e-30)
+        matrix = connection_laplacian(stiffness, normals, tangent_frames(normals), mass)
+        solver = TwoGrid(matrix, mass, points, lambda stage, fraction: None)
+        load = np.zeros(1601, dtype=complex)
+        load[[5, 1600]] = 1.0, 1j
+        found = solver.solve(load, np.arange(1601) < 1600, lambda stage, fraction: None)
+        assert found[1600] == pytest.approx(1j / 1e-30)
+        residual = np.linalg.norm((matrix @ found - load)[:1600])
+        assert residual < 1e-2
+
+    def test_what_does_not_converge_is_an_error(self, square, monkeypatch):
+        monkeypatch.setattr("core.operator.two_grid._STEPS", 1)
+        with pytest.raises(core.SolverError, match="in 1 steps"):
+            core.transport(square, [0], [1.0, 0.0, 0.0])
 
 
 class TestTransport:
@@ -180,6 +235,26 @@ class TestLogarithmicMap:
         first = np.cross(normal, [1.0, 0.0, 0.0])
         along, across = (carried.logarithmic_map(7, axis) for axis in (first, np.cross(normal, first)))
         assert_allclose(across, np.column_stack([along[:, 1], -along[:, 0]]), atol=1e-2)
+
+    def test_a_second_map_uses_what_the_first_one_made(self, sphere, monkeypatch):
+        carried = core.Transport(sphere)
+        carried.logarithmic_map(7)
+        given = core.Transport(sphere).logarithmic_map(1234, geodesics=Geodesics(sphere))
+        monkeypatch.setattr(Geodesics, "__init__", lambda *_, **__: pytest.fail("lengths were made again"))
+        assert_array_equal(carried.logarithmic_map(1234), given)
+
+    def test_it_can_be_cancelled_at_each_report(self):
+        laplacian, reports = core.build_laplacian(random_sphere(600)), []
+        core.logarithmic_map(laplacian, 7, progress=lambda stage, fraction: reports.append(stage))
+        assert {"Equations", "Factors", "Directions", "Lengths", "Distance", "Map"} == set(reports)
+        for stage in set(reports):
+
+            def stop(now, fraction, stage=stage):
+                if now == stage:
+                    raise core.Cancelled
+
+            with pytest.raises(core.Cancelled):
+                core.logarithmic_map(laplacian, 7, progress=stop)
 
     def test_other_components_have_no_place(self):
         points = np.concatenate([random_sphere(600), random_sphere(600, 1) + [4.0, 0.0, 0.0]])
