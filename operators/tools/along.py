@@ -10,7 +10,7 @@ from ..objects.attributes import CELL, DIRECTION, SIGNED_DISTANCE, UV, tag_chang
 from ..objects.groups import SOURCE
 from ..objects.result import length_text
 from ..running import cache
-from ..running.application import ShownOperator, operator_reader
+from ..running.application import ShownOperator, Tool, operator_reader
 from .select import read_sources
 
 OUTSIDE = -1.0  # place in the texture of points that the map does not reach: beyond its border
@@ -20,11 +20,9 @@ def _transport(laplacian, progress):
     return cache.result(laplacian, "transport", compute=lambda: Transport(laplacian, progress=progress))
 
 
-class MESHFREE_OT_nearest_source(ShownOperator, bpy.types.Operator):
-    """Divide the surface into cells: the points that are nearest, along the surface, to the same source"""
+class NearestSource(Tool):
+    """The settings and the work of `meshfree.nearest_source`."""
 
-    bl_idname = "meshfree.nearest_source"
-    bl_label = "Nearest Source"
     writes = (CELL,)
     asks = ("group", "show")
 
@@ -53,6 +51,13 @@ class MESHFREE_OT_nearest_source(ShownOperator, bpy.types.Operator):
         missed, line = np.count_nonzero(result < 0), f"{obj.name}: {len(np.unique(result[result >= 0])):,} cells"
         far = f"{missed:,} points of {obj.name} are reached by no source. Their cell is -1."
         return [far, line] if missed else [line]
+
+
+class MESHFREE_OT_nearest_source(NearestSource, ShownOperator, bpy.types.Operator):
+    """Divide the surface into cells: the points that are nearest, along the surface, to the same source"""
+
+    bl_idname = "meshfree.nearest_source"
+    bl_label = "Nearest Source"
 
 
 class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
