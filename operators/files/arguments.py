@@ -15,6 +15,8 @@ def add_setting(parser, setting):
         kind.update(action=argparse.BooleanOptionalAction)
     elif setting.type == "STRING":
         kind.update(metavar="NAME")
+    elif setting.is_array:
+        kind.update(type=place, metavar="X,Y,Z")
     elif setting.subtype == "ANGLE":
         kind.update(type=_number(setting, lambda text: math.radians(float(text))), metavar="DEGREES")
     else:
@@ -35,10 +37,10 @@ def _number(setting, convert):
 
 
 def place(text):
-    """Turn X,Y,Z into a place, (3,) float64."""
+    """Turn X,Y,Z into a place or a direction, (3,) float64."""
     found = as_place(text)
     if found is None:
-        raise argparse.ArgumentTypeError(f"{text!r} is no place X,Y,Z")
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z")
     return found
 
 

@@ -8,7 +8,7 @@ import bpy
 
 from ...core import PointCloudError
 from ...core.files import numbered_files
-from ..tools.along import NearestSource
+from ..tools.along import ExtendDirection, NearestSource, Unwrap
 from ..tools.curvature import Curvatures, Roughness
 from ..tools.fields import GeodesicDistance, HarmonicField
 from ..tools.minimal import MinimalSurface
@@ -47,6 +47,8 @@ def make_verbs():
         Orient(),
         FromSources("geodesic_distance", GeodesicDistance),
         FromSources("nearest_source", NearestSource),
+        FromSources("unwrap", Unwrap),
+        FromSources("extend_direction", ExtendDirection),
         Apply("harmonic_field", HarmonicField),
         SplatInfo(),
         Deform(),

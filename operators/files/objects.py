@@ -153,7 +153,7 @@ def _read_colors(data):
     return np.clip(colors.reshape(-1, 4), 0.0, 1.0)
 
 
-def load(path, name: str = ""):
+def load(path, name: str = "", option: str = "--object"):
     """Open a file in place of everything that is loaded.
 
     Parameters
@@ -162,6 +162,8 @@ def load(path, name: str = ""):
         A file of one of the kinds in `INPUTS`.
     name : str
         The object's name; empty for the active one, or else the only mesh.
+    option : str
+        Of the command line, by which one names it.
 
     Returns
     -------
@@ -185,10 +187,10 @@ def load(path, name: str = ""):
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
     else:
         raise PointCloudError(f"There is no file {path}. Check its name and folder.")
-    return _choose_object(path, name), notices
+    return _choose_object(path, name, option), notices
 
 
-def _choose_object(path, name):
+def _choose_object(path, name, option):
     bpy.context.view_layer.update()
     meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
     active = bpy.context.view_layer.objects.active
@@ -203,7 +205,7 @@ def _choose_object(path, name):
     if len(chosen) != 1:
         names = ", ".join(obj.name for obj in meshes)
         what = f'mesh object "{name}"' if name else "active mesh object"
-        raise PointCloudError(f"{path} has no {what}. Name one of its mesh objects with --object: {names}.")
+        raise PointCloudError(f"{path} has no {what}. Name one of its mesh objects with {option}: {names}.")
     bpy.context.view_layer.objects.active = chosen[0]
     return chosen[0]
 

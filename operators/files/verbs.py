@@ -73,13 +73,13 @@ class _ObjectVerb(Verb):
             add_setting(parser, settings[name])
 
     def run(self, path, arguments, output):
-        obj, notices = self.open(path, arguments.object, arguments)
+        obj, notices = self.open(path, "object", arguments)
         result = self.work(obj, path, arguments, output)
         return {**result, "notices": notices + result["notices"]}
 
-    def open(self, path, name, arguments):
-        """Open a file in place of everything that is loaded; return its object, with settings, and notices."""
-        obj, notices = files.load(path, name)
+    def open(self, path, option, arguments):
+        """Open a file in place of all that is loaded; return the object that an option names, set up, and notices."""
+        obj, notices = files.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}")
         reason = obstacle(obj)
         if reason:
             raise PointCloudError(reason)
@@ -185,7 +185,7 @@ class Apply(_ObjectVerb):
 
     def work(self, obj, path, arguments, output):
         tool = self._tool()
-        values = {item.identifier: item.default for item in self.operator.properties if item.type != "POINTER"}
+        values = {item.identifier: _default(item) for item in self.operator.properties if item.type != "POINTER"}
         values |= {name: value for name, value in vars(arguments).items() if name in values and value is not None}
         values |= {name: files.group_of(obj, value) for name, value in values.items() if _names_group(name)}
         vars(tool).update(values, target="IN_PLACE")
@@ -215,6 +215,10 @@ class Apply(_ObjectVerb):
     def figures(self, tool, result) -> dict:
         """Return numbers to print, beside the line about what was done."""
         return {}
+
+
+def _default(setting):
+    return setting.default_array if getattr(setting, "is_array", False) else setting.default
 
 
 class FromSources(Apply):
@@ -305,9 +309,10 @@ class CompareWith(Apply):
         return {**result, "notices": self._reference.notices + result["notices"]}
 
     def _read(self, arguments):
+        obj, notices = self.open(arguments.reference, "reference_object", arguments)
         with naming(str(arguments.reference)):
-            obj, notices = self.open(arguments.reference, arguments.reference_object, arguments)
-            return _Reference(str(arguments.reference), place_of(obj), operator_reader(bpy.context, obj)[1], notices)
+            _, build = operator_reader(bpy.context, obj)
+        return _Reference(str(arguments.reference), place_of(obj), build, notices)
 
     def prepare(self, tool, obj, path, arguments):
         tool.reference = self._reference

@@ -60,11 +60,9 @@ class MESHFREE_OT_nearest_source(NearestSource, ShownOperator, bpy.types.Operato
     bl_label = "Nearest Source"
 
 
-class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
-    """Lay the surface around a point out flat as texture coordinates: a decal that follows the surface"""
+class Unwrap(Tool):
+    """The settings and the work of `meshfree.unwrap`."""
 
-    bl_idname = "meshfree.unwrap"
-    bl_label = "Unwrap Around Point"
     writes = (UV,)
     asks = ("group", "radius", "angle", "show")
     adjustable = ("radius", "angle", "show")
@@ -121,11 +119,16 @@ class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
         return [f"{obj.name}: texture coordinates up to {length_text(border)} from the middle"]
 
 
-class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
-    """Carry a direction at some points along the surface to all others, for hair, scratches or brush strokes"""
+class MESHFREE_OT_unwrap(Unwrap, ShownOperator, bpy.types.Operator):
+    """Lay the surface around a point out flat as texture coordinates: a decal that follows the surface"""
 
-    bl_idname = "meshfree.extend_direction"
-    bl_label = "Extend Direction"
+    bl_idname = "meshfree.unwrap"
+    bl_label = "Unwrap Around Point"
+
+
+class ExtendDirection(Tool):
+    """The settings and the work of `meshfree.extend_direction`."""
+
     writes = (DIRECTION,)
     asks = ("group", "direction", "show")
 
@@ -172,6 +175,13 @@ class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
         missed, line = np.count_nonzero(~result.any(axis=1)), f"{obj.name}: directions on {len(result):,} points"
         far = f"{missed:,} points of {obj.name} are reached by no source. They have no direction."
         return [far, line] if missed else [line]
+
+
+class MESHFREE_OT_extend_direction(ExtendDirection, ShownOperator, bpy.types.Operator):
+    """Carry a direction at some points along the surface to all others, for hair, scratches or brush strokes"""
+
+    bl_idname = "meshfree.extend_direction"
+    bl_label = "Extend Direction"
 
 
 class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):

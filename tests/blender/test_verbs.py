@@ -160,6 +160,9 @@ class TestCompare:
         code, [line] = run("compare", tmp_path / "a.blend", *names)
         assert code == 0, line
         assert line["mean_distance"] == pytest.approx(0.05, abs=2e-3)
+        code, [line] = run("compare", tmp_path / "a.blend", *names[:-1], "Nobody")
+        assert code == 1
+        assert "with --reference-object: Plan, Scan" in line["error"]
 
     def test_what_is_far_away_is_not_compared(self, run, tmp_path):  # noqa: F811
         write(tmp_path / "plan.csv", POINTS)
@@ -181,7 +184,7 @@ class TestCompare:
         code, lines = run("compare", *inputs, "--reference", tmp_path / "plan.csv")
         assert code == 1
         assert len(lines) == 2
-        assert all(str(tmp_path / "plan.csv") in line["error"] for line in lines)
+        assert all(line["error"].count(str(tmp_path / "plan.csv")) == 1 for line in lines)
 
     def test_too_few_points_in_the_reference(self, run, tmp_path):  # noqa: F811
         write(tmp_path / "plan.csv", POINTS[:2])
@@ -293,6 +296,25 @@ class TestSources:
         clear = np.abs(POINTS[:, 0]) > 0.1
         assert len({*zip(cells[clear].tolist(), (POINTS[clear, 0] > 0.0).tolist(), strict=True)}) == 2
 
+    def test_a_map_around_a_place(self, run, tmp_path):  # noqa: F811
+        """On a plane it is the plane, turned in some way."""
+        points, _ = grid_points()
+        middle = points[np.linalg.norm(points - [2.0, 1.5, 0.0], axis=1).argmin()]
+        given = f"--at={','.join(map(str, middle))}", "--radius", 4
+        code, [line] = run("unwrap", write(tmp_path / "a.csv", points), *given, "--out", tmp_path / "a.npz")
+        assert code == 0, line
+        away = 8.0 * np.linalg.norm(np.load(tmp_path / "a.npz")["uv"] - 0.5, axis=1)
+        assert_allclose(away, np.linalg.norm(points - middle, axis=1), atol=0.02)
+
+    def test_a_direction_carried_over_a_plane(self, run, tmp_path):  # noqa: F811
+        points, _ = grid_points()
+        given = "--at=0,0,0", "--direction=-1,1,5"
+        write(tmp_path / "a.csv", points)
+        code, [line] = run("extend-direction", tmp_path / "a.csv", *given, "--out", tmp_path / "a.npz")
+        assert code == 0, line
+        expected = np.tile(np.array([-1.0, 1.0, 0.0]) / np.sqrt(2.0), (len(points), 1))
+        assert_allclose(np.load(tmp_path / "a.npz")["direction"], expected, atol=0.01)
+
     def test_a_field_between_the_points_of_two_columns(self, run, tmp_path):  # noqa: F811
         points, _ = grid_points()
         low, high = points[:, 0] < 0.3, points[:, 0] > 3.6
@@ -389,6 +411,7 @@ def test_files_that_cannot_be_read(run, tmp_path, monkeypatch, verb):  # noqa: F
         ("geodesic-distance", "a.csv", "--at", "1,2"),
         ("geodesic-distance", "a.csv", "--at", "1,2,nan"),
         ("nearest-source", "a.csv", "--at", "1,2,3", "--group", "seed"),
+        ("extend-direction", "a.csv", "--at", "1,2,3", "--direction", "up"),
         ("smooth", "."),
         ("splat-info", "a.ply", "--out", "b.ply"),
     ],
