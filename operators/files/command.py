@@ -15,7 +15,8 @@ from ..tools.minimal import MinimalSurface
 from ..tools.segment import Segment, Signature
 from ..tools.smooth import ModeShape, Smooth
 from .bending import Deform, SplatInfo
-from .verbs import Analyze, Apply, CompareWith, FromSources, Mesh, Orient
+from .tool_verbs import AlongCurve, CompareWith, FromSources, Mesh, Orient
+from .verbs import Analyze, Apply
 
 _handles = []
 
@@ -49,6 +50,7 @@ def make_verbs():
         FromSources("nearest_source", NearestSource),
         FromSources("unwrap", Unwrap),
         FromSources("extend_direction", ExtendDirection),
+        AlongCurve(),
         Apply("harmonic_field", HarmonicField),
         SplatInfo(),
         Deform(),
@@ -138,7 +140,7 @@ def _output_path(path, arguments):
 def _process(verb, path, arguments) -> dict:
     """Work on one file, write its output, and return what to print."""
     output = _output_path(path, arguments)
-    for read in (path, *(getattr(arguments, name) for name in verb.reads)):
+    for read in (path, *(Path(getattr(arguments, name)) for name in verb.reads)):
         if output is not None and output.resolve() == read.resolve():
             raise PointCloudError(f"The output {output} would overwrite its input. Choose another name.")
     return {**verb.run(path, arguments, output), "output": None if output is None else str(output)}

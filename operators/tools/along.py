@@ -184,11 +184,9 @@ class MESHFREE_OT_extend_direction(ExtendDirection, ShownOperator, bpy.types.Ope
     bl_label = "Extend Direction"
 
 
-class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
-    """Measure the distance along the surface from a curve on it: above zero on its left, below zero on its right"""
+class SignedDistance(Tool):
+    """The settings and the work of `meshfree.signed_distance`."""
 
-    bl_idname = "meshfree.signed_distance"
-    bl_label = "Signed Distance"
     writes = (SIGNED_DISTANCE,)
     asks = ("curve", "show")
 
@@ -198,9 +196,8 @@ class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
     )
 
     def plan(self, context, obj):
-        places, closed = _read_curve(context, self.curve)
+        places, closed = self.way(context, obj)
         reading, operator = operator_reader(context, obj)
-        places = places - np.array(obj.matrix_world.translation)  # points are read without it
 
         def compute(progress):
             laplacian = operator(progress)
@@ -220,6 +217,11 @@ class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
 
         return compute
 
+    def way(self, context, obj):
+        """Return the places that the curve goes through, (k, 3), as points are read, and whether it is closed."""
+        places, closed = _read_curve(context, self.curve)
+        return places - np.array(obj.matrix_world.translation), closed  # points are read without it
+
     def write(self, context, obj, result):
         reached = np.isfinite(result)
         write_attribute(obj.data, SIGNED_DISTANCE, np.where(reached, result, 0.0))
@@ -228,6 +230,13 @@ class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
         missed, line = np.count_nonzero(~reached), f"{obj.name}: {low} on the right to {high} on the left"
         far = f"{missed:,} points of {obj.name} are not reached from the curve. Their distance is 0."
         return [far, line] if missed else [line]
+
+
+class MESHFREE_OT_signed_distance(SignedDistance, ShownOperator, bpy.types.Operator):
+    """Measure the distance along the surface from a curve on it: above zero on its left, below zero on its right"""
+
+    bl_idname = "meshfree.signed_distance"
+    bl_label = "Signed Distance"
 
 
 def _read_curve(context, name):

@@ -296,6 +296,25 @@ class TestSources:
         clear = np.abs(POINTS[:, 0]) > 0.1
         assert len({*zip(cells[clear].tolist(), (POINTS[clear, 0] > 0.0).tolist(), strict=True)}) == 2
 
+    def test_distance_from_a_curve_of_a_file(self, run, tmp_path):  # noqa: F811
+        """Of the equator walked eastwards the north is on the left; a closed one has no ends."""
+        longitude = 2.0 * np.pi * np.arange(200) / 200.0
+        equator = np.stack([np.cos(longitude), np.sin(longitude), 0.0 * longitude], axis=1)
+        points = np.vstack([equator, sphere_points(3000)])
+        curve = write(tmp_path / "curve.csv", equator + FAR)
+        given = "--curve", curve, "--closed"
+        code, [line] = run(
+            "signed-distance", write(tmp_path / "a.csv", points + FAR), *given, "--out", tmp_path / "a.npz"
+        )
+        assert code == 0, line
+        assert_allclose(np.load(tmp_path / "a.npz")["signed_distance"], np.arcsin(points[:, 2]), atol=0.03)
+        code, [line] = run("signed-distance", tmp_path / "a.csv", *given, "--out", curve)
+        assert (code, "overwrite its input" in line["error"]) == (1, True)
+        code, [line] = run("signed-distance", tmp_path / "a.csv", "--curve", tmp_path / "none.csv")
+        assert (code, "There is no file" in line["error"]) == (1, True)
+        code, [line] = run("signed-distance", tmp_path / "a.csv", "--curve", "Seam")
+        assert (code, 'no curve "Seam"' in line["error"]) == (1, True)
+
     def test_a_map_around_a_place(self, run, tmp_path):  # noqa: F811
         """On a plane it is the plane, turned in some way."""
         points, _ = grid_points()
