@@ -243,11 +243,11 @@ def save(path, obj, arrays, shown=""):
         table = point_table(bpy.context, obj)
         write_points(path, table, double=not table.single)
     else:
+        for other in bpy.context.view_layer.objects:
+            other.select_set(other == obj)
         names = [name for name in (shown, *APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
         if names:
             tell("result_written", obj, names[0])
-        for other in bpy.context.view_layer.objects:
-            other.select_set(other == obj)
         save_scene(path)
 
 

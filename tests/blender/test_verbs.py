@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.blender.clouds import add_object, attribute, grid_points, local_points, sphere_points
+from tests.blender.clouds import add_group, add_object, attribute, grid_points, local_points, sphere_points
 from tests.blender.test_command import run  # noqa: F401
 
 FAR = np.array([400_000.0, 5_000_000.0, 100.0])
@@ -368,6 +368,22 @@ class TestSources:
         code, [line] = run("geodesic-distance", tmp_path / "a.csv", "--group", "seed")
         assert code == 1
         assert text in line["error"]
+
+    def test_a_place_leaves_groups_of_a_blend_file(self, run, tmp_path):  # noqa: F811
+        obj = add_object(POINTS)
+        add_group(obj, "Source", POINTS[:, 2] > 0.9)
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+        farthest = {}
+        for name, given in (("group", ()), ("place", ("--at=0,0,-1",))):
+            code, [line] = run("geodesic-distance", tmp_path / "a.blend", *given, "--out", tmp_path / f"{name}.blend")
+            assert code == 0, line
+            bpy.ops.wm.open_mainfile(filepath=str(tmp_path / f"{name}.blend"))
+            farthest[name] = POINTS[attribute(bpy.context.object, "lb_distance").argmax(), 2]
+            assert "Source" in bpy.context.object.vertex_groups
+            members = [any(item.group == 0 for item in vertex.groups) for vertex in bpy.context.object.data.vertices]
+            assert_array_equal(members, POINTS[:, 2] > 0.9)
+        assert farthest["group"] < -0.9
+        assert farthest["place"] > 0.9
 
     def test_a_column_of_the_boundary(self, run, tmp_path):  # noqa: F811
         points, outermost = grid_points()
