@@ -51,7 +51,7 @@ class ObjectVerb(Verb):
     def __init__(self, operator):
         self.name = operator.replace("_", "-")
         self.operator = getattr(bpy.ops.meshfree, operator).get_rna_type()
-        self.help = self.operator.description.lower()
+        self.help = self.operator.description[0].lower() + self.operator.description[1:]
         self.description = (
             f"{self.operator.description}. Writes one JSON line per input: points, what was done, seconds per stage,"
             " notices; or the error. The exit code is 1 if any input failed."
