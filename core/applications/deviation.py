@@ -92,6 +92,8 @@ def surface_deviation(points, normals, laplacian, greatest=None, *, progress=Non
     places = surface.scaled(points)
     nearest = surface.nearest(places)
     distance = np.einsum("ij,ij->i", surface.points[nearest] - places, normals)
+    # Beyond this no surface is met: far off it, where all slopes are guesses, steps would grow without end.
+    farthest = np.linalg.norm(places, axis=1) + 2.0 * np.linalg.norm(surface.points, axis=1).max()
     known, rows = np.zeros(len(points), dtype=bool), np.arange(len(points))
     for _ in range(_ROUNDS):
         there = surface.heights(places[rows] + distance[rows, None] * normals[rows], lambda: report("Deviation", 0.8))
@@ -99,7 +101,7 @@ def surface_deviation(points, normals, laplacian, greatest=None, *, progress=Non
         steep = np.abs(cosine) > _STEEP
         met = steep & (np.abs(there.height) < _MET)
         step = np.where(steep, -there.height / np.where(steep, cosine, 1.0), 0.0)
-        distance[rows] += step
+        distance[rows] = np.clip(distance[rows] + step, -farthest[rows], farthest[rows])
         known[rows] = met & there.belongs
         rows = rows[steep & ~met]
         if not len(rows):

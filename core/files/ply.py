@@ -139,7 +139,7 @@ def _read_binary(file, order, before, vertex, path):
     return [rows[f"f{index}"].astype(code) for index, code in enumerate(vertex.types)]
 
 
-def write_ply(path, table, double=True):
+def write_ply(path, table, double=True, faces=()):
     """Write a table as a binary PLY file.
 
     Parameters
@@ -148,14 +148,16 @@ def write_ply(path, table, double=True):
     table : PointTable
     double : bool
         Whether coordinates are kept in double precision.
+    faces : sequence of ndarray, (m, k) int
+        Of k corners each, as indices of points.
     """
     columns = to_columns(table)
     if not double:
         columns.update((axis, columns[axis].astype(np.float32)) for axis in "xyz")
-    write_vertex_columns(path, columns)
+    write_vertex_columns(path, columns, faces=faces)
 
 
-def write_vertex_columns(path, columns, order="<", comments=()):
+def write_vertex_columns(path, columns, order="<", comments=(), faces=()):
     """Write a binary PLY file.
 
     Parameters
@@ -166,6 +168,8 @@ def write_vertex_columns(path, columns, order="<", comments=()):
         Of the bytes.
     comments : sequence of str
         Lines of the header.
+    faces : sequence of ndarray, (m, k) int
+        Of at most 255 corners each, as indices of vertices.
     """
     columns = {name: values.view(np.uint8) if values.dtype == bool else values for name, values in columns.items()}
     types = {name: _code(values) for name, values in columns.items()}
@@ -176,9 +180,15 @@ def write_vertex_columns(path, columns, order="<", comments=()):
     kind = next(name for name, known in _ORDERS.items() if known == order)
     lines = ["ply", f"format {kind} 1.0", *comments, f"element vertex {count}"]
     lines += [f"property {_NAMES[code]} {name.replace(' ', '_')}" for name, code in types.items()]
+    if len(faces):
+        lines += [f"element face {sum(map(len, faces))}", "property list uchar int vertex_indices"]
     with open(path, "wb") as file:
         file.write("\n".join([*lines, "end_header\n"]).encode())
         rows.tofile(file)
+        for corners in faces:
+            lists = np.empty(len(corners), [("count", "u1"), ("corners", order + "i4", corners.shape[1])])
+            lists["count"], lists["corners"] = corners.shape[1], corners
+            lists.tofile(file)
 
 
 def _code(values):

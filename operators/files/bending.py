@@ -9,56 +9,82 @@ import numpy as np
 from ...core import CoarseDeformer, PointCloudError, build_laplacian, read_splats, write_splats
 from ...core.files import WRITABLE, read_points, write_points
 from ...core.splats import floating_rows, holds_splats
+from .verbs import ONE_LINE, Verb
 
 _SHARES = (0.01, 0.5, 0.99)  # quantiles that are told
 _FLAT = 0.3  # of the middle axis, below which the shortest one makes a splat flat
 
 
-def splat_info(path, arguments, output) -> dict:
-    """Tell what a file of splats holds."""
-    splats = read_splats(path)
-    axes = np.sort(splats.scales, axis=1)
+class SplatInfo(Verb):
+    """The verb `splat-info`: what a file of splats holds."""
 
-    def quantiles(values):
-        return [float(f"{value:.6g}") for value in np.quantile(values, _SHARES)]
+    name = "splat-info"
+    help = "what files of Gaussian splats hold"
+    description = f"What files of Gaussian splats hold. {ONE_LINE}"
+    inputs = "files of splats"
 
-    return {
-        "splats": len(splats),
-        "degree": round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1,
-        "low": splats.positions.min(axis=0).tolist(),
-        "high": splats.positions.max(axis=0).tolist(),
-        "longest_axis": quantiles(axes[:, 2]),
-        "opacity": quantiles(splats.opacities),
-        "flat": float(np.mean(axes[:, 0] < _FLAT * axes[:, 1])),
-        "notices": splats.notices,
-    }
+    def run(self, path, arguments, output):
+        splats = read_splats(path)
+        axes = np.sort(splats.scales, axis=1)
+
+        def quantiles(values):
+            return [float(f"{value:.6g}") for value in np.quantile(values, _SHARES)]
+
+        return {
+            "splats": len(splats),
+            "degree": round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1,
+            "low": splats.positions.min(axis=0).tolist(),
+            "high": splats.positions.max(axis=0).tolist(),
+            "longest_axis": quantiles(axes[:, 2]),
+            "opacity": quantiles(splats.opacities),
+            "flat": float(np.mean(axes[:, 0] < _FLAT * axes[:, 1])),
+            "notices": splats.notices,
+        }
 
 
-def deform(path, arguments, output) -> dict:
-    """Move the points, or the splats, of a file by handles that a JSON file names, and write them."""
-    if output is None:
-        raise PointCloudError("Nothing would be written. Give --out or --out-dir.")
-    wanted = _read_handles(arguments.handles)
-    splats = read_splats(path) if holds_splats(path) else None
-    if splats is not None and output.suffix.lower() != ".ply":
-        raise PointCloudError(f"Splats cannot be written to {output}. Let its name end in .ply.")
-    if splats is None and output.suffix.lower() not in WRITABLE:
-        raise PointCloudError(f"Points cannot be written to {output}. Let its name end in {', '.join(WRITABLE)}.")
-    table = read_points(path) if splats is None else None
-    points = table.points if splats is None else splats.positions
-    handles, goal = _moves(wanted, points)
-    anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
-    out = floating_rows(splats) if splats is not None else ()
-    laplacian = build_laplacian(points, left_out=out)
-    deformer = CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
-    moved = deformer.solve(goal)
-    if splats is None:
-        write_points(output, replace(table, points=moved), double=not table.single)
-    else:
-        write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
-    notices = (table if splats is None else splats).notices
-    farthest = float(np.linalg.norm(moved - points, axis=1).max())
-    return {"points": len(points), "farthest": farthest, "left_out": len(out), "notices": [*notices, *deformer.notices]}
+class Deform(Verb):
+    """The verb `deform`: the points, or the splats, of a file are moved by handles that a JSON file names."""
+
+    name = "deform"
+    help = "move points or Gaussian splats by handles that a JSON file names"
+    description = f"Move points or Gaussian splats by handles that a JSON file names. {ONE_LINE}"
+    inputs = "files of points or splats"
+    outputs = WRITABLE
+    reads = ("handles",)
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--handles",
+            type=Path,
+            required=True,
+            metavar="JSON",
+            help='{"handles": [{"center": [x, y, z], "radius": r, "shift": [x, y, z]}], "anchors": [...]}: points'
+            ' in balls or by "indices", moved by "shift", "matrix" (4 x 4) or "positions"',
+        )
+
+    def run(self, path, arguments, output):
+        if output is None:
+            raise PointCloudError("Nothing would be written. Give --out or --out-dir.")
+        wanted = _read_handles(arguments.handles)
+        splats = read_splats(path) if holds_splats(path) else None
+        if splats is not None and output.suffix.lower() != ".ply":
+            raise PointCloudError(f"Splats cannot be written to {output}. Let its name end in .ply.")
+        table = read_points(path) if splats is None else None
+        points = table.points if splats is None else splats.positions
+        handles, goal = _moves(wanted, points)
+        anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
+        out = floating_rows(splats) if splats is not None else ()
+        laplacian = build_laplacian(points, left_out=out)
+        deformer = CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
+        moved = deformer.solve(goal)
+        if splats is None:
+            write_points(output, replace(table, points=moved), double=not table.single)
+        else:
+            write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
+        notices = (table if splats is None else splats).notices
+        farthest = float(np.linalg.norm(moved - points, axis=1).max())
+        notices = [*notices, *deformer.notices]
+        return {"points": len(points), "farthest": farthest, "left_out": len(out), "notices": notices}
 
 
 def _read_handles(path):

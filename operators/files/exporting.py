@@ -10,6 +10,7 @@ from bpy_extras.io_utils import ExportHelper
 from ...core import PointCloudError, write_splats
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
+from ..objects.place import place_of
 from ..objects.reading import read_points
 from ..objects.result import read_eigenvalues
 from ..objects.splats import has_splats
@@ -17,7 +18,7 @@ from ..running import cache
 from ..running.application import build_operator
 from ..running.job import JobOperator
 from ..running.ready import reporting
-from .objects import analysis_arrays, file_filter, place_of, point_table, save_arrays
+from .objects import analysis_arrays, file_filter, point_table, save_arrays
 from .splats import splats_to_write
 
 

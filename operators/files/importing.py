@@ -15,11 +15,12 @@ from ...core.splats import holds_splats
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
 from ..objects.handlers import tell
+from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
-from .objects import OFFSET, add_object, file_filter, known_offset, offset_of
+from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
 

@@ -18,10 +18,11 @@ from ..objects.attributes import (
     type_of,
     write_attribute,
 )
+from ..objects.groups import add_group, has_group
 from ..objects.handlers import tell
+from ..objects.place import OFFSET, place_of
 from ..objects.reading import TYPES, seen_positions
 
-OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
 INPUTS = (*READABLE, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
 _COLORS = ("BYTE_COLOR", "FLOAT_COLOR")
@@ -36,21 +37,6 @@ def file_filter(*suffixes):
         default=";".join(f"*{suffix}" for suffix in suffixes),
         options={"HIDDEN"},
     )
-
-
-def offset_of(obj):
-    """Return what is added to an object's coordinates in the world to get those of its file, (3,) float64."""
-    return np.array(obj.get(OFFSET, (0.0, 0.0, 0.0)), dtype=np.float64)
-
-
-def place_of(obj):
-    """Return what is added to points with the object's scale and rotation to get those of its file, (3,) float64."""
-    return np.array(obj.matrix_world.translation, dtype=np.float64) + offset_of(obj)
-
-
-def known_offset(scene):
-    """Return the offset of the first object of a scene that has one, which others share if they can; or None."""
-    return next((offset_of(obj) for obj in scene.objects if OFFSET in obj), None)
 
 
 def add_object(name, table, collection, known=None, with_attributes=True):
@@ -167,7 +153,7 @@ def _read_colors(data):
     return np.clip(colors.reshape(-1, 4), 0.0, 1.0)
 
 
-def load(path, name: str = ""):
+def load(path, name: str = "", option: str = "--object"):
     """Open a file in place of everything that is loaded.
 
     Parameters
@@ -176,6 +162,8 @@ def load(path, name: str = ""):
         A file of one of the kinds in `INPUTS`.
     name : str
         The object's name; empty for the active one, or else the only mesh.
+    option : str
+        Of the command line, by which one names it.
 
     Returns
     -------
@@ -199,10 +187,10 @@ def load(path, name: str = ""):
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
     else:
         raise PointCloudError(f"There is no file {path}. Check its name and folder.")
-    return _choose_object(path, name), notices
+    return _choose_object(path, name, option), notices
 
 
-def _choose_object(path, name):
+def _choose_object(path, name, option):
     bpy.context.view_layer.update()
     meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
     active = bpy.context.view_layer.objects.active
@@ -217,13 +205,37 @@ def _choose_object(path, name):
     if len(chosen) != 1:
         names = ", ".join(obj.name for obj in meshes)
         what = f'mesh object "{name}"' if name else "active mesh object"
-        raise PointCloudError(f"{path} has no {what}. Name one of its mesh objects with --object: {names}.")
+        raise PointCloudError(f"{path} has no {what}. Name one of its mesh objects with {option}: {names}.")
     bpy.context.view_layer.objects.active = chosen[0]
     return chosen[0]
 
 
-def save(path, obj, arrays):
-    """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, the points, or the arrays by name."""
+def group_of(obj, name):
+    """Return the name of an object's group; of a mesh that has a column of that name instead, of a group made of it.
+
+    Weights are its numbers, from 0 to 1; of whole numbers all but 0 count.
+    """
+    column = None if obj.type != "MESH" or has_group(obj, name) else obj.data.attributes.get(name)
+    if column is None or not _is_column(column):
+        return name
+    weights = read_attribute(obj.data, name)
+    if weights.ndim > 1:
+        raise PointCloudError(f'The column "{name}" of "{obj.name}" holds vectors. Name one with a number a point.')
+    if weights.dtype.kind != "f":
+        weights = weights.astype(bool)
+    if not ((weights >= 0.0) & (weights <= 1.0)).all():
+        raise PointCloudError(
+            f'The column "{name}" of "{obj.name}" has numbers that are not from 0 to 1, so they are no weights. Name'
+            " another, or let it hold 1 for the points of the group and 0 for others."
+        )
+    return add_group(obj, f"{name} (column)", weights).name
+
+
+def save(path, obj, arrays, shown=""):
+    """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, the points, or the arrays by name.
+
+    The scene shows the attribute `shown`, or else another result that the points have.
+    """
     suffix = path.suffix.lower()
     if suffix == ".npz":
         save_arrays(path, arrays)
@@ -233,11 +245,36 @@ def save(path, obj, arrays):
     else:
         for other in bpy.context.view_layer.objects:
             other.select_set(other == obj)
-        names = [name for name in (*APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
+        names = [name for name in (shown, *APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
         if names:
             tell("result_written", obj, names[0])
-        path.parent.mkdir(parents=True, exist_ok=True)
-        bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))
+        save_scene(path)
+
+
+def save_scene(path):
+    """Write all that is open to a .blend file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))
+
+
+def faces_of(obj):
+    """Return the faces of an object, turned as they are seen in the world.
+
+    Returns
+    -------
+    list of ndarray, (m, k) int32
+        One for each number k of corners.
+    """
+    mesh = obj.data
+    corners = np.empty(len(mesh.loops), np.int32)
+    starts, counts = np.empty((2, len(mesh.polygons)), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    mesh.polygons.foreach_get("loop_start", starts)
+    mesh.polygons.foreach_get("loop_total", counts)
+    turn = -1 if obj.matrix_world.determinant() < 0.0 else 1
+    return [
+        corners[starts[counts == count, None] + np.arange(count)][:, ::turn] for count in np.unique(counts).tolist()
+    ]
 
 
 def save_arrays(path, arrays):

@@ -114,6 +114,16 @@ def chosen_members(obj, name: str, setting: str, least: int = 1):
     return chosen_weights(obj, name, setting, least) > 0.0
 
 
+def add_group(obj, name: str, weights):
+    """Add a vertex group of the weights of all points, (n,) from 0 to 1; those of weight 0 stay outside."""
+    group = obj.vertex_groups.new(name=name)
+    order = np.argsort(weights, kind="stable")
+    for part in np.split(order, np.flatnonzero(np.diff(weights[order])) + 1):
+        if weights[part[0]]:
+            group.add(part.tolist(), float(weights[part[0]]), "REPLACE")
+    return group
+
+
 def check_assignable(obj, name: str, must_exist: bool):
     """Refuse a group that points cannot be assigned to, or removed from."""
     kind, exists = group_kind(obj), has_group(obj, name)

@@ -28,6 +28,11 @@ class Tool:
     adjustable = ()  # names of those that Adjust Last Operation, which waits, offers: they compute nothing long again
     writes = ()  # names of the attributes that `write` makes
 
+    @property
+    def shown(self) -> str:
+        """Name of the attribute that shows the result; empty if it is none."""
+        return self.writes[0] if self.writes else ""
+
     def plan_all(self, context, objects, among=()):
         """Return name and plan of each object, if it can be written to; for `among` see `check_writable`."""
         plans = []
@@ -108,11 +113,6 @@ class ShownOperator(ApplicationOperator):
 
     show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
     adjustable = ("show",)
-
-    @property
-    def shown(self) -> str:
-        """Name of the attribute."""
-        return self.writes[0]
 
     def conclude(self, context, objects):
         sharing = [other for obj in objects for other in sharing_objects(obj) if other in context.selected_objects]

@@ -10,7 +10,7 @@ from ..objects.attributes import CELL, DIRECTION, SIGNED_DISTANCE, UV, tag_chang
 from ..objects.groups import SOURCE
 from ..objects.result import length_text
 from ..running import cache
-from ..running.application import ShownOperator, operator_reader
+from ..running.application import ShownOperator, Tool, operator_reader
 from .select import read_sources
 
 OUTSIDE = -1.0  # place in the texture of points that the map does not reach: beyond its border
@@ -20,11 +20,9 @@ def _transport(laplacian, progress):
     return cache.result(laplacian, "transport", compute=lambda: Transport(laplacian, progress=progress))
 
 
-class MESHFREE_OT_nearest_source(ShownOperator, bpy.types.Operator):
-    """Divide the surface into cells: the points that are nearest, along the surface, to the same source"""
+class NearestSource(Tool):
+    """The settings and the work of `meshfree.nearest_source`."""
 
-    bl_idname = "meshfree.nearest_source"
-    bl_label = "Nearest Source"
     writes = (CELL,)
     asks = ("group", "show")
 
@@ -58,11 +56,16 @@ class MESHFREE_OT_nearest_source(ShownOperator, bpy.types.Operator):
         return [far, line] if missed else [line]
 
 
-class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
-    """Lay the surface around a point out flat as texture coordinates: a decal that follows the surface"""
+class MESHFREE_OT_nearest_source(NearestSource, ShownOperator, bpy.types.Operator):
+    """Divide the surface into cells: the points that are nearest, along the surface, to the same source"""
 
-    bl_idname = "meshfree.unwrap"
-    bl_label = "Unwrap Around Point"
+    bl_idname = "meshfree.nearest_source"
+    bl_label = "Nearest Source"
+
+
+class Unwrap(Tool):
+    """The settings and the work of `meshfree.unwrap`."""
+
     writes = (UV,)
     asks = ("group", "radius", "angle", "show")
     adjustable = ("radius", "angle", "show")
@@ -121,11 +124,16 @@ class MESHFREE_OT_unwrap(ShownOperator, bpy.types.Operator):
         return [f"{obj.name}: texture coordinates up to {length_text(border)} from the middle"]
 
 
-class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
-    """Carry a direction at some points along the surface to all others, for hair, scratches or brush strokes"""
+class MESHFREE_OT_unwrap(Unwrap, ShownOperator, bpy.types.Operator):
+    """Lay the surface around a point out flat as texture coordinates: a decal that follows the surface"""
 
-    bl_idname = "meshfree.extend_direction"
-    bl_label = "Extend Direction"
+    bl_idname = "meshfree.unwrap"
+    bl_label = "Unwrap Around Point"
+
+
+class ExtendDirection(Tool):
+    """The settings and the work of `meshfree.extend_direction`."""
+
     writes = (DIRECTION,)
     asks = ("group", "direction", "show")
 
@@ -174,11 +182,16 @@ class MESHFREE_OT_extend_direction(ShownOperator, bpy.types.Operator):
         return [far, line] if missed else [line]
 
 
-class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
-    """Measure the distance along the surface from a curve on it: above zero on its left, below zero on its right"""
+class MESHFREE_OT_extend_direction(ExtendDirection, ShownOperator, bpy.types.Operator):
+    """Carry a direction at some points along the surface to all others, for hair, scratches or brush strokes"""
 
-    bl_idname = "meshfree.signed_distance"
-    bl_label = "Signed Distance"
+    bl_idname = "meshfree.extend_direction"
+    bl_label = "Extend Direction"
+
+
+class SignedDistance(Tool):
+    """The settings and the work of `meshfree.signed_distance`."""
+
     writes = (SIGNED_DISTANCE,)
     asks = ("curve", "show")
 
@@ -188,9 +201,8 @@ class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
     )
 
     def plan(self, context, obj):
-        places, closed = _read_curve(context, self.curve)
+        places, closed = self.way(context, obj)
         reading, operator = operator_reader(context, obj)
-        places = places - np.array(obj.matrix_world.translation)  # points are read without it
 
         def compute(progress):
             laplacian = operator(progress)
@@ -212,6 +224,11 @@ class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
 
         return compute
 
+    def way(self, context, obj):
+        """Return the places that the curve goes through, (k, 3), as points are read, and whether it is closed."""
+        places, closed = _read_curve(context, self.curve)
+        return places - np.array(obj.matrix_world.translation), closed  # points are read without it
+
     def write(self, context, obj, result):
         reached = np.isfinite(result)
         write_attribute(obj.data, SIGNED_DISTANCE, np.where(reached, result, 0.0))
@@ -220,6 +237,13 @@ class MESHFREE_OT_signed_distance(ShownOperator, bpy.types.Operator):
         missed, line = np.count_nonzero(~reached), f"{obj.name}: {low} on the right to {high} on the left"
         far = f"{missed:,} points of {obj.name} are not reached from the curve. Their distance is 0."
         return [far, line] if missed else [line]
+
+
+class MESHFREE_OT_signed_distance(SignedDistance, ShownOperator, bpy.types.Operator):
+    """Measure the distance along the surface from a curve on it: above zero on its left, below zero on its right"""
+
+    bl_idname = "meshfree.signed_distance"
+    bl_label = "Signed Distance"
 
 
 def _read_curve(context, name):

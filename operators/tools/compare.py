@@ -8,17 +8,14 @@ from ...core import PointCloudError, surface_deviation
 from ..objects.attributes import COMPARED, DEVIATION, tag_changed, write_attribute
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
-from ..running.application import ShownOperator, naming, operator_reader
+from ..running.application import ShownOperator, Tool, naming, operator_reader
 
 
-class MESHFREE_OT_compare(ShownOperator, bpy.types.Operator):
-    """Measure how far the points of the active object are from the surface of the other selected one"""
+class Compare(Tool):
+    """The settings and the work of `meshfree.compare`."""
 
-    bl_idname = "meshfree.compare"
-    bl_label = "Compare Points"
     writes = (DEVIATION, COMPARED)
     asks = ("greatest", "show")
-    only_active = True
 
     greatest: FloatProperty(
         name="Greatest Distance",
@@ -28,25 +25,10 @@ class MESHFREE_OT_compare(ShownOperator, bpy.types.Operator):
         subtype="DISTANCE",
     )
 
-    @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason:
-            return reason
-        count = len(_others(context))
-        if count != 1:
-            many = f"{count} others are" if count else "no other is"
-            return f'"{context.object.name}" is compared with one other cloud, and {many} selected. Select one'
-        return obstacle(_others(context)[0])
-
     def plan(self, context, obj):
-        [other] = _others(context)
         reading, operator = operator_reader(context, obj)
-        with naming(other.name):
-            _, other_operator = operator_reader(context, other)
-        # Points are read without the place of their objects: here as they lie about the other one.
-        shift = np.array(obj.matrix_world.translation) - np.array(other.matrix_world.translation)
-        greatest, own_name, name = self.greatest or None, obj.name, other.name
+        name, other_operator, shift = self.other(context, obj)
+        greatest, own_name = self.greatest or None, obj.name
 
         def compute(progress):
             normals = operator(lambda stage, fraction: progress(stage, 0.4 * fraction)).normals
@@ -68,14 +50,20 @@ class MESHFREE_OT_compare(ShownOperator, bpy.types.Operator):
 
         return compute
 
+    def other(self, context, obj):
+        """Return the name of the other cloud, what gives its operator, and how points lie about it, less as read."""
+        [other] = _others(context)
+        with naming(other.name):
+            _, operator = operator_reader(context, other)
+        # Points are read without the place of their objects.
+        return other.name, operator, np.array(obj.matrix_world.translation) - np.array(other.matrix_world.translation)
+
     def write(self, context, obj, result):
         found, name = result
         write_attribute(obj.data, DEVIATION, found.distance)
         write_attribute(obj.data, COMPARED, found.known)
         tag_changed(obj.data)
-        sizes = np.abs(found.distance[found.known])
-        mean, most = length_text(sizes.mean()), length_text(sizes.max())
-        within = length_text(np.percentile(sizes, 95.0))
+        mean, within, most = map(length_text, distances(found))
         line = f"{obj.name}: {mean} from {name} on average, 95 % within {within}, {most} at most"
         left = np.count_nonzero(~found.known)
         if not left:
@@ -85,6 +73,31 @@ class MESHFREE_OT_compare(ShownOperator, bpy.types.Operator):
             f" not compared, and {COMPARED} is false there."
         )
         return [notice, line]
+
+
+def distances(found):
+    """Return of a `Deviation` the mean distance, what 95 % of the points are within, and the greatest one."""
+    sizes = np.abs(found.distance[found.known])
+    return float(sizes.mean()), float(np.percentile(sizes, 95.0)), float(sizes.max())
+
+
+class MESHFREE_OT_compare(Compare, ShownOperator, bpy.types.Operator):
+    """Measure how far the points of the active object are from the surface of the other selected one"""
+
+    bl_idname = "meshfree.compare"
+    bl_label = "Compare Points"
+    only_active = True
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason:
+            return reason
+        count = len(_others(context))
+        if count != 1:
+            many = f"{count} others are" if count else "no other is"
+            return f'"{context.object.name}" is compared with one other cloud, and {many} selected. Select one'
+        return obstacle(_others(context)[0])
 
 
 def _others(context):

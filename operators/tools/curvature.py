@@ -56,6 +56,10 @@ class Curvatures(Tool):
         default="SHAPE_INDEX",
     )
 
+    @property
+    def shown(self):
+        return _SHOWN[self.display]
+
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)
 
@@ -81,10 +85,6 @@ class MESHFREE_OT_principal_curvatures(Curvatures, ShownOperator, bpy.types.Oper
 
     bl_idname = "meshfree.principal_curvatures"
     bl_label = "Principal Curvatures"
-
-    @property
-    def shown(self):
-        return _SHOWN[self.display]
 
 
 class Roughness(Tool):

@@ -9,17 +9,15 @@ from ..objects.attributes import DISTANCE, FIELD, point_count, read_attribute, t
 from ..objects.groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind
 from ..objects.result import length_text
 from ..running import cache
-from ..running.application import ShownOperator, operator_reader
+from ..running.application import ShownOperator, Tool, operator_reader
 from .select import read_sources
 
 UNREACHED = -1.0  # distance of points that no source reaches
 
 
-class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
-    """Fill in a smooth field between points with given values, or solve Poisson's equation"""
+class HarmonicField(Tool):
+    """The settings and the work of `meshfree.harmonic_field`."""
 
-    bl_idname = "meshfree.harmonic_field"
-    bl_label = "Harmonic Field"
     writes = (FIELD,)
 
     values: EnumProperty(
@@ -113,11 +111,16 @@ class MESHFREE_OT_harmonic_field(ShownOperator, bpy.types.Operator):
         return [f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"]
 
 
-class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
-    """Measure the distance along the surface from a group of points, or from the selected ones"""
+class MESHFREE_OT_harmonic_field(HarmonicField, ShownOperator, bpy.types.Operator):
+    """Fill in a smooth field between points with given values, or solve Poisson's equation"""
 
-    bl_idname = "meshfree.geodesic_distance"
-    bl_label = "Geodesic Distance"
+    bl_idname = "meshfree.harmonic_field"
+    bl_label = "Harmonic Field"
+
+
+class GeodesicDistance(Tool):
+    """The settings and the work of `meshfree.geodesic_distance`."""
+
     writes = (DISTANCE,)
     asks = ("group", "show")
 
@@ -155,6 +158,13 @@ class MESHFREE_OT_geodesic_distance(ShownOperator, bpy.types.Operator):
         missed, line = np.count_nonzero(~reached), f"{obj.name}: distances up to {length_text(result[reached].max())}"
         far = f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."
         return [far, line] if missed else [line]
+
+
+class MESHFREE_OT_geodesic_distance(GeodesicDistance, ShownOperator, bpy.types.Operator):
+    """Measure the distance along the surface from a group of points, or from the selected ones"""
+
+    bl_idname = "meshfree.geodesic_distance"
+    bl_label = "Geodesic Distance"
 
 
 CLASSES = (MESHFREE_OT_harmonic_field, MESHFREE_OT_geodesic_distance)

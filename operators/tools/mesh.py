@@ -8,9 +8,11 @@ from bpy.props import BoolProperty, FloatProperty
 from ...core import mesh_surface, values_on_mesh
 from ..objects.attributes import DIRECTION_1, DISC, NORMAL, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
+from ..objects.groups import add_group
 from ..objects.handlers import tell
+from ..objects.place import OFFSET
 from ..running import cache
-from ..running.application import ApplicationOperator, operator_reader
+from ..running.application import ApplicationOperator, Tool, operator_reader
 
 _COLORS = "FLOAT_COLOR", "BYTE_COLOR"
 _LEFT = DISC, "position"  # attributes that mean nothing on a mesh, or something else
@@ -18,14 +20,12 @@ _GAP = 12  # edges around a hole that is no opening, but a gap between points
 _STEPS = 255  # of weights
 
 
-class MESHFREE_OT_mesh_surface(ApplicationOperator, bpy.types.Operator):
-    """Make a mesh of the surface that the points lie on, with their results, colors and groups on its vertices"""
+class MeshSurface(Tool):
+    """The settings and the work of `meshfree.mesh_surface`."""
 
-    bl_idname = "meshfree.mesh_surface"
-    bl_label = "Surface from Points"
     asks = ("detail", "keep_open")
     adjustable = ("keep_open",)
-    _made = ()  # names of objects, and of those that hold their meshes
+    made = ()  # names of objects, of those that hold their meshes, and how many edges of these are open
 
     detail: FloatProperty(
         name="Detail",
@@ -66,18 +66,20 @@ class MESHFREE_OT_mesh_surface(ApplicationOperator, bpy.types.Operator):
         for collection in obj.users_collection:
             collection.objects.link(made)
         made.matrix_world = obj.matrix_world
+        if OFFSET in obj:
+            made[OFFSET] = obj[OFFSET]
         opened = _close(made.data, _GAP if self.keep_open else 0)
         carried.write(made)
         for name in COLOR_CHOICES:
             setattr(made.meshfree, name, getattr(obj.meshfree, name))
-        self._made = (*self._made, (obj.name, made.name))
+        self.made = (*self.made, (obj.name, made.name, opened))
         state = "closed" if not opened else "open"
         return [f"{made.name}: {len(made.data.polygons):,} faces, {state}. The points are hidden"]
 
     def conclude(self, context, objects):
         """Show the meshes as their points were shown, and hide these."""
-        made = {name: bpy.data.objects[other] for name, other in self._made}
-        self._made = ()
+        made = {name: bpy.data.objects[other] for name, other, _ in self.made}
+        self.made = ()
         for obj in objects:
             tell("mesh_made", obj, made[obj.name])
         for other in context.selected_objects:
@@ -87,6 +89,13 @@ class MESHFREE_OT_mesh_surface(ApplicationOperator, bpy.types.Operator):
         context.view_layer.objects.active = made[objects[0].name]
         for obj in objects:
             obj.hide_set(True)
+
+
+class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Operator):
+    """Make a mesh of the surface that the points lie on, with their results, colors and groups on its vertices"""
+
+    bl_idname = "meshfree.mesh_surface"
+    bl_label = "Surface from Points"
 
 
 class _Kept:
@@ -135,12 +144,7 @@ class _Kept:
             else:
                 write_attribute(obj.data, name, values, self._types[name])
         for name, weights in self._groups.items():
-            group = obj.vertex_groups.new(name=name)
-            steps = np.round(_STEPS * weights).astype(int)
-            order = np.argsort(steps, kind="stable")
-            for part in np.split(order, np.flatnonzero(np.diff(steps[order])) + 1):
-                if steps[part[0]]:
-                    group.add(part.tolist(), steps[part[0]] / _STEPS, "REPLACE")
+            add_group(obj, name, np.round(_STEPS * weights) / _STEPS)
 
 
 def _weights(obj):

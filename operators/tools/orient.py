@@ -9,15 +9,13 @@ from ..objects.attributes import NORMAL, ORIENTATION, RESULTS, read_attribute
 from ..objects.reading import read_points
 from ..objects.result import write_result
 from ..running import cache
-from ..running.application import ShownOperator
+from ..running.application import ShownOperator, Tool
 from .analyze import WRITE_LIMIT, plan_analysis
 
 
-class MESHFREE_OT_orient_normals(ShownOperator, bpy.types.Operator):
-    """Choose the side that normals point to, for this object's results and all that is computed of it later"""
+class OrientNormals(Tool):
+    """The settings and the work of `meshfree.orient_normals`."""
 
-    bl_idname = "meshfree.orient_normals"
-    bl_label = "Orient Normals"
     writes = (*RESULTS, ORIENTATION)
     shown = NORMAL
     asks = ("method", "viewpoint", "source", "holds", "flip", "show")
@@ -53,13 +51,7 @@ class MESHFREE_OT_orient_normals(ShownOperator, bpy.types.Operator):
     def plan(self, context, obj):
         reading = read_points(context, obj)
         method, sign = self.method, -1.0 if self.flip else 1.0
-        viewpoint = None
-        if method == "VIEWPOINT":
-            viewpoint = _place(context, obj, self.viewpoint)
-        elif method == "ATTRIBUTE":
-            viewpoint = _vectors(obj, self.source) @ reading.matrix.T
-            if self.holds == "DIRECTIONS":
-                viewpoint += reading.points
+        viewpoint = self.seen_from(context, obj, reading)
         way = {"WINDING": "winding", "OUTSIDE": "outside"}.get(method, "viewpoint")
 
         def orient(measured, progress):
@@ -75,12 +67,28 @@ class MESHFREE_OT_orient_normals(ShownOperator, bpy.types.Operator):
 
         return plan_analysis(context, obj, orient=orient)
 
+    def seen_from(self, context, obj, reading):
+        """Return the places that points, as they are read, were seen from, (3,) or (n, 3); None if no method asks."""
+        if self.method == "VIEWPOINT":
+            return _place(context, obj, self.viewpoint)
+        if self.method != "ATTRIBUTE":
+            return None
+        vectors = _vectors(obj, self.source) @ reading.matrix.T
+        return vectors + reading.points if self.holds == "DIRECTIONS" else vectors
+
     def write(self, context, obj, result):
         before = obj.data.attributes.get(NORMAL)
         turned = None if before is None else _turned(read_attribute(obj.data, NORMAL), result.local_normals)
         write_result(obj, result, WRITE_LIMIT, oriented=True)
         told = "normals oriented" if turned is None else f"{turned:,} of {len(result.local_normals):,} normals reversed"
         return [*result.notices, f"{obj.name}: {told}"]
+
+
+class MESHFREE_OT_orient_normals(OrientNormals, ShownOperator, bpy.types.Operator):
+    """Choose the side that normals point to, for this object's results and all that is computed of it later"""
+
+    bl_idname = "meshfree.orient_normals"
+    bl_label = "Orient Normals"
 
 
 def _turned(before, after):

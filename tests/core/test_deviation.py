@@ -54,6 +54,16 @@ def test_points_beside_the_other_surface_are_not_compared():
     assert found.distance[:2].tolist() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("far", [1e2, 1e4, 4e6, 1e9])
+def test_clouds_that_are_far_apart(far):
+    """As when one is in the coordinates of a national grid, and the other is not: nothing is met."""
+    normals = random_sphere(1500, 0)
+    rough = normals * (1.0 + 0.2 * np.sin(5.0 * normals[:, :1]) * np.sin(7.0 * normals[:, 1:2]))
+    found = core.surface_deviation(normals + [0.1 * far, far, 0.0], normals, core.build_laplacian(rough))
+    assert not found.known.any()
+    assert not found.distance.any()
+
+
 def test_normals_along_the_surface_meet_nothing():
     laplacian = core.build_laplacian(square_grid(40))
     found = core.surface_deviation([[0.5, 0.5, 0.2], [0.4, 0.5, 0.2]], [[1.0, 0.0, 0.0]] * 2, laplacian)

@@ -1,0 +1,77 @@
+"""Meshes to files: vertices with what they hold, and faces."""
+
+import numpy as np
+
+from ..errors import PointCloudError
+from .origin import is_coarse
+from .ply import write_ply
+from .whole import replacing
+
+_BLOCK = 10_000  # lines that are written at once
+
+
+def write_mesh(path, table, faces, double=True):
+    """Write a mesh to a file of one of the kinds in `MESHES`; an older file stays if that fails.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    table : PointTable
+        The vertices.
+    faces : sequence of ndarray, (m, k) int
+        Faces of k corners each, as indices of vertices.
+    double : bool
+        Whether coordinates are kept in double precision; STL has none.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in MESHES:
+        raise PointCloudError(f"A mesh cannot be written to {path}. Give it one of {', '.join(MESHES)}.")
+    with replacing(path) as part:
+        _WRITERS[suffix](part, table, double, faces)
+
+
+def _write_obj(path, table, double, faces):
+    """Write text: vertices, with colors after the coordinates if they have any, and faces."""
+    values, digits = table.points, "%.15g" if double else "%.9g"
+    line = " ".join(["v", *3 * [digits]])
+    if table.colors is not None:
+        values, line = np.hstack([values, table.colors[:, :3]]), " ".join([line, *3 * ["%.6g"]])
+    with open(path, "w", encoding="utf-8", newline="\n") as file:
+        _write_rows(file, line, values)
+        for part in faces:
+            _write_rows(file, " ".join(["f", *part.shape[1] * ["%d"]]), part + 1)
+
+
+def _write_rows(file, line, rows):
+    line += "\n"
+    for start in range(0, len(rows), _BLOCK):
+        block = rows[start : start + _BLOCK]
+        file.write((line * len(block)) % tuple(block.reshape(-1).tolist()))
+
+
+def _write_stl(path, table, double, faces):
+    """Write binary triangles, in single precision, which is all that STL has."""
+    if is_coarse(table.points):
+        raise PointCloudError(
+            "STL keeps single precision, too little for coordinates as large as these. Write .ply or .obj."
+        )
+    corners = np.concatenate([_triangles(part) for part in faces]) if len(faces) else np.zeros((0, 3), int)
+    places = table.points[corners]
+    normals = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    rows = np.zeros(len(corners), [("normal", "<f4", 3), ("places", "<f4", (3, 3)), ("unused", "<u2")])
+    rows["normal"], rows["places"] = normals / np.where(lengths > 0.0, lengths, 1.0), places
+    with open(path, "wb") as file:
+        file.write(b"triangles of a mesh".ljust(80))
+        file.write(np.array(len(rows), "<u4").tobytes())
+        rows.tofile(file)
+
+
+def _triangles(faces):
+    """Divide faces of k corners, (m, k), into fans of triangles, (m (k - 2), 3)."""
+    fans = [faces[:, [0, corner, corner + 1]] for corner in range(1, faces.shape[1] - 1)]
+    return np.stack(fans, axis=1).reshape(-1, 3)
+
+
+_WRITERS = {".ply": write_ply, ".obj": _write_obj, ".stl": _write_stl}
+MESHES = tuple(_WRITERS)

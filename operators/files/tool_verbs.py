@@ -1,0 +1,231 @@
+"""Verbs of tools that take more than settings: places, other files, or another kind of output."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...core.files import MESHES, READABLE, read_points, write_mesh
+from ..objects.attributes import point_count
+from ..objects.groups import assign
+from ..objects.place import offset_of, place_of
+from ..running.application import naming, operator_reader
+from ..tools.along import SignedDistance
+from ..tools.compare import Compare, distances
+from ..tools.mesh import MeshSurface
+from ..tools.orient import OrientNormals
+from . import objects as files
+from .arguments import as_place, place
+from .verbs import LEFT_OUT, Apply
+
+_PLACES = "--at"  # group of the points nearest to places
+
+
+class FromSources(Apply):
+    """A tool that starts at some points: those of a group, or those nearest to places."""
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--at",
+            type=place,
+            action="append",
+            metavar="X,Y,Z",
+            help="place in the coordinates of the file: the nearest point is a source. Give it once for each source, as"
+            " --at=X,Y,Z where X is below zero",
+        )
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        if arguments.at and arguments.group:
+            parser.error("--at and --group both say which points are the sources: give one of them")
+        known = arguments.at or arguments.group or all(path.suffix.lower() == ".blend" for path in arguments.inputs)
+        if not known:  # other files have no default group, and nothing selected
+            parser.error("nothing says which points are the sources: give --at X,Y,Z, or --group with a column's name")
+
+    def prepare(self, tool, obj, path, arguments):
+        if arguments.at:
+            nearest = cKDTree(files.file_points(obj)).query(arguments.at)[1]
+            tool.group = _PLACES
+            assign(obj, tool.group, np.isin(np.arange(point_count(obj.data)), nearest), "REPLACE", 1.0)
+
+
+class AlongCurve(Apply):
+    """The verb `signed-distance`, with a curve of a file."""
+
+    left_out = LEFT_OUT | {"curve"}
+    reads = ("curve",)
+
+    def __init__(self):
+        super().__init__("signed_distance", _SignedDistanceInFile)
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--curve",
+            required=True,
+            metavar="FILE",
+            help=f"points of a curve on the surface in their order: {', '.join(READABLE)}; or the name of a curve"
+            " object of a .blend file",
+        )
+        parser.add_argument("--closed", action="store_true", help="join the last point of the file with the first")
+        super().add_options(parser)
+
+    def prepare(self, tool, obj, path, arguments):
+        tool.curve, tool.closed = arguments.curve, arguments.closed
+        curve = Path(arguments.curve)
+        if curve.suffix.lower() in READABLE:
+            tool.places = read_points(curve).points
+
+
+class _SignedDistanceInFile(SignedDistance):
+    """The same tool, with a curve in the coordinates of the file."""
+
+    places = None  # (k, 3), if it is no object
+    closed = False
+
+    def way(self, context, obj):
+        return super().way(context, obj) if self.places is None else (self.places - place_of(obj), self.closed)
+
+
+class Mesh(Apply):
+    """The verb `mesh`, whose outputs are files of meshes."""
+
+    outputs = (".blend", *MESHES)
+
+    def __init__(self):
+        super().__init__("mesh_surface", MeshSurface)
+        self.name = "mesh"
+
+    def save(self, tool, obj, output):
+        made = bpy.data.objects[tool.made[0][1]]
+        if output.suffix.lower() == ".blend":
+            tool.conclude(bpy.context, [obj])
+            files.save_scene(output)
+        else:
+            table = files.point_table(bpy.context, made)
+            write_mesh(output, table, files.faces_of(made), double=not table.single)
+
+    def figures(self, tool, result):
+        ((_, name, opened),) = tool.made
+        mesh = bpy.data.objects[name].data
+        return {"vertices": len(mesh.vertices), "faces": len(mesh.polygons), "open_edges": opened}
+
+
+class CompareWith(Apply):
+    """The verb `compare`: all inputs with one other file."""
+
+    reads = ("reference",)
+
+    def __init__(self):
+        super().__init__("compare", _CompareWithFile)
+        self.help = "how far points are from the surface of those of another file"
+        self._reference = None
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--reference",
+            type=Path,
+            required=True,
+            metavar="FILE",
+            help="point cloud whose surface distances are measured from, of the kinds of inputs",
+        )
+        parser.add_argument(
+            "--reference-object",
+            default="",
+            metavar="NAME",
+            help="its object, if it is a .blend file; else the active one",
+        )
+        super().add_options(parser)
+
+    def run(self, path, arguments, output):
+        if self._reference is None:  # before the input, which takes its place in Blender
+            self._reference = self._read(arguments)
+        result = super().run(path, arguments, output)
+        return {**result, "notices": self._reference.notices + result["notices"]}
+
+    def _read(self, arguments):
+        obj, notices = self.open(arguments.reference, "reference_object", arguments)
+        with naming(str(arguments.reference)):
+            _, build = operator_reader(bpy.context, obj)
+        return _Reference(str(arguments.reference), place_of(obj), build, notices)
+
+    def prepare(self, tool, obj, path, arguments):
+        tool.reference = self._reference
+
+    def figures(self, tool, result):
+        found, _ = result
+        mean, within, most = distances(found)
+        return {
+            "compared_count": int(np.count_nonzero(found.known)),
+            "mean_distance": mean,
+            "distance_95": within,
+            "greatest_distance": most,
+        }
+
+
+class _Reference:
+    """A cloud that others are compared with: its operator is built once, when the first of them asks for it."""
+
+    def __init__(self, name, place, build, notices):
+        self.name, self.place, self.notices = name, place, notices
+        self._build, self._laplacian = build, None
+
+    def operator(self, progress):
+        if self._laplacian is None:
+            self._laplacian = self._build(progress)
+        return self._laplacian
+
+
+class _CompareWithFile(Compare):
+    """The same tool, with a cloud that is no object of the scene, both in the coordinates of their files."""
+
+    reference = None
+
+    def other(self, context, obj):
+        return self.reference.name, self.reference.operator, place_of(obj) - self.reference.place
+
+
+class Orient(Apply):
+    """The verb `orient`, with viewpoints in the coordinates of the file."""
+
+    left_out = LEFT_OUT | {"viewpoint"}
+
+    def __init__(self):
+        super().__init__("orient_normals", _OrientInFile)
+        self.name = "orient"
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--viewpoint",
+            metavar="X,Y,Z",
+            help="place in the coordinates of the file that the points were seen from, as --viewpoint=X,Y,Z where X is"
+            " below zero; or the name of an object of a .blend file. Sets the method VIEWPOINT",
+        )
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        implied = {"VIEWPOINT": arguments.viewpoint, "ATTRIBUTE": arguments.source}
+        for method, value in implied.items():
+            if value and arguments.method is None:
+                arguments.method = method
+            elif value and arguments.method != method:
+                option = "--viewpoint" if method == "VIEWPOINT" else "--source"
+                parser.error(f"{option} goes with the method {method}, not {arguments.method}")
+
+    def prepare(self, tool, obj, path, arguments):
+        tool.viewpoint = arguments.viewpoint or ""
+        tool.place = as_place(tool.viewpoint)
+        tool.shift = offset_of(obj) if path.suffix.lower() != ".blend" else 0.0
+
+
+class _OrientInFile(OrientNormals):
+    """The same tool, with places in the coordinates of the file, before the shift of large ones."""
+
+    place = None  # that the points were seen from, (3,), if it is no object
+    shift = 0.0  # of places that are columns of the file
+
+    def seen_from(self, context, obj, reading):
+        if self.method == "VIEWPOINT" and self.place is not None:
+            return self.place - place_of(obj)
+        found = super().seen_from(context, obj, reading)
+        return found - self.shift if self.method == "ATTRIBUTE" and self.holds == "POSITIONS" else found

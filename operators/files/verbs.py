@@ -1,0 +1,212 @@
+"""Verbs of the command line: what one is, the analysis, and those of tools that need nothing but their settings."""
+
+import bpy
+
+from ...core import PointCloudError
+from ..objects import options
+from ..objects.attributes import point_count
+from ..objects.place import place_of
+from ..objects.reading import obstacle, sharing_objects
+from ..objects.result import analysis_names, check_writable, write_result
+from ..running.application import compute_all
+from ..running.stages import Stages
+from ..tools.analyze import WRITE_LIMIT, plan_analysis
+from ..tools.sequence import continue_modes
+from . import objects as files
+from .arguments import add_setting
+
+ONE_LINE = "Writes one JSON line per input, with notices, or the error. The exit code is 1 if any input failed."
+_SETTINGS = (*options.ALL_NAMES, "make_single_user")  # of the object
+LEFT_OUT = {"rna_type", "show", "display", "target", "animate", "period"}  # of an operator: points are moved in place
+
+
+class Verb:
+    """What is done with each file. There is a new one for each command, which may keep what its files share.
+
+    A subclass says what by `run`, and which options that takes by `add_options`.
+    """
+
+    name = help = description = ""  # as the user writes it, what it is in a line, and in more
+    inputs = "files"
+    outputs = ()  # endings of the files that it can write, for folders the first one unless told; none to write nothing
+    reads = ()  # names of the options that give other files, which are never overwritten
+
+    def add_options(self, parser):
+        """Add what it takes beside inputs and outputs."""
+
+    def check(self, parser, arguments):
+        """Refuse options that do not go together, by `parser.error`."""
+
+    def run(self, path, arguments, output) -> dict:
+        """Work on one file, write the output unless it is None, and return what to print."""
+        raise NotImplementedError
+
+
+class ObjectVerb(Verb):
+    """A verb that opens a file as an object with the settings of the panel. A subclass works on it, by `work`."""
+
+    inputs = f"point clouds: {', '.join(files.INPUTS)}. Text has columns x y z and may have a header"
+    outputs = files.OUTPUTS
+
+    def __init__(self, operator):
+        self.name = operator.replace("_", "-")
+        self.operator = getattr(bpy.ops.meshfree, operator).get_rna_type()
+        self.help = self.operator.description[0].lower() + self.operator.description[1:]
+        self.description = (
+            f"{self.operator.description}. Writes one JSON line per input: points, what was done, seconds per stage,"
+            " notices; or the error. The exit code is 1 if any input failed."
+        )
+
+    def add_options(self, parser):
+        parser.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
+        settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
+        for name in _SETTINGS:
+            add_setting(parser, settings[name])
+
+    def run(self, path, arguments, output):
+        obj, notices = self.open(path, "object", arguments)
+        result = self.work(obj, path, arguments, output)
+        return {**result, "notices": notices + result["notices"]}
+
+    def open(self, path, option, arguments):
+        """Open a file in place of all that is loaded; return the object that an option names, set up, and notices."""
+        obj, notices = files.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}")
+        reason = obstacle(obj)
+        if reason:
+            raise PointCloudError(reason)
+        for setting in _SETTINGS:
+            value = getattr(arguments, setting)
+            if value is not None:
+                setattr(obj.meshfree, setting, files.group_of(obj, value) if _names_group(setting) else value)
+        return obj, notices
+
+    def work(self, obj, path, arguments, output) -> dict:
+        """Work on the object, write the output, and return what to print, with notices."""
+        raise NotImplementedError
+
+
+def _names_group(setting):
+    """Whether a setting of some name holds the name of a group of points."""
+    return setting == "group" or setting.endswith("_group")
+
+
+class Analyze(ObjectVerb):
+    """The verb `analyze`, for single files or for the frames of a sequence."""
+
+    def __init__(self):
+        super().__init__("analyze")
+        self.help = "areas, normals, curvature, boundaries and vibration modes of point clouds"
+        self.description = (
+            "Analyze point clouds. Writes one JSON line per input: points, total area, components, points at a"
+            " boundary, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1 if"
+            " any input failed."
+        )
+        self._earlier = None  # points and modes of the frame before
+
+    def add_options(self, parser):
+        parser.add_argument("--modes", type=int, default=0, metavar="N", help="how many vibration modes to compute")
+        parser.add_argument(
+            "--write-limit", type=int, default=WRITE_LIMIT, metavar="N", help="modes written as attributes at most"
+        )
+        parser.add_argument(
+            "--sequence",
+            action="store_true",
+            help="the inputs are frames in their order: each mode continues one of the frame before, with its sign, so"
+            " that eigenvalues need not ascend; overlaps of the two are written, too",
+        )
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        if arguments.modes < 0 or arguments.write_limit < 1:
+            parser.error("--modes takes a number of at least 0, --write-limit one of at least 1")
+        if arguments.sequence and not arguments.modes:
+            parser.error("--sequence matches modes: give --modes, too")
+
+    def work(self, obj, path, arguments, output):
+        check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
+        with Stages(bpy.context.window_manager, self.operator.name) as stages:
+            analysis = plan_analysis(bpy.context, obj, arguments.modes, arguments.write_limit)(stages)
+        matched = {}
+        if arguments.sequence:
+            analysis, overlaps, self._earlier = continue_modes(analysis, files.file_points(obj), self._earlier)
+            matched["overlaps"] = overlaps.tolist()
+        if sharing_objects(obj):  # by choice, or it would not be writable
+            obj.data = obj.data.copy()
+        write_result(obj, analysis, arguments.write_limit)
+        if output is not None:
+            files.save(output, obj, _arrays(obj, analysis))
+        return {
+            "points": len(analysis.measures.areas),
+            "total_area": analysis.total_area,
+            **analysis.counts,
+            "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
+            **matched,
+            "seconds": _rounded(analysis.seconds),
+            "notices": analysis.notices,
+        }
+
+
+def _arrays(obj, analysis):
+    """Arrays of an analysis by name; of one of a subset those that were carried to all points, without an operator."""
+    if analysis.subset_count:
+        return files.attribute_arrays(obj)
+    return files.analysis_arrays(place_of(obj), analysis.laplacian, analysis.measures.mean_curvature, analysis.spectrum)
+
+
+def _rounded(seconds):
+    return {name: round(spent, 3) for name, spent in seconds.items()}
+
+
+class Apply(ObjectVerb):
+    """The verb of a tool, by the name of its operator, whose settings are its options."""
+
+    left_out = LEFT_OUT
+
+    def __init__(self, operator, tool):
+        super().__init__(operator)
+        self._tool = tool
+        self._choices = [
+            item for item in self.operator.properties if item.identifier not in self.left_out and not item.is_hidden
+        ]
+
+    def add_options(self, parser):
+        for setting in self._choices:
+            add_setting(parser, setting)
+        super().add_options(parser)
+
+    def work(self, obj, path, arguments, output):
+        tool = self._tool()
+        values = {item.identifier: _default(item) for item in self.operator.properties if item.type != "POINTER"}
+        values |= {name: value for name, value in vars(arguments).items() if name in values and value is not None}
+        values |= {name: files.group_of(obj, value) for name, value in values.items() if _names_group(name)}
+        vars(tool).update(values, target="IN_PLACE")
+        self.prepare(tool, obj, path, arguments)
+        plans = tool.plan_all(bpy.context, [obj])
+        with Stages(bpy.context.window_manager, self.operator.name) as stages:
+            results = compute_all(plans, stages)
+        ((*notices, line),) = tool.write_all(bpy.context, [obj], results)
+        figures = self.figures(tool, results[0])
+        if output is not None:
+            self.save(tool, obj, output)
+        return {
+            "points": point_count(obj.data),
+            "done": line,
+            **figures,
+            "seconds": _rounded(stages.seconds),
+            "notices": notices,
+        }
+
+    def prepare(self, tool, obj, path, arguments):
+        """Give the tool what its settings do not hold."""
+
+    def save(self, tool, obj, output):
+        """Write the output."""
+        files.save(output, obj, files.attribute_arrays(obj), tool.shown)
+
+    def figures(self, tool, result) -> dict:
+        """Return numbers to print, beside the line about what was done."""
+        return {}
+
+
+def _default(setting):
+    return setting.default_array if getattr(setting, "is_array", False) else setting.default

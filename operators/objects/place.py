@@ -1,0 +1,20 @@
+"""Where an object's points were in the file that they come from: large coordinates are shifted at import."""
+
+import numpy as np
+
+OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
+
+
+def offset_of(obj):
+    """Return what is added to an object's coordinates in the world to get those of its file, (3,) float64."""
+    return np.array(obj.get(OFFSET, (0.0, 0.0, 0.0)), dtype=np.float64)
+
+
+def place_of(obj):
+    """Return what is added to points with the object's scale and rotation to get those of its file, (3,) float64."""
+    return np.array(obj.matrix_world.translation, dtype=np.float64) + offset_of(obj)
+
+
+def known_offset(scene):
+    """Return the offset of the first object of a scene that has one, which others share if they can; or None."""
+    return next((offset_of(obj) for obj in scene.objects if OFFSET in obj), None)
