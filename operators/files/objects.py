@@ -5,11 +5,9 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ...core import PointCloudError
-from ...core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, read_points, replacing, write_points
+from ...core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, replacing
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ..objects.attributes import (
-    APPLICATIONS,
-    MEAN_CURVATURE,
     NORMAL,
     PREFIX,
     STORABLE,
@@ -19,9 +17,8 @@ from ..objects.attributes import (
     write_attribute,
 )
 from ..objects.groups import add_group, has_group
-from ..objects.handlers import tell
 from ..objects.place import OFFSET, place_of
-from ..objects.reading import TYPES, seen_positions
+from ..objects.reading import seen_positions
 
 INPUTS = (*READABLE, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
@@ -153,63 +150,6 @@ def _read_colors(data):
     return np.clip(colors.reshape(-1, 4), 0.0, 1.0)
 
 
-def load(path, name: str = "", option: str = "--object"):
-    """Open a file in place of everything that is loaded.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        A file of one of the kinds in `INPUTS`.
-    name : str
-        The object's name; empty for the active one, or else the only mesh.
-    option : str
-        Of the command line, by which one names it.
-
-    Returns
-    -------
-    bpy.types.Object
-        The object to work on.
-    list of str
-        What of the file was left out.
-
-    Raises
-    ------
-    PointCloudError
-        There is no such file, or no such object in it, or no points.
-    """
-    notices = []
-    if path.suffix.lower() != ".blend":
-        table = read_points(path)
-        notices = table.notices
-        bpy.ops.wm.read_homefile(use_empty=True)
-        add_object(path.stem, table, bpy.context.scene.collection)
-    elif path.is_file():
-        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
-    else:
-        raise PointCloudError(f"There is no file {path}. Check its name and folder.")
-    return _choose_object(path, name, option), notices
-
-
-def _choose_object(path, name, option):
-    bpy.context.view_layer.update()
-    meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
-    active = bpy.context.view_layer.objects.active
-    if not meshes:
-        raise PointCloudError(f"{path} has no mesh object. Give a file with points.")
-    if name:
-        chosen = [obj for obj in meshes if obj.name == name]
-    elif active in meshes:
-        chosen = [active]
-    else:
-        chosen = meshes
-    if len(chosen) != 1:
-        names = ", ".join(obj.name for obj in meshes)
-        what = f'mesh object "{name}"' if name else "active mesh object"
-        raise PointCloudError(f"{path} has no {what}. Name one of its mesh objects with {option}: {names}.")
-    bpy.context.view_layer.objects.active = chosen[0]
-    return chosen[0]
-
-
 def group_of(obj, name):
     """Return the name of an object's group; of a mesh that has a column of that name instead, of a group made of it.
 
@@ -229,32 +169,6 @@ def group_of(obj, name):
             " another, or let it hold 1 for the points of the group and 0 for others."
         )
     return add_group(obj, f"{name} (column)", weights).name
-
-
-def save(path, obj, arrays, shown=""):
-    """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, the points, or the arrays by name.
-
-    The scene shows the attribute `shown`, or else another result that the points have.
-    """
-    suffix = path.suffix.lower()
-    if suffix == ".npz":
-        save_arrays(path, arrays)
-    elif suffix in WRITABLE:
-        table = point_table(bpy.context, obj)
-        write_points(path, table, double=not table.single)
-    else:
-        for other in bpy.context.view_layer.objects:
-            other.select_set(other == obj)
-        names = [name for name in (shown, *APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
-        if names:
-            tell("result_written", obj, names[0])
-        save_scene(path)
-
-
-def save_scene(path):
-    """Write all that is open to a .blend file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))
 
 
 def faces_of(obj):

@@ -1,13 +1,14 @@
 """Objects of files of Gaussian splats, and files of such objects."""
 
 import json
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from ...core import Splats
 from ...core.splats import NEEDED, SplatFile
-from ..objects.attributes import read_attribute, write_attribute
+from ..objects.attributes import PREFIX, STORABLE, read_attribute, write_attribute
 from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, shown_splats
 from .objects import add_column
 
@@ -102,3 +103,14 @@ def splats_to_write(obj) -> Splats:
     file = SplatFile(columns, written["order"], tuple(written["comments"]))
     rest = (splats.positions, splats.scales, splats.rotations, splats.opacities, splats.colors, splats.harmonics)
     return Splats(*rest, file=file)
+
+
+def with_results(splats, data):
+    """Return splats to be written with the results that their points hold, as columns of the file beside its own."""
+    columns = {} if splats.file is None else dict(splats.file.columns)
+    for layer in data.attributes:
+        if layer.name.startswith(PREFIX) and layer.data_type in STORABLE:
+            values = read_attribute(data, layer.name)
+            names = [layer.name] if values.ndim == 1 else [f"{layer.name}_{axis}" for axis in "xyz"]
+            columns.update(zip(names, values.reshape(len(splats), -1).T, strict=False))
+    return replace(splats, file=(splats.file or SplatFile({}))._replace(columns=columns))

@@ -16,6 +16,7 @@ from ..tools.compare import Compare, distances
 from ..tools.mesh import MeshSurface
 from ..tools.orient import OrientNormals
 from . import objects as files
+from . import opening
 from .arguments import as_place, place
 from .verbs import LEFT_OUT, Apply
 
@@ -100,7 +101,7 @@ class Mesh(Apply):
         made = bpy.data.objects[tool.made[0][1]]
         if output.suffix.lower() == ".blend":
             tool.conclude(bpy.context, [obj])
-            files.save_scene(output)
+            opening.save_scene(output)
         else:
             table = files.point_table(bpy.context, made)
             write_mesh(output, table, files.faces_of(made), double=not table.single)

@@ -13,6 +13,7 @@ from ..running.stages import Stages
 from ..tools.analyze import WRITE_LIMIT, plan_analysis
 from ..tools.sequence import continue_modes
 from . import objects as files
+from . import opening
 from .arguments import add_setting
 
 ONE_LINE = "Writes one JSON line per input, with notices, or the error. The exit code is 1 if any input failed."
@@ -70,7 +71,7 @@ class ObjectVerb(Verb):
 
     def open(self, path, option, arguments):
         """Open a file in place of all that is loaded; return the object that an option names, set up, and notices."""
-        obj, notices = files.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}")
+        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}")
         reason = obstacle(obj)
         if reason:
             raise PointCloudError(reason)
@@ -134,7 +135,7 @@ class Analyze(ObjectVerb):
             obj.data = obj.data.copy()
         write_result(obj, analysis, arguments.write_limit)
         if output is not None:
-            files.save(output, obj, _arrays(obj, analysis))
+            opening.save(output, obj, _arrays(obj, analysis))
         return {
             "points": len(analysis.measures.areas),
             "total_area": analysis.total_area,
@@ -201,7 +202,7 @@ class Apply(ObjectVerb):
 
     def save(self, tool, obj, output):
         """Write the output."""
-        files.save(output, obj, files.attribute_arrays(obj), tool.shown)
+        opening.save(output, obj, files.attribute_arrays(obj), tool.shown)
 
     def figures(self, tool, result) -> dict:
         """Return numbers to print, beside the line about what was done."""

@@ -7,6 +7,7 @@ names its own.
 import importlib
 import os
 import threading
+from dataclasses import replace
 from types import SimpleNamespace
 
 import bpy
@@ -63,9 +64,10 @@ def compared():
     return obj
 
 
-def splats():
+def splats(size=1.0):
     """A bar of splats with groups of handles and anchors."""
-    obj = add_splats(bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1))
+    bar = bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1)
+    obj = add_splats(replace(bar, positions=np.float32(size) * bar.positions))
     height = own_positions(obj)[:, 2]
     for name, chosen in (("Handle", height > 9.0), ("Anchor", height < 1.0)):
         if obj.type == "MESH":
@@ -245,7 +247,8 @@ def attended(extension, monkeypatch):
         members = {key: value for key, value in vars(registered).items() if not key.startswith(("__", "bl_rna"))}
         run = type(name, bases, members)()
         for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties[1:]:
-            setattr(run, item.identifier, settings.get(item.identifier, item.default))
+            default = tuple(item.default_array) if getattr(item, "is_array", False) else item.default
+            setattr(run, item.identifier, settings.get(item.identifier, default))
         run.reports, run.context, run.pause = [], Context(), Pause(jobs, number, monkeypatch)
         run.report = lambda kinds, text: run.reports.append((*kinds, text))
         run.takes_window = lambda: True
@@ -281,12 +284,14 @@ def delete_all(obj, folder):
 
 
 def take_other_data(obj, folder):
-    other = add_object(sphere_points(90), "Other")
-    obj.data = other.data
+    obj.data = add_object(sphere_points(90), "Other").data if obj.type == "MESH" else splats(2.0).data
 
 
 def delete_points(obj, folder):
-    obj.data.clear_geometry()
+    if obj.type == "MESH":
+        obj.data.clear_geometry()
+    else:
+        obj.data = bpy.data.pointclouds.new("Empty")
 
 
 def rename(obj, folder):

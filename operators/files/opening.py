@@ -1,0 +1,99 @@
+"""Files that the command line opens in place of all that is loaded, and files that it writes."""
+
+import bpy
+
+from ...core import PointCloudError, read_splats, write_splats
+from ...core.files import WRITABLE, read_points, write_points
+from ...core.splats import holds_splats
+from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
+from ..objects.handlers import tell
+from ..objects.reading import TYPES
+from ..objects.splats import has_splats
+from .objects import add_object, point_table, save_arrays
+from .splats import add_splats, splats_to_write, with_results
+
+
+def load(path, name: str = "", option: str = "--object"):
+    """Open a file in place of everything that is loaded.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        A file of one of the kinds in `INPUTS`.
+    name : str
+        The object's name; empty for the active one, or else the only mesh.
+    option : str
+        Of the command line, by which one names it.
+
+    Returns
+    -------
+    bpy.types.Object
+        The object to work on.
+    list of str
+        What of the file was left out.
+
+    Raises
+    ------
+    PointCloudError
+        There is no such file, or no such object in it, or no points.
+    """
+    notices = []
+    if path.suffix.lower() != ".blend":
+        add, read = (add_splats, read_splats) if holds_splats(path) else (add_object, read_points)
+        given = read(path)
+        notices = given.notices
+        bpy.ops.wm.read_homefile(use_empty=True)
+        add(path.stem, given, bpy.context.scene.collection)
+    elif path.is_file():
+        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
+    else:
+        raise PointCloudError(f"There is no file {path}. Check its name and folder.")
+    return _choose_object(path, name, option), notices
+
+
+def _choose_object(path, name, option):
+    bpy.context.view_layer.update()
+    meshes = [obj for obj in bpy.context.view_layer.objects if obj.type in TYPES]
+    active = bpy.context.view_layer.objects.active
+    if not meshes:
+        raise PointCloudError(f"{path} has no mesh object. Give a file with points.")
+    if name:
+        chosen = [obj for obj in meshes if obj.name == name]
+    elif active in meshes:
+        chosen = [active]
+    else:
+        chosen = meshes
+    if len(chosen) != 1:
+        names = ", ".join(obj.name for obj in meshes)
+        what = f'mesh object "{name}"' if name else "active mesh object"
+        raise PointCloudError(f"{path} has no {what}. Name one of its mesh objects with {option}: {names}.")
+    bpy.context.view_layer.objects.active = chosen[0]
+    return chosen[0]
+
+
+def save(path, obj, arrays, shown=""):
+    """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, points or splats, or the arrays by name.
+
+    The scene shows the attribute `shown`, or else another result that the points have.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        save_arrays(path, arrays)
+    elif suffix == ".ply" and has_splats(obj.data):
+        write_splats(path, with_results(splats_to_write(obj), obj.data))
+    elif suffix in WRITABLE:
+        table = point_table(bpy.context, obj)
+        write_points(path, table, double=not table.single)
+    else:
+        for other in bpy.context.view_layer.objects:
+            other.select_set(other == obj)
+        names = [name for name in (shown, *APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
+        if names:
+            tell("result_written", obj, names[0])
+        save_scene(path)
+
+
+def save_scene(path):
+    """Write all that is open to a .blend file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))
