@@ -110,7 +110,8 @@ def turn_rigidly(splats):
     quick = replace(splats, harmonics=splats.harmonics[:, :0])
     timed("sizes and rotations", lambda: quick.deformed(moved, gradients))
     found = timed("with harmonics", lambda: splats.deformed(moved, gradients))
-    held = np.flatnonzero(np.isin(laplacian.component, np.unique(laplacian.component[deformer.handles])))
+    components = laplacian.component[deformer.handles]
+    held = np.flatnonzero(np.isin(laplacian.component, components[components >= 0]))
     print(f"{len(held):,} of {len(splats):,} splats are of a surface with a handle; of these at most off:")
     wanted = turn @ splats.covariances @ turn.T
     size = np.abs(wanted).max(axis=(1, 2))
