@@ -45,7 +45,7 @@ def carried(data) -> tuple:
             Carried(ROTATION, SPLAT_ROTATION, "QUATERNION"),
             *numbered,
         )
-    return (Carried(DISC, MOVED_DISC, "FLOAT_VECTOR"),) if DISC in data.attributes else ()
+    return (Carried(DISC, MOVED_DISC, "FLOAT_VECTOR"),) if _has_discs(data) else ()
 
 
 def carries(obj) -> bool:
@@ -53,7 +53,12 @@ def carries(obj) -> bool:
     data = obj.data
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         return False
-    return has_splats(data) or (DISC in data.attributes and obj.meshfree.point_shape == "DISCS")
+    return has_splats(data) or (_has_discs(data) and obj.meshfree.point_shape == "DISCS")
+
+
+def _has_discs(data):
+    layer = data.attributes.get(DISC)
+    return layer is not None and (layer.data_type, layer.domain) == ("FLOAT_VECTOR", "POINT")
 
 
 def discs_at_rest(obj):
