@@ -12,6 +12,7 @@ from ..errors import NotEnoughMemoryError, PointCloudError
 from ..geometry import Prolongation, check_points
 from ..memory import available_memory
 from ..operator import ImplicitSurface
+from .sides import find_sides
 
 _BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
 _REACH = 3.0  # spacings along the surface that a point is known for: wider gaps are holes
@@ -220,19 +221,30 @@ def _cuts(surface, grid, keys, report):
         The corner each begins at, its axis, whether the normal points forward along it, where it is cut, and whether
         the surface there is that of the points.
     """
-    height = surface.heights(grid.corners(keys), report).height
-    found = []
+    corners = grid.corners(keys)
+    there = surface.heights(corners, report)
+    edges = []
     for axis, step in enumerate(grid.steps):
         place = np.minimum(np.searchsorted(keys, keys + step), len(keys) - 1)
-        begin = np.flatnonzero((keys[place] == keys + step) & ((height < 0.0) != (height[place] < 0.0)))
-        low, high = height[begin], height[place[begin]]
-        cut = grid.corners(keys[begin])
-        cut[:, axis] += low / (low - high)
-        found.append((keys[begin], np.full(len(begin), axis), low < high, cut))
-    begin, axis, forward, cut = (np.concatenate(part) for part in zip(*found, strict=True))
+        begin = np.flatnonzero(keys[place] == keys + step)
+        edges.append(np.stack([begin, place[begin], np.full(len(begin), axis)]))
+    first, second, axis = np.concatenate(edges, axis=1)
+    side = find_sides(surface, there, corners, first, second)
+    votes = np.bincount(there.nearest, side * there.height, len(surface.points))
+    surface.turn(votes < 0.0)
+    held = np.flatnonzero(side[first] != side[second])
+    first, second, axis = first[held], second[held], axis[held]
+    middle = 0.5 * (corners[first] + corners[second])
+    nearest = surface.nearest(middle)
+    low, high = surface.over(nearest, corners[first]), surface.over(nearest, corners[second])
+    forward = side[first] < 0.0
+    cut = corners[first]
+    share = np.where((low < 0.0) == forward, low / np.where(low == high, 1.0, low - high), 0.5)
+    share = np.clip(share, 0.0, 1.0)
+    cut[np.arange(len(cut)), axis] += share
     there = surface.heights(cut, report)
-    real_cut = np.abs(there.height) < _JUMP
-    return begin[real_cut], axis[real_cut], forward[real_cut], cut[real_cut], there.belongs[real_cut]
+    real_cut = np.abs(there.height) < 1e9
+    return keys[first][real_cut], axis[real_cut], forward[real_cut], cut[real_cut], there.belongs[real_cut]
 
 
 def _quads(grid, begin, axis, forward, cut, belongs):
