@@ -16,7 +16,6 @@ from .sides import find_sides
 
 _BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
 _REACH = 3.0  # spacings along the surface that a point is known for: wider gaps are holes
-_JUMP = 0.5  # voxels off the surface at which a change of sign is no cut, but a seam between sheets
 _ROUNDS = 2  # of moving vertices onto the surface, after which they are a thousandth of a voxel off
 _FRAGMENT = 20.0  # cells of points that a piece of the mesh covers at least: fewer points make no surface
 _FEWEST = 20  # faces of a mesh that is no shapeless lump
@@ -44,15 +43,15 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
     """Make a mesh of the surface that the points lie on.
 
     Quadrics of near points tell how far the corners of a regular grid are from the surface, in a narrow band around
-    it. Each voxel that the surface cuts gets a vertex and each cut edge a quad (surface nets); the vertices are then
-    moved onto the surface, to which they are as close as the quadrics: an error of third order in the spacing. Where
-    the points end, at a boundary or at gaps of several spacings, the mesh ends too.
+    it, and which of them are on the same side: normals of wrong signs do no harm. Each voxel that the surface cuts gets
+    a vertex and each cut edge a quad (surface nets); the vertices are then moved onto the surface, to which they are as
+    close as the quadrics: an error of third order in the spacing. Where the points end, at a boundary or at gaps of
+    several spacings, the mesh ends too.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals must agree in sign, as those from quadrics do, and others with ``LaplacianOptions(orient=True)``.
-        Points that it leaves out make no surface.
+        The mesh looks to the side that most of its normals point to. Points that it leaves out make no surface.
     detail : float
         How many voxels there are along a typical spacing of the points: 2 gives four times as many faces as 1.
     progress : callable, optional
@@ -112,7 +111,7 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
     if not len(faces) or places < _FEWEST:
         raise PointCloudError(
             f"The {np.count_nonzero(kept)} points give no mesh at a detail of {size:g}: it would have voxels larger"
-            " than the surface. Raise the detail."
+            " than the surface, or too few points lie between its edges. Raise the detail, or add points."
         )
     vertices = _onto(surface, vertices, _rim(faces), lambda: report("Faces", 0.9))
     return SurfaceMesh(surface.placed(vertices), faces)
@@ -218,7 +217,7 @@ def _cuts(surface, grid, keys, report):
     Returns
     -------
     ndarrays, (k,) int, (k,) int, (k,) bool, (k, 3), (k,) bool
-        The corner each begins at, its axis, whether the normal points forward along it, where it is cut, and whether
+        The corner each begins at, its axis, whether the outer side is ahead along it, where it is cut, and whether
         the surface there is that of the points.
     """
     corners = grid.corners(keys)
@@ -227,24 +226,19 @@ def _cuts(surface, grid, keys, report):
     for axis, step in enumerate(grid.steps):
         place = np.minimum(np.searchsorted(keys, keys + step), len(keys) - 1)
         begin = np.flatnonzero(keys[place] == keys + step)
-        edges.append(np.stack([begin, place[begin], np.full(len(begin), axis)]))
-    first, second, axis = np.concatenate(edges, axis=1)
+        edges.append((begin, place[begin], np.full(len(begin), axis)))
+    first, second, axis = (np.concatenate(part) for part in zip(*edges, strict=True))
     side = find_sides(surface, there, corners, first, second)
-    votes = np.bincount(there.nearest, side * there.height, len(surface.points))
-    surface.turn(votes < 0.0)
-    held = np.flatnonzero(side[first] != side[second])
-    first, second, axis = first[held], second[held], axis[held]
-    middle = 0.5 * (corners[first] + corners[second])
-    nearest = surface.nearest(middle)
+    surface.turn(np.bincount(there.nearest, side * there.height, len(surface.points)) < 0.0)
+
+    between = side[first] != side[second]
+    first, second, axis = first[between], second[between], axis[between]
+    forward, cut = side[first] < 0.0, corners[first]
+    nearest = surface.nearest(0.5 * (corners[first] + corners[second]))
     low, high = surface.over(nearest, corners[first]), surface.over(nearest, corners[second])
-    forward = side[first] < 0.0
-    cut = corners[first]
-    share = np.where((low < 0.0) == forward, low / np.where(low == high, 1.0, low - high), 0.5)
-    share = np.clip(share, 0.0, 1.0)
-    cut[np.arange(len(cut)), axis] += share
-    there = surface.heights(cut, report)
-    real_cut = np.abs(there.height) < 1e9
-    return keys[first][real_cut], axis[real_cut], forward[real_cut], cut[real_cut], there.belongs[real_cut]
+    crossed = (low < 0.0) != (high < 0.0)  # elsewhere it is closed around sharp rims
+    cut[np.arange(len(cut)), axis] += np.where(crossed, low / np.where(crossed, low - high, 1.0), 0.5)
+    return keys[first], axis, forward, cut, surface.heights(cut, report).belongs
 
 
 def _quads(grid, begin, axis, forward, cut, belongs):

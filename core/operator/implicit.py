@@ -42,6 +42,11 @@ class Heights(NamedTuple):
     outward: np.ndarray
 
     @property
+    def support(self):
+        """How near the foot of each place is to a point, from 1 at one to 0 far from all, (k,)."""
+        return np.exp(-np.maximum(self.distance**2 - (self.height / self.spacing) ** 2, 0.0))
+
+    @property
     def belongs(self):
         """Whether the surface next to the place is that of the points, (k,) bool: no gap between them, nor outside."""
         return (self.distance < _BELONGS) & (self.beyond <= 0.0)
@@ -56,7 +61,7 @@ class ImplicitSurface:
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals must agree in sign. Points that it leaves out make no surface.
+        Heights are right where the signs of its normals agree. Points that it leaves out make no surface.
     unit : float
         Length [L] that counts as one in all that is measured.
 
