@@ -64,6 +64,7 @@ def _torus_grid(ring, tube, minor=0.4):
 
 
 def box(sides, count):
+    """Return random points on a box from the origin to its sides."""
     sides = np.asarray(sides)
     rng = np.random.default_rng(0)
     face = np.repeat([sides[1] * sides[2], sides[0] * sides[2], sides[0] * sides[1]], 2)

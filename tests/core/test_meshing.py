@@ -130,7 +130,8 @@ def test_surface_ends_at_sharp_rims():
     assert np.all(edges_of(mesh) == 2)
     assert euler_characteristic(mesh) == 2
     spacing = typical_spacing(laplacian)
-    assert np.all(np.abs(mesh.vertices - 0.5 * sides) < 0.5 * sides + spacing)
+    # Beyond 1.5 spacings what points tell of their quadric, exp(-r^2), is fainter than that nothing is there.
+    assert np.all(np.abs(mesh.vertices - 0.5 * sides) < 0.5 * sides + 1.6 * spacing)
     assert cKDTree(points).query(mesh.vertices)[0].max() < 3.0 * spacing
 
 
