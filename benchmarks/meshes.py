@@ -37,7 +37,7 @@ mesh from even samples of the true surface. With a scan alone, marked *, they ar
 triangles with an angle below 10 degrees, quads divided along their better diagonal. The operator is built before, and
 its time is left out; the machine did other things, too.
 
-The constants were chosen on cheburashka, featuretype, arm, cat, screwdriver and brain; on the others, marked *, the same
+The constants were chosen on cheburashka, featuretype, arm, cat, screwdriver and brain; on others, marked *, the same
 ones were only run. The 1,722 vertices of featuretype lie along the edges of a machine part: nothing tells what is
 between them, and no mesh is made. Brain's own mesh folds and has 14 pieces: shells closer to each other than
 the points are lost, which Poisson loses less of.
