@@ -39,7 +39,7 @@ its time is left out; the machine did other things, too.
 
 The constants were chosen on cheburashka, featuretype, arm, cat, screwdriver and brain; on others, marked *, the same
 ones were only run. The 1,722 vertices of featuretype lie along the edges of a machine part: nothing tells what is
-between them, and no mesh is made. Brain's own mesh folds and has 14 pieces: shells closer to each other than
+between them, and hardly any mesh is made. Brain's own mesh folds and has 14 pieces: shells closer to each other than
 the points are lost, which Poisson loses less of.
 
 Made by `MESHFREE_ZOO=folder MESHFREE_RAW=folder python -m benchmarks.meshes`; the shapes are not part of the project.
