@@ -63,7 +63,8 @@ def _torus_grid(ring, tube, minor=0.4):
     return np.stack([radius * np.cos(u), radius * np.sin(u), minor * np.sin(v)], axis=2).reshape(-1, 3)
 
 
-def _box(sides, count):
+def box(sides, count):
+    """Return random points on a box from the origin to its sides."""
     sides = np.asarray(sides)
     rng = np.random.default_rng(0)
     face = np.repeat([sides[1] * sides[2], sides[0] * sides[2], sides[0] * sides[1]], 2)
@@ -99,8 +100,8 @@ def samplings():
         yield label, _torus_grid(ring, tube), 1.6 * np.pi**2
     yield "sphere, latitude and longitude 60 x 120", globe(60, 120), SPHERE
     for count in (600, 2000, 6000):
-        yield f"cube, {count:,} random", _box([1.0, 1.0, 1.0], count), 6.0
-    yield "bar 1 x 0.03 x 0.03, 6,000 random", _box([1.0, 0.03, 0.03], 6000), 0.1218
+        yield f"cube, {count:,} random", box([1.0, 1.0, 1.0], count), 6.0
+    yield "bar 1 x 0.03 x 0.03, 6,000 random", box([1.0, 0.03, 0.03], 6000), 0.1218
     sheet = random_sphere(4000)
     gap = 1.0 + 0.5 * np.sqrt(SPHERE / 4000)
     yield "two spheres half a spacing apart", np.concatenate([sheet, gap * sheet]), SPHERE * (1.0 + gap**2)

@@ -12,10 +12,10 @@ from ..errors import NotEnoughMemoryError, PointCloudError
 from ..geometry import Prolongation, check_points
 from ..memory import available_memory
 from ..operator import ImplicitSurface
+from .sides import find_sides
 
 _BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
 _REACH = 3.0  # spacings along the surface that a point is known for: wider gaps are holes
-_JUMP = 0.5  # voxels off the surface at which a change of sign is no cut, but a seam between sheets
 _ROUNDS = 2  # of moving vertices onto the surface, after which they are a thousandth of a voxel off
 _FRAGMENT = 20.0  # cells of points that a piece of the mesh covers at least: fewer points make no surface
 _FEWEST = 20  # faces of a mesh that is no shapeless lump
@@ -43,15 +43,15 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
     """Make a mesh of the surface that the points lie on.
 
     Quadrics of near points tell how far the corners of a regular grid are from the surface, in a narrow band around
-    it. Each voxel that the surface cuts gets a vertex and each cut edge a quad (surface nets); the vertices are then
-    moved onto the surface, to which they are as close as the quadrics: an error of third order in the spacing. Where
-    the points end, at a boundary or at gaps of several spacings, the mesh ends too.
+    it, and which of them are on the same side: normals of wrong signs do no harm. Each voxel that the surface cuts gets
+    a vertex and each cut edge a quad (surface nets); the vertices are then moved onto the surface, to which they are as
+    close as the quadrics: an error of third order in the spacing. Where the points end, at a boundary or at gaps of
+    several spacings, the mesh ends too.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals must agree in sign, as those from quadrics do, and others with ``LaplacianOptions(orient=True)``.
-        Points that it leaves out make no surface.
+        The mesh looks to the side that most of its normals point to. Points that it leaves out make no surface.
     detail : float
         How many voxels there are along a typical spacing of the points: 2 gives four times as many faces as 1.
     progress : callable, optional
@@ -111,7 +111,7 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
     if not len(faces) or places < _FEWEST:
         raise PointCloudError(
             f"The {np.count_nonzero(kept)} points give no mesh at a detail of {size:g}: it would have voxels larger"
-            " than the surface. Raise the detail."
+            " than the surface, or too few points lie between its edges. Raise the detail, or add points."
         )
     vertices = _onto(surface, vertices, _rim(faces), lambda: report("Faces", 0.9))
     return SurfaceMesh(surface.placed(vertices), faces)
@@ -217,22 +217,28 @@ def _cuts(surface, grid, keys, report):
     Returns
     -------
     ndarrays, (k,) int, (k,) int, (k,) bool, (k, 3), (k,) bool
-        The corner each begins at, its axis, whether the normal points forward along it, where it is cut, and whether
+        The corner each begins at, its axis, whether the outer side is ahead along it, where it is cut, and whether
         the surface there is that of the points.
     """
-    height = surface.heights(grid.corners(keys), report).height
-    found = []
+    corners = grid.corners(keys)
+    there = surface.heights(corners, report)
+    edges = []
     for axis, step in enumerate(grid.steps):
         place = np.minimum(np.searchsorted(keys, keys + step), len(keys) - 1)
-        begin = np.flatnonzero((keys[place] == keys + step) & ((height < 0.0) != (height[place] < 0.0)))
-        low, high = height[begin], height[place[begin]]
-        cut = grid.corners(keys[begin])
-        cut[:, axis] += low / (low - high)
-        found.append((keys[begin], np.full(len(begin), axis), low < high, cut))
-    begin, axis, forward, cut = (np.concatenate(part) for part in zip(*found, strict=True))
-    there = surface.heights(cut, report)
-    real_cut = np.abs(there.height) < _JUMP
-    return begin[real_cut], axis[real_cut], forward[real_cut], cut[real_cut], there.belongs[real_cut]
+        begin = np.flatnonzero(keys[place] == keys + step)
+        edges.append((begin, place[begin], np.full(len(begin), axis)))
+    first, second, axis = (np.concatenate(part) for part in zip(*edges, strict=True))
+    side = find_sides(surface, there, corners, first, second)
+    surface.turn(np.bincount(there.nearest, side * there.height, len(surface.points)) < 0.0)
+
+    between = side[first] != side[second]
+    first, second, axis = first[between], second[between], axis[between]
+    forward, cut = side[first] < 0.0, corners[first]
+    nearest = surface.nearest(0.5 * (corners[first] + corners[second]))
+    low, high = surface.over(nearest, corners[first]), surface.over(nearest, corners[second])
+    crossed = (low < 0.0) != (high < 0.0)  # elsewhere it is closed around sharp rims
+    cut[np.arange(len(cut)), axis] += np.where(crossed, low / np.where(crossed, low - high, 1.0), 0.5)
+    return keys[first], axis, forward, cut, surface.heights(cut, report).belongs
 
 
 def _quads(grid, begin, axis, forward, cut, belongs):

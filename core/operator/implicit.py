@@ -21,6 +21,10 @@ class Heights(NamedTuple):
         Distance from the surface, positive on the side of the normals: exact for quadrics, to second order.
     normal : ndarray, (k, 3)
         Unit normals of the surface nearby.
+    nearest : ndarray, (k,) int
+        The nearest point.
+    spacing : ndarray, (k,)
+        Of the points there.
     distance : ndarray, (k,)
         From the nearest point, in spacings of the points there.
     beyond : ndarray, (k,)
@@ -31,9 +35,16 @@ class Heights(NamedTuple):
 
     height: np.ndarray
     normal: np.ndarray
+    nearest: np.ndarray
+    spacing: np.ndarray
     distance: np.ndarray
     beyond: np.ndarray
     outward: np.ndarray
+
+    @property
+    def support(self):
+        """How near the foot of each place is to a point, from 1 at one to 0 far from all, (k,)."""
+        return np.exp(-np.maximum(self.distance**2 - (self.height / self.spacing) ** 2, 0.0))
 
     @property
     def belongs(self):
@@ -50,7 +61,7 @@ class ImplicitSurface:
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals must agree in sign. Points that it leaves out make no surface.
+        Heights are right where the signs of its normals agree. Points that it leaves out make no surface.
     unit : float
         Length [L] that counts as one in all that is measured.
 
@@ -95,6 +106,17 @@ class ImplicitSurface:
         forms = self._shape_operator[rows]
         return 0.5 * np.sqrt(np.einsum("iab,iab->i", forms, forms))
 
+    def over(self, rows, places):
+        """Return how far places, (k, 3), are above the quadrics of some points, (k,) int; no others are asked."""
+        offset = places - self.points[rows]
+        bent = np.einsum("icd,id->ic", self._shape_operator[rows], offset)
+        return np.einsum("ic,ic->i", offset, self.normals[rows] + 0.5 * bent)
+
+    def turn(self, rows):
+        """Turn the normals of some points, (k,) int or (m,) bool, around."""
+        self.normals[rows] *= -1.0
+        self._shape_operator[rows] *= -1.0
+
     def heights(self, places, report=lambda: None):
         """Measure places near the surface.
 
@@ -109,7 +131,9 @@ class ImplicitSurface:
         Heights
         """
         count = len(places)
-        result = Heights(np.empty(count), np.empty((count, 3)), np.empty(count), np.empty(count), np.empty((count, 3)))
+        height, spacing, distance, beyond = np.empty((4, count))
+        normal, outward = np.empty((2, count, 3))
+        result = Heights(height, normal, np.empty(count, dtype=np.int64), spacing, distance, beyond, outward)
 
         def measure(block):
             for known, found in zip(result, self._measure(places[block]), strict=True):
@@ -140,7 +164,7 @@ class ImplicitSurface:
         past = np.einsum("ikc,ikc->ik", offset, outward) - np.where(near > 0.0, inside, 0.0)
         beyond = np.where(near[:, 0] > 0.0, np.einsum("ik,ik->i", near, past) / total, -np.inf)
         outward = _units(np.einsum("ik,ikc->ic", near, outward))
-        return height, normal, distance[:, 0] / spacing, beyond, outward
+        return height, normal, first, spacing, distance[:, 0] / spacing, beyond, outward
 
 
 def _units(vectors):

@@ -1,12 +1,16 @@
 """Meshes of the surface that points lie on, against surfaces that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import core
+from benchmarks.awkward import box
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
+from core.applications.sides import agreeing
 
 
 def edges_of(mesh):
@@ -93,6 +97,62 @@ def test_sheets_within_one_voxel_share_no_vertex():
     mesh = core.mesh_surface(laplacian)
     assert np.all(edges_of(mesh) == 2)
     assert euler_characteristic(mesh) == 2
+
+
+@pytest.mark.parametrize("turned", ["half", "every third", "all"])
+def test_signs_of_normals_make_no_holes(operators, turned):
+    laplacian = operators("another random sphere")
+    rows = {
+        "half": laplacian.points[:, 0] > 0.1,
+        "every third": np.arange(len(laplacian.points)) % 3 == 0,
+        "all": np.full(len(laplacian.points), True),
+    }[turned]
+    sign = np.where(rows, -1.0, 1.0)
+    other = replace(
+        laplacian,
+        normals=laplacian.normals * sign[:, None],
+        shape_operator=laplacian.shape_operator * sign[:, None, None],
+    )
+    one, mesh = core.mesh_surface(laplacian), core.mesh_surface(other)
+    assert np.all(edges_of(mesh) == 2)
+    assert euler_characteristic(mesh) == 2
+    np.testing.assert_allclose(np.sort(np.linalg.norm(mesh.vertices, axis=1)), 1.0, atol=5e-3)
+    assert area_of(mesh) == pytest.approx(area_of(one), rel=1e-3)
+    outwards = np.einsum("ij,ij->i", areas_of(mesh), mesh.vertices[mesh.faces].mean(axis=1)) > 0.0
+    assert np.all(outwards == (turned != "all" and np.count_nonzero(rows) < 0.5 * len(rows)))
+
+
+def test_surface_ends_at_sharp_rims():
+    sides = np.array([1.0, 1.0, 0.04])  # some two spacings thick
+    points = box(sides, 8000)
+    laplacian = core.build_laplacian(points)
+    mesh = core.mesh_surface(laplacian)
+    assert np.all(edges_of(mesh) == 2)
+    assert euler_characteristic(mesh) == 2
+    spacing = typical_spacing(laplacian)
+    # Beyond 1.5 spacings what points tell of their quadric, exp(-r^2), is fainter than that nothing is there.
+    assert np.all(np.abs(mesh.vertices - 0.5 * sides) < 0.5 * sides + 1.6 * spacing)
+    assert cKDTree(points).query(mesh.vertices)[0].max() < 3.0 * spacing
+
+
+def test_sides_are_found_in_one_round_or_many():
+    rng = np.random.default_rng(0)
+    count = 3000
+    true = rng.choice([-1.0, 1.0], count)
+    first = np.concatenate([np.arange(count - 1), rng.integers(0, count, 4 * count)])
+    second = np.concatenate([np.arange(1, count), rng.integers(0, count, 4 * count)])
+    told = true[first] * true[second] * rng.choice([0.5, 1.0, 2.0], len(first))  # with ties
+    sign, group = agreeing(count, first, second, told)
+    assert np.all(group == group[0])
+    assert np.abs(sign @ true) == count
+
+
+def test_places_that_no_edge_joins_stay_apart():
+    sign, group = agreeing(5, np.array([0, 2, 3]), np.array([1, 3, 4]), np.array([-1.0, 1.0, 0.0]))
+    assert sign[0] == -sign[1]
+    assert sign[2] == sign[3]
+    assert len(np.unique(group)) == 3
+    assert group[2] == group[3]
 
 
 def test_order_of_the_points_makes_no_difference(operators):
