@@ -5,7 +5,9 @@ from scipy import sparse
 
 from ..geometry import ON, SMOOTH
 
-_FAINT = 0.1  # what an edge far from all points tells for one side, beside one next to them
+_FAINT = (
+    0.1  # what an edge that cuts a quadric far from all points tells for one side, where one near them tells for two
+)
 _PAST = 1.0  # how far beyond the boundary a surface has no sides
 
 
@@ -40,9 +42,8 @@ def find_sides(surface, there, places, first, second):
 def _told(surface, there, places, first, second):
     """Return by how much each edge tells that its ends are on one side; negative for two, (e,).
 
-    An end that is close to the surface tells little. What is told counts as far as points support it, and a cut that
-    none supports is none, so that the surface does not go on beyond its sharp rims. Where the quadrics at the two ends
-    do not agree, nothing is told.
+    An end that is close to the surface tells little. That a quadric is cut counts as far as points support it, so that
+    the surface does not go on beyond its sharp rims. Where the quadrics at the two ends do not agree, nothing is told.
     """
     own, other = there.nearest[first], there.nearest[second]
     by_own, by_other = (
@@ -53,8 +54,8 @@ def _told(surface, there, places, first, second):
     cosine = np.einsum("ij,ij->i", surface.normals[own], surface.normals[other])
     apart = np.abs(surface.over(own, surface.points[other])) + np.abs(surface.over(other, surface.points[own]))
     one = (np.abs(cosine) > SMOOTH) & (apart < 2.0 * ON * (surface.spacing[own] + surface.spacing[other]))
-    support = np.minimum(there.support[first], there.support[second])
-    told *= np.where(cut, np.where(one, _FAINT - support, 0.0), np.maximum(support, _FAINT))
+    support = there.support
+    told *= np.where(cut, np.where(one, _FAINT - np.minimum(support[first], support[second]), 0.0), 1.0)
     unknown = (cut != (by_other[0] * by_other[1] < 0.0)) | (
         np.maximum(there.beyond[first], there.beyond[second]) > _PAST
     )
