@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
@@ -17,7 +17,10 @@ METHODS = ("outside", "viewpoint", "winding")
 _CERTAIN = 0.9  # cosine of a link that carries a sign without doubt: 26 degrees from a circular arc
 _PATCHES = 200  # that a surface is divided into at most
 _CLUMPS = 4000  # of points, each a dipole; pairs of them are summed in blocks
+_FINE = 32_000  # clumps that stand for the points where they are near, so that close sheets are told apart
+_NEAR = 3.0  # sizes of a clump
 _BLOCK = 250
+_PAIRS = 1_000_000  # of fine clumps that are summed at once
 _SPHERE = 30.0  # radius that points are mirrored in to see which are hidden, over that of the cloud
 _COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
 
@@ -69,7 +72,8 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
     up to its sign the integral of the squared gradient of the generalized winding number off the surface. That is
     zero for a closed surface with one outside, and for any surface grows with every edge at which the normals change
     sides: the signs with the least integral are looked for, from the propagated ones by flipping patches one by one. To
-    bound the work the dipoles of at most 4,000 clumps of points stand for the points, and r is smoothed by their size.
+    bound the work the dipoles of at most 4,000 clumps of points stand for the points, of at most 32,000 between clumps
+    that are near, and r is smoothed by their size.
     The volume that each part encloses tells outside from inside. At last, for 'viewpoint' too, single points flip as
     long as that improves the energy among the nearest 40 of each: noise gave them a sign that others do not share.
 
@@ -230,7 +234,7 @@ def _winding_signs(points, normals, weight, patch, part):
         Numbers of patches, and of the connected parts of the surface that they divide.
     """
     count = part.max() + 1
-    energy = _energies(*_clumps(points, normals, weight, patch), patch.max() + 1)
+    energy = _patch_energies(points, normals, weight, patch)
     sign = _least(energy)
     owner = np.empty(len(sign), dtype=int)
     owner[patch] = part
@@ -246,9 +250,26 @@ def _winding_signs(points, normals, weight, patch, part):
     return sign * outside[group_of_patch]
 
 
-def _clumps(points, normals, weight, patch):
-    """Gather points of one patch and place to dipoles: place, moment and patch of each, and the size of a place."""
-    size = 0.0 if len(points) <= _CLUMPS else np.sqrt(len(points) / _CLUMPS) * np.median(spacing_to_next(points))
+def _patch_energies(points, normals, weight, patch):
+    """Return the mutual energy of each two patches: of clumps of points, and of finer ones where those are near."""
+    count = patch.max() + 1
+    fine, _ = _clumps(points, weight[:, None] * normals, weight, patch, _FINE)
+    coarse, clump = _clumps(*fine[:4], _CLUMPS)
+    energy = _energies(*coarse, count)
+    return energy if len(coarse[0]) == len(fine[0]) else energy + _corrections(fine, coarse, clump, count)
+
+
+def _clumps(points, moments, weight, patch, most):
+    """Gather dipoles of one patch and place, until there are at most so many.
+
+    Returns
+    -------
+    tuple
+        Place, moment, weight and patch of each clump, and the size of a place.
+    ndarray, (m,) int
+        The clump of each given dipole.
+    """
+    size = 0.0 if len(points) <= most else np.sqrt(len(points) / most) * np.median(spacing_to_next(points))
     while True:
         if not size:
             clump, count = np.arange(len(points)), len(points)
@@ -257,16 +278,16 @@ def _clumps(points, normals, weight, patch):
             _, clump = np.unique(np.column_stack([patch, cell]), axis=0, return_inverse=True)
             clump = clump.reshape(-1)
             count = clump.max() + 1
-        if count <= _CLUMPS:
+        if count <= most:
             break
         size *= 1.2
-    whole = np.bincount(clump, weight, count)
-    whole = np.where(whole > 0.0, whole, 1.0)
+    total = np.bincount(clump, weight, count)
+    whole = np.where(total > 0.0, total, 1.0)
     place = np.column_stack([np.bincount(clump, weight * points[:, axis], count) for axis in range(3)]) / whole[:, None]
-    moment = np.column_stack([np.bincount(clump, weight * normals[:, axis], count) for axis in range(3)])
+    moment = np.column_stack([np.bincount(clump, moments[:, axis], count) for axis in range(3)])
     owner = np.empty(count, dtype=int)
     owner[clump] = patch
-    return place, moment, owner, max(size, np.median(spacing_to_next(points)))
+    return (place, moment, total, owner, max(size, np.median(spacing_to_next(points)))), clump
 
 
 def spacing_to_next(points):
@@ -274,7 +295,7 @@ def spacing_to_next(points):
     return find_nearest(points).spacing
 
 
-def _energies(place, moment, owner, width, count):
+def _energies(place, moment, _, owner, width, count):
     """Return the mutual energy of each two patches, (count, count), by dipoles smoothed over a width."""
     result = np.zeros((count, count))
     patches = sparse.csr_array((np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), count))
@@ -286,6 +307,39 @@ def _energies(place, moment, owner, width, count):
         there = np.einsum("jk,ijk->ij", moment, offset)
         result += patches[block].T @ (_coupling(moment[block] @ moment.T, here * there, square) @ patches)
     return result
+
+
+def _corrections(fine, coarse, clump, count):
+    """Return by how much the energy of each two patches is more, (count, count), where near clumps are taken finely.
+
+    Within a clump there is one patch, whose energy with itself does not matter.
+    """
+    first, second = cKDTree(coarse[0]).query_pairs(_NEAR * coarse[4], output_type="ndarray").T
+    apart = coarse[3][first] != coarse[3][second]
+    first, second = first[apart], second[apart]
+    member, size = np.argsort(clump, kind="stable"), np.bincount(clump)
+    start = np.cumsum(size) - size
+    ends = np.cumsum(size[first] * size[second])
+    result = np.zeros((count, count))
+    for rows in np.split(np.arange(len(first)), np.searchsorted(ends, np.arange(_PAIRS, ends[-1:].sum(), _PAIRS))):
+        one, other = first[rows], second[rows]
+        times = size[one] * size[other]
+        row = np.repeat(np.arange(len(rows)), times)
+        place = np.arange(len(row)) - np.repeat(np.cumsum(times) - times, times)
+        left = member[start[one][row] + place // size[other][row]]
+        right = member[start[other][row] + place % size[other][row]]
+        more = np.bincount(row, _pair_energies(fine, left, right), len(rows)) - _pair_energies(coarse, one, other)
+        np.add.at(result, (coarse[3][one], coarse[3][other]), more)
+    return result + result.T
+
+
+def _pair_energies(dipoles, first, second):
+    """Return the energy of pairs of dipoles."""
+    place, moment, _, _, width = dipoles
+    offset = place[second] - place[first]
+    left, right = moment[first], moment[second]
+    along = np.einsum("ij,ij->i", left, offset) * np.einsum("ij,ij->i", right, offset)
+    return _coupling(np.einsum("ij,ij->i", left, right), along, np.einsum("ij,ij->i", offset, offset) + width**2)
 
 
 def _coupling(alike, along, square):
