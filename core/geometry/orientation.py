@@ -282,8 +282,9 @@ def _clumps(points, moments, weight, patch, most):
             break
         size *= 1.2
     total = np.bincount(clump, weight, count)
-    whole = np.where(total > 0.0, total, 1.0)
-    place = np.column_stack([np.bincount(clump, weight * points[:, axis], count) for axis in range(3)]) / whole[:, None]
+    share = np.where(total[clump] > 0.0, weight, 1.0)
+    share = share / np.bincount(clump, share, count)[clump]
+    place = np.column_stack([np.bincount(clump, share * points[:, axis], count) for axis in range(3)])
     moment = np.column_stack([np.bincount(clump, moments[:, axis], count) for axis in range(3)])
     owner = np.empty(count, dtype=int)
     owner[clump] = patch
