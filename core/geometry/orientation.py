@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
@@ -17,7 +17,10 @@ METHODS = ("outside", "viewpoint", "winding")
 _CERTAIN = 0.9  # cosine of a link that carries a sign without doubt: 26 degrees from a circular arc
 _PATCHES = 200  # that a surface is divided into at most
 _CLUMPS = 4000  # of points, each a dipole; pairs of them are summed in blocks
+_FINE = 32_000  # clumps that stand for the points where they are near, so that close sheets are told apart
+_NEAR = 3.0  # sizes of a clump
 _BLOCK = 250
+_PAIRS = 1_000_000  # of fine clumps that are summed at once
 _SPHERE = 30.0  # radius that points are mirrored in to see which are hidden, over that of the cloud
 _COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
 
@@ -39,7 +42,7 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
     viewpoint : array_like, (3,) or (n, 3), optional
         For 'viewpoint': one place, or the place of the scanner for each point [L].
     areas : array_like, (n,), optional
-        For 'winding': areas of the points [L^2]; from the distances of neighbours where not given.
+        For 'winding' and 'viewpoint': areas of the points [L^2]; from the distances of neighbours where not given.
 
     Returns
     -------
@@ -69,8 +72,10 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
     up to its sign the integral of the squared gradient of the generalized winding number off the surface. That is
     zero for a closed surface with one outside, and for any surface grows with every edge at which the normals change
     sides: the signs with the least integral are looked for, from the propagated ones by flipping patches one by one. To
-    bound the work the dipoles of at most 4,000 clumps of points stand for the points, and r is smoothed by their size.
-    The volume that each part encloses tells outside from inside.
+    bound the work the dipoles of at most 4,000 clumps of points stand for the points, of at most 32,000 between clumps
+    that are near, and r is smoothed by their size.
+    The volume that each part encloses tells outside from inside. At last, for 'viewpoint' too, single points flip as
+    long as that improves the energy among the nearest 40 of each: noise gave them a sign that others do not share.
 
     References
     ----------
@@ -108,18 +113,19 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
         oriented, tree = propagate_signs(nearest, chosen)
         patch = _patches(nearest.points, oriented, tree)
         place = scaled.points + sample.moved  # where components stand as they do
+        weight = nearest.spacing**2
+        if areas is not None:
+            given = _checked_areas(areas, len(points))[scaled.first]
+            weight = given * (weight.sum() / max(given.sum(), np.finfo(float).tiny))
         if method == "viewpoint":
             votes = np.einsum("ij,ij->i", oriented, towards[scaled.first])
             if np.ndim(viewpoint) == 1:
                 votes = np.where(_seen(points[scaled.first] - viewpoint), votes, 0.0)
             sign = _elected(votes, patch, sample.component)
         else:
-            weight = nearest.spacing**2
-            if areas is not None:
-                given = _checked_areas(areas, len(points))[scaled.first]
-                weight = given * (weight.sum() / max(given.sum(), np.finfo(float).tiny))
             sign = _winding_signs(place, oriented, weight, patch, sample.component)
         oriented = oriented * sign[patch][:, None]
+        oriented *= _settled(_near_energies(place, nearest, oriented, weight))[:, None]
     return toward(normals, scaled.scatter(oriented, 0.0))
 
 
@@ -228,7 +234,7 @@ def _winding_signs(points, normals, weight, patch, part):
         Numbers of patches, and of the connected parts of the surface that they divide.
     """
     count = part.max() + 1
-    energy = _energies(*_clumps(points, normals, weight, patch), patch.max() + 1)
+    energy = _patch_energies(points, normals, weight, patch)
     sign = _least(energy)
     owner = np.empty(len(sign), dtype=int)
     owner[patch] = part
@@ -244,9 +250,26 @@ def _winding_signs(points, normals, weight, patch, part):
     return sign * outside[group_of_patch]
 
 
-def _clumps(points, normals, weight, patch):
-    """Gather points of one patch and place to dipoles: place, moment and patch of each, and the size of a place."""
-    size = 0.0 if len(points) <= _CLUMPS else np.sqrt(len(points) / _CLUMPS) * np.median(spacing_to_next(points))
+def _patch_energies(points, normals, weight, patch):
+    """Return the mutual energy of each two patches: of clumps of points, and of finer ones where those are near."""
+    count = patch.max() + 1
+    fine, _ = _clumps(points, weight[:, None] * normals, weight, patch, _FINE)
+    coarse, clump = _clumps(*fine[:4], _CLUMPS)
+    energy = _energies(*coarse, count)
+    return energy if len(coarse[0]) == len(fine[0]) else energy + _corrections(fine, coarse, clump, count)
+
+
+def _clumps(points, moments, weight, patch, most):
+    """Gather dipoles of one patch and place, until there are at most so many.
+
+    Returns
+    -------
+    tuple
+        Place, moment, weight and patch of each clump, and the size of a place.
+    ndarray, (m,) int
+        The clump of each given dipole.
+    """
+    size = 0.0 if len(points) <= most else np.sqrt(len(points) / most) * np.median(spacing_to_next(points))
     while True:
         if not size:
             clump, count = np.arange(len(points)), len(points)
@@ -255,16 +278,17 @@ def _clumps(points, normals, weight, patch):
             _, clump = np.unique(np.column_stack([patch, cell]), axis=0, return_inverse=True)
             clump = clump.reshape(-1)
             count = clump.max() + 1
-        if count <= _CLUMPS:
+        if count <= most:
             break
         size *= 1.2
-    whole = np.bincount(clump, weight, count)
-    whole = np.where(whole > 0.0, whole, 1.0)
-    place = np.column_stack([np.bincount(clump, weight * points[:, axis], count) for axis in range(3)]) / whole[:, None]
-    moment = np.column_stack([np.bincount(clump, weight * normals[:, axis], count) for axis in range(3)])
+    total = np.bincount(clump, weight, count)
+    share = np.where(total[clump] > 0.0, weight, 1.0)
+    share = share / np.bincount(clump, share, count)[clump]
+    place = np.column_stack([np.bincount(clump, share * points[:, axis], count) for axis in range(3)])
+    moment = np.column_stack([np.bincount(clump, moments[:, axis], count) for axis in range(3)])
     owner = np.empty(count, dtype=int)
     owner[clump] = patch
-    return place, moment, owner, max(size, np.median(spacing_to_next(points)))
+    return (place, moment, total, owner, max(size, np.median(spacing_to_next(points)))), clump
 
 
 def spacing_to_next(points):
@@ -272,7 +296,7 @@ def spacing_to_next(points):
     return find_nearest(points).spacing
 
 
-def _energies(place, moment, owner, width, count):
+def _energies(place, moment, _, owner, width, count):
     """Return the mutual energy of each two patches, (count, count), by dipoles smoothed over a width."""
     result = np.zeros((count, count))
     patches = sparse.csr_array((np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), count))
@@ -282,9 +306,79 @@ def _energies(place, moment, owner, width, count):
         square = np.einsum("ijk,ijk->ij", offset, offset) + width**2
         here = np.einsum("ik,ijk->ij", moment[block], offset)
         there = np.einsum("jk,ijk->ij", moment, offset)
-        mutual = (moment[block] @ moment.T - 3.0 * here * there / square) / (4.0 * np.pi * square**1.5)
-        result += patches[block].T @ (mutual @ patches)
+        result += patches[block].T @ (_coupling(moment[block] @ moment.T, here * there, square) @ patches)
     return result
+
+
+def _corrections(fine, coarse, clump, count):
+    """Return by how much the energy of each two patches is more, (count, count), where near clumps are taken finely.
+
+    Within a clump there is one patch, whose energy with itself does not matter.
+    """
+    first, second = cKDTree(coarse[0]).query_pairs(_NEAR * coarse[4], output_type="ndarray").T
+    apart = coarse[3][first] != coarse[3][second]
+    first, second = first[apart], second[apart]
+    member, size = np.argsort(clump, kind="stable"), np.bincount(clump)
+    start = np.cumsum(size) - size
+    ends = np.cumsum(size[first] * size[second])
+    result = np.zeros((count, count))
+    for rows in np.split(np.arange(len(first)), np.searchsorted(ends, np.arange(_PAIRS, ends[-1:].sum(), _PAIRS))):
+        one, other = first[rows], second[rows]
+        times = size[one] * size[other]
+        row = np.repeat(np.arange(len(rows)), times)
+        place = np.arange(len(row)) - np.repeat(np.cumsum(times) - times, times)
+        left = member[start[one][row] + place // size[other][row]]
+        right = member[start[other][row] + place % size[other][row]]
+        more = np.bincount(row, _pair_energies(fine, left, right), len(rows)) - _pair_energies(coarse, one, other)
+        np.add.at(result, (coarse[3][one], coarse[3][other]), more)
+    return result + result.T
+
+
+def _pair_energies(dipoles, first, second):
+    """Return the energy of pairs of dipoles."""
+    place, moment, _, _, width = dipoles
+    offset = place[second] - place[first]
+    left, right = moment[first], moment[second]
+    along = np.einsum("ij,ij->i", left, offset) * np.einsum("ij,ij->i", right, offset)
+    return _coupling(np.einsum("ij,ij->i", left, right), along, np.einsum("ij,ij->i", offset, offset) + width**2)
+
+
+def _coupling(alike, along, square):
+    """Return the energy of dipoles by the product of their moments, of those along their distance, and its square."""
+    return (alike - 3.0 * along / square) / (4.0 * np.pi * square**1.5)
+
+
+def _near_energies(place, nearest, normals, weight):
+    """Return the mutual energy of each two near points, (m, m) CSR, by dipoles smoothed over their spacing."""
+    count, width = nearest.index.shape
+    first, second = np.repeat(np.arange(count), width - 1), nearest.index[:, 1:].ravel()
+    offset = place[second] - place[first]
+    square = np.einsum("ij,ij->i", offset, offset) + nearest.spacing[first] * nearest.spacing[second]
+    left, right = normals[first], normals[second]
+    alike = np.einsum("ij,ij->i", left, right)
+    along = np.einsum("ij,ij->i", left, offset) * np.einsum("ij,ij->i", right, offset)
+    energy = weight[first] * weight[second] * _coupling(alike, along, square)
+    energy = sparse.csr_array((energy, (first, second)), shape=(count, count))
+    return (0.5 * (energy + energy.T)).tocsr()
+
+
+def _settled(energy):
+    """Return signs, (m,), from which no flip of one point improves the energy of pairs, (m, m) CSR without empty rows.
+
+    In each round those points flip that gain most among their neighbours, no two of which are neighbours.
+    """
+    sign = np.ones(energy.shape[0])
+    least = 1e-9 * (abs(energy) @ sign)  # below it a gain may be one of rounding
+    while True:
+        gain = -sign * (energy @ sign)
+        gaining = gain > least
+        if not gaining.any():
+            return sign
+        rank = np.zeros(len(gain), dtype=int)
+        order = np.flatnonzero(gaining)[np.argsort(gain[gaining], kind="stable")]
+        rank[order] = np.arange(1, len(order) + 1)
+        rival = np.maximum.reduceat(rank[energy.indices], energy.indptr[:-1])
+        sign[rank > rival] *= -1.0
 
 
 def _least(energy):

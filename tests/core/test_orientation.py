@@ -1,9 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy import sparse
 
 import core
 from benchmarks.samplings import fibonacci_sphere, torus_points
-from core.geometry.orientation import _energies, _least
+from core.geometry import orientation
+from core.geometry.nearest import find_nearest
+from core.geometry.orientation import _energies, _least, _near_energies, _patch_energies, _settled
 from tests.core.test_normals import torus_normals
 
 
@@ -127,10 +132,26 @@ def test_energy_of_two_dipoles():
     """Side by side, parallel ones share +1, one behind the other -2, times 1 / (4 pi r^3)."""
     place = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     for moment, expected in (([0.0, 0.0, 1.0], 1.0), ([1.0, 0.0, 0.0], -2.0)):
-        energy = _energies(place, np.array([moment, moment]), np.array([0, 1]), 1e-9, 3)
+        energy = _energies(place, np.array([moment, moment]), np.ones(2), np.array([0, 1]), 1e-9, 3)
         assert energy[0, 1] == pytest.approx(expected / (4.0 * np.pi * 8.0))
         assert energy[0, 1] == energy[1, 0]
     assert not energy[2].any()
+
+
+def test_clumps_that_are_near_are_taken_finely(monkeypatch):
+    """Where all are near the energy of patches is that of the points, which clumps alone do not tell."""
+    points = fibonacci_sphere(600)
+    weight, patch = np.random.default_rng(0).random(600) + 0.5, (points[:, 2] > 0.0) + 2 * (points[:, 0] > 0.3)
+    exact = _patch_energies(points, points, weight, patch)
+    monkeypatch.setattr(orientation, "_CLUMPS", 150)
+    monkeypatch.setattr(orientation, "_PAIRS", 10_000)
+    monkeypatch.setattr(orientation, "_NEAR", 1e9)
+    off = ~np.eye(4, dtype=bool)
+    np.testing.assert_allclose(_patch_energies(points, points, weight, patch)[off], exact[off], rtol=1e-9)
+    monkeypatch.setattr(orientation, "_NEAR", 3.0)
+    near = np.abs(_patch_energies(points, points, weight, patch) - exact)[off].max()
+    monkeypatch.setattr(orientation, "_NEAR", 0.0)
+    assert near < 0.1 * np.abs(_patch_energies(points, points, weight, patch) - exact)[off].max()
 
 
 def test_signs_of_least_energy_are_found_among_all():
@@ -139,6 +160,39 @@ def test_signs_of_least_energy_are_found_among_all():
     mutual = np.outer(hidden, hidden) * rng.random((9, 9))
     sign = _least(mutual + mutual.T + 3.0 * np.eye(9))
     np.testing.assert_array_equal(sign * sign[0], hidden * hidden[0])
+
+
+def test_energy_of_near_points_is_that_of_dipoles():
+    """The same as between patches of one point each, where the spacing is even and all are neighbours."""
+    points = torus_points(40)
+    nearest, normals = find_nearest(points), torus_normals(points)
+    even = replace(nearest, distance=np.broadcast_to(nearest.distance[:1], nearest.distance.shape))
+    weight = np.random.default_rng(0).random(40)
+    near = _near_energies(points, even, normals, weight).toarray()
+    whole = _energies(points, weight[:, None] * normals, weight, np.arange(40), even.spacing[0], 40)
+    np.testing.assert_allclose(near, whole - np.diag(np.diag(whole)), rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_flip_of_a_point_improves_settled_signs(seed):
+    """And from there nothing flips any more."""
+    rng = np.random.default_rng(seed)
+    energy = np.triu(rng.standard_normal((60, 60)) * (rng.random((60, 60)) < 0.2), 1)
+    energy = sparse.csr_array(energy + energy.T)
+    sign = _settled(energy)
+    assert (sign * (energy @ sign) >= -1e-12).all()
+    assert sign @ energy @ sign > np.ones(60) @ energy @ np.ones(60)
+    gauge = sparse.diags_array(sign)
+    np.testing.assert_array_equal(_settled((gauge @ energy @ gauge).tocsr()), np.ones(60))
+
+
+def test_single_points_among_others_are_turned():
+    """Of a sphere whose points were given signs by a bad tree, by the energy alone."""
+    sphere = fibonacci_sphere(800)
+    signs = np.where(np.random.default_rng(0).random(800) < 0.2, -1.0, 1.0)
+    nearest = find_nearest(sphere)
+    settled = _settled(_near_energies(sphere, nearest, signs[:, None] * sphere, nearest.spacing**2))
+    np.testing.assert_array_equal(settled * signs, np.ones(800))
 
 
 def test_operator_takes_the_side_and_nothing_else_changes():
