@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ..arguments import real
 from ..blocks import blocks, on_all_cores
@@ -16,6 +17,8 @@ from .sides import find_sides
 
 _BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
 _REACH = 3.0  # spacings along the surface that a point is known for: wider gaps are holes
+_COVERED = 1.5  # voxels between a point and the next cut: a mesh passes there
+_BARE = 0.05  # share of the points that may stay without a mesh; less than 0.002 do where sides are found
 _ROUNDS = 2  # of moving vertices onto the surface, after which they are a thousandth of a voxel off
 _FRAGMENT = 20.0  # cells of points that a piece of the mesh covers at least: fewer points make no surface
 _FEWEST = 20  # faces of a mesh that is no shapeless lump
@@ -228,17 +231,42 @@ def _cuts(surface, grid, keys, report):
         begin = np.flatnonzero(keys[place] == keys + step)
         edges.append((begin, place[begin], np.full(len(begin), axis)))
     first, second, axis = (np.concatenate(part) for part in zip(*edges, strict=True))
-    side = find_sides(surface, there, corners, first, second)
-    surface.turn(np.bincount(there.nearest, side * there.height, len(surface.points)) < 0.0)
+    wrong = np.zeros(len(surface.points), dtype=bool)
+    for around in True, False:
+        surface.turn(wrong)  # as they were
+        side = find_sides(surface, there, corners, first, second, around)
+        wrong = np.bincount(there.nearest, side * there.height, len(surface.points)) < 0.0
+        surface.turn(wrong)
+        edge, cut, belongs = _between(surface, corners, first, second, axis, side, report)
+        # Ways around that lead through what is no thin part but a gap take the surface between with them.
+        if _bare(surface, cut[belongs]) <= _BARE:
+            break
+    return keys[first[edge]], axis[edge], side[first[edge]] < 0.0, cut, belongs
 
-    between = side[first] != side[second]
-    first, second, axis = first[between], second[between], axis[between]
-    forward, cut = side[first] < 0.0, corners[first]
-    nearest = surface.nearest(0.5 * (corners[first] + corners[second]))
+
+def _between(surface, corners, first, second, axis, side, report):
+    """Find the edges between corners on two sides.
+
+    Returns
+    -------
+    ndarrays, (k,) int, (k, 3), (k,) bool
+        Their numbers, where they are cut, and whether the surface there is that of the points.
+    """
+    edge = np.flatnonzero(side[first] != side[second])
+    first, second, axis = first[edge], second[edge], axis[edge]
+    cut, nearest = corners[first], surface.nearest(0.5 * (corners[first] + corners[second]))
     low, high = surface.over(nearest, corners[first]), surface.over(nearest, corners[second])
     crossed = (low < 0.0) != (high < 0.0)  # elsewhere it is closed around sharp rims
     cut[np.arange(len(cut)), axis] += np.where(crossed, low / np.where(crossed, low - high, 1.0), 0.5)
-    return keys[first], axis, forward, cut, surface.heights(cut, report).belongs
+    return edge, cut, surface.heights(cut, report).belongs
+
+
+def _bare(surface, cut):
+    """Return the share of points without a cut near them, which get no mesh."""
+    if not len(cut):
+        return 1.0
+    apart = cKDTree(cut).query(surface.points, distance_upper_bound=_COVERED, workers=-1)[0]
+    return np.mean(np.isinf(apart))
 
 
 def _quads(grid, begin, axis, forward, cut, belongs):

@@ -5,13 +5,11 @@ from scipy import sparse
 
 from ..geometry import ON, SMOOTH
 
-_FAINT = (
-    0.1  # what an edge that cuts a quadric far from all points tells for one side, where one near them tells for two
-)
+_FAINT = 0.1  # what an edge far from all points tells for one side, beside one next to them
 _PAST = 1.0  # how far beyond the boundary a surface has no sides
 
 
-def find_sides(surface, there, places, first, second):
+def find_sides(surface, there, places, first, second, around):
     """Tell on which of two sides places near a surface are.
 
     Each edge between two places tells whether its ends are on one side or on two, by the quadrics of the points next to
@@ -27,19 +25,21 @@ def find_sides(surface, there, places, first, second):
     places : ndarray, (k, 3)
     first, second : ndarray, (e,) int
         Places at the ends of edges, which are of length one.
+    around : bool
+        Whether ways through the empty space far from points count in full, as ways around thin parts do; else faintly.
 
     Returns
     -------
     ndarray, (k,)
         1.0 on the side that most normals point to in each group of places that edges join, -1.0 on the other.
     """
-    told = _told(surface, there, places, first, second)
+    told = _told(surface, there, places, first, second, around)
     side, group = agreeing(len(places), first, second, told)
     votes = np.bincount(group, side * there.height * there.support)
     return np.where(votes[group] < 0.0, -side, side)
 
 
-def _told(surface, there, places, first, second):
+def _told(surface, there, places, first, second, around):
     """Return by how much each edge tells that its ends are on one side; negative for two, (e,).
 
     An end that is close to the surface tells little. That a quadric is cut counts as far as points support it, so that
@@ -54,8 +54,9 @@ def _told(surface, there, places, first, second):
     cosine = np.einsum("ij,ij->i", surface.normals[own], surface.normals[other])
     apart = np.abs(surface.over(own, surface.points[other])) + np.abs(surface.over(other, surface.points[own]))
     one = (np.abs(cosine) > SMOOTH) & (apart < 2.0 * ON * (surface.spacing[own] + surface.spacing[other]))
-    support = there.support
-    told *= np.where(cut, np.where(one, _FAINT - np.minimum(support[first], support[second]), 0.0), 1.0)
+    support = np.minimum(there.support[first], there.support[second])
+    whole = 1.0 if around else np.maximum(support, _FAINT)
+    told *= np.where(cut, np.where(one, _FAINT - support, 0.0), whole)
     unknown = (cut != (by_other[0] * by_other[1] < 0.0)) | (
         np.maximum(there.beyond[first], there.beyond[second]) > _PAST
     )
