@@ -14,6 +14,7 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
+    point_count,
     read_attribute,
 )
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
@@ -33,6 +34,7 @@ from .display import (
     without_unreached,
 )
 from .nodes import (
+    DISC_COST,
     DISCS,
     INK,
     MOST,
@@ -51,7 +53,7 @@ from .nodes import (
 from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
-_MOST_WITHOUT_CARD = 20_000  # points that two processors draw five times a second, with the rest of the window
+_MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
 _NO_SPACING = 0.01  # stands in where points are too few to have one
 
 
@@ -210,21 +212,34 @@ def resize(obj):
 
 
 def reshape(obj):
-    """Draw discs and strokes where chosen and known; while handles move the points, dots, which need no turn."""
+    """Draw discs and strokes where chosen and known; while handles move the points, dots, which need no turn.
+
+    Dots would hide which points are selected in Edit Mode, and Blender 5.2 draws all of them as selected. So there they
+    are only seen with the colors of groups, and where they show what handles move.
+    """
     modifier = find_display(obj)
     if modifier is not None:
-        group, turned = modifier.node_group, DISC in obj.data.attributes and find_deform(obj) is None
+        group, bound = modifier.node_group, find_deform(obj) is not None
+        turned = DISC in obj.data.attributes and not bound
         formed = obj.meshfree.point_shape == "DISCS"
         if has_input(group, DISCS):
             set_input(modifier, DISCS, turned and formed)
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
+        dots = not (turned and formed and _few(obj, modifier))
+        modifier.show_in_editmode = obj.type != "MESH" or not dots or bound or obj.meshfree.show_groups
         if has_input(group, STROKES):
             stroked = turned and _has_strokes(obj)
             set_input(modifier, STROKES, shown_attribute(obj) if stroked else "")
             if stroked and get_input(modifier, INK) is None:  # else one of the user's choice stays
                 set_input(modifier, INK, stroke_material())
     obj.update_tag()
+
+
+def _few(obj, modifier):
+    """Whether the viewport draws as many discs as there are points."""
+    most = get_input(modifier, MOST)
+    return not most or DISC_COST * point_count(obj.data) <= most
 
 
 def _has_strokes(obj):

@@ -46,6 +46,28 @@ def display_points(obj):
     ]
 
 
+def rendered_faces(obj):
+    """Count the faces of an object that a render gets."""
+    found, scene = [], bpy.context.scene
+
+    class Counting(bpy.types.RenderEngine):
+        bl_idname, bl_label = "COUNTING", "Counting"
+
+        def render(self, depsgraph):
+            found.append(len(obj.evaluated_get(depsgraph).data.polygons))
+
+    bpy.utils.register_class(Counting)
+    try:
+        scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+        scene.collection.objects.link(scene.camera)
+        scene.render.engine = "COUNTING"
+        bpy.ops.render.render()
+    finally:
+        bpy.utils.unregister_class(Counting)
+    (faces,) = found
+    return faces
+
+
 def test_analysis_shows_its_result(display, obj):
     assert display.shown_attribute(obj) == "lb_mean_curvature"
 
@@ -78,6 +100,31 @@ def test_a_limited_viewport_draws_a_share_of_the_points_which_cover_as_much(disp
     ((fewer, _, larger, _),) = display_points(obj)
     assert fewer == 1000
     assert larger == pytest.approx(radii)
+
+
+@pytest.mark.parametrize(("most", "kind"), [(0, "discs"), (2000, "discs"), (1999, "dots"), (500, "dots")])
+def test_a_limited_viewport_draws_dots_from_half_its_limit_on_and_renders_draw_discs(
+    display, modifiers, obj, most, kind
+):
+    obj.meshfree.point_shape = "DISCS"
+    modifiers.set_input(display.find_display(obj), "Viewport Points", most)
+    obj.meshfree.point_size = obj.meshfree.point_size  # tells of it
+    faces = len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons)
+    assert (faces, len(display_points(obj))) == ((8000, 0) if kind == "discs" else (0, 1))
+    modifier = display.find_display(obj)
+    assert modifier.show_in_editmode == (kind == "discs")
+    assert rendered_faces(obj) == 8000
+
+
+def test_dots_hide_no_selection_in_edit_mode(display, obj):
+    modifier = display.find_display(obj)
+    assert not modifier.show_in_editmode
+    obj.meshfree.point_shape = "DISCS"
+    assert modifier.show_in_editmode
+    obj.meshfree.point_shape = "DOTS"
+    assert not modifier.show_in_editmode
+    obj.meshfree.show_groups = True  # asked for
+    assert modifier.show_in_editmode
 
 
 def test_no_loose_vertex_is_drawn_over_the_points(obj):
