@@ -64,7 +64,7 @@ def figure09(path):
     studio.grid(rows, path, size=(760, 500))
 
 
-def domains(points, mode, like=None, radius=studio.TOUCHING, **settings):
+def domains(points, mode, like=None, **settings):
     """Add an object that shows the nodal domains of a mode, analyzed with these settings.
 
     Each has the color of its match on an earlier object, or else they are numbered in the order of the points.
@@ -83,7 +83,7 @@ def domains(points, mode, like=None, radius=studio.TOUCHING, **settings):
         labels = matched(labels, attributes.read_attribute(like.data, attributes.SEGMENT))
     attributes.write_attribute(obj.data, attributes.SEGMENT, labels)
     obj.meshfree.color_map = "CATEGORICAL"
-    studio.show(obj, attributes.SEGMENT, radius)
+    studio.show(obj, attributes.SEGMENT)
     return obj
 
 
@@ -132,7 +132,7 @@ def figure16(path):
     from benchmarks.samplings import sausage
 
     points = sausage(bent=True)[0][:, [0, 2, 1]]
-    rows = [[domains(points, 2, radius=0.8, sheets=sheets)] for sheets in (False, True)]
+    rows = [[domains(points, 2, sheets=sheets)] for sheets in (False, True)]
     studio.grid(rows, path, view=(0.0, -1.0, 0.2), size=(640, 440), gap=0.25)
 
 
