@@ -14,7 +14,6 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
-    point_count,
     read_attribute,
 )
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
@@ -26,6 +25,7 @@ from . import colormaps, legend
 from .display import (
     NAME,
     component,
+    draws_discs,
     find_display,
     find_material,
     is_texture,
@@ -34,7 +34,6 @@ from .display import (
     without_unreached,
 )
 from .nodes import (
-    DISC_COST,
     DISCS,
     INK,
     MOST,
@@ -226,7 +225,7 @@ def reshape(obj):
             set_input(modifier, DISCS, turned and formed)
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
-        dots = not (turned and formed and _few(obj, modifier))
+        dots = not (turned and formed and draws_discs(obj))
         modifier.show_in_editmode = obj.type != "MESH" or not dots or bound or obj.meshfree.show_groups
         if has_input(group, STROKES):
             stroked = turned and _has_strokes(obj)
@@ -234,12 +233,6 @@ def reshape(obj):
             if stroked and get_input(modifier, INK) is None:  # else one of the user's choice stays
                 set_input(modifier, INK, stroke_material())
     obj.update_tag()
-
-
-def _few(obj, modifier):
-    """Whether the viewport draws as many discs as there are points."""
-    most = get_input(modifier, MOST)
-    return not most or DISC_COST * point_count(obj.data) <= most
 
 
 def _has_strokes(obj):
