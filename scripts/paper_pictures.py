@@ -64,7 +64,7 @@ def figure09(path):
     studio.grid(rows, path, size=(760, 500))
 
 
-def domains(points, mode, like=None, **settings):
+def domains(points, mode, like=None, radius=0.0, **settings):
     """Add an object that shows the nodal domains of a mode, analyzed with these settings.
 
     Each has the color of its match on an earlier object, or else they are numbered in the order of the points.
@@ -83,7 +83,7 @@ def domains(points, mode, like=None, **settings):
         labels = matched(labels, attributes.read_attribute(like.data, attributes.SEGMENT))
     attributes.write_attribute(obj.data, attributes.SEGMENT, labels)
     obj.meshfree.color_map = "CATEGORICAL"
-    studio.show(obj, attributes.SEGMENT)
+    studio.show(obj, attributes.SEGMENT, radius)
     return obj
 
 
@@ -106,8 +106,10 @@ def figure11(path):
     around = np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))
     noisy = points + 0.03 * around * np.random.default_rng(0).standard_normal(points.shape)  # as in the benchmark
     upright = [0, 2, 1]
-    clean = domains(points[:, upright], 6)
-    studio.grid([[clean, domains(noisy[:, upright], 6, clean)]], path, view=(0.3, -1.0, 0.4), size=(760, 360))
+    clean = domains(points[:, upright], 6, radius=studio.TOUCHING)  # by dots: so noisy discs stick out
+    studio.grid(
+        [[clean, domains(noisy[:, upright], 6, clean, studio.TOUCHING)]], path, view=(0.3, -1.0, 0.4), size=(760, 360)
+    )
 
 
 def figure15(path):

@@ -16,7 +16,8 @@ MODULE = "bl_ext.user_default.meshfree_laplacian"
 LEGEND_WIDTH = 0.38  # of the picture's height
 VIEW = (0.45, -1.0, 0.35)  # direction towards the camera
 LENS, FAR_LENS = 50.0, 250.0  # focal length, mm; objects in a row are seen from the same side by the latter
-CLOSED = 2.0  # radius of points without any gap, which would show as dark holes in clay, in units of their spacing
+TOUCHING = 1.6  # radius of dots that make a closed surface, in units of their spacing
+CLOSED = 2.0  # without any gap, which would show as dark holes in clay
 SIZE, WIDE = (640, 400), (800, 360)  # of pictures of the manual, in pixels
 SAMPLES = 64  # rays per pixel of these
 LEVELS = 52  # of each color in pictures of many objects: the background stays gray
@@ -204,9 +205,11 @@ def aim(scene, points, view, margin=0.05, room=LEGEND_WIDTH):
 
 
 def show(obj, attribute, radius=0.0):
-    """Show an attribute of an object as colours on its surface, or on points of a radius in units of their spacing."""
+    """Show an attribute of an object as colours on its surface, or on dots of a radius in units of their spacing."""
     activate(obj)
-    if not radius and part("operators.objects.attributes").DISC not in obj.data.attributes:
+    if radius:
+        obj.meshfree.point_shape = "DOTS"
+    elif part("operators.objects.attributes").DISC not in obj.data.attributes:
         bpy.ops.meshfree.show_surface()
     bpy.ops.meshfree.colormap(attribute=attribute, radius=radius * part("operators.objects.reading").spacing(obj.data))
 
@@ -214,11 +217,9 @@ def show(obj, attribute, radius=0.0):
 def show_shape(obj, normals="", like=None):
     """Show an object as if made of clay, its points as large as those of another one.
 
-    An attribute of normals makes the shading smooth, and discs of points where those are known.
+    An attribute of normals makes the shading smooth.
     """
     modifier = add_display(obj, CLOSED * part("operators.objects.reading").spacing((like or obj).data))
-    discs = bool(normals) and part("operators.objects.attributes").DISC in obj.data.attributes
-    part("operators.objects.modifiers").set_input(modifier, part("ui.nodes").DISCS, discs)
     part("operators.objects.modifiers").set_input(modifier, "Material", paint("Clay", CLAY, normals))
 
 
@@ -370,7 +371,7 @@ def deformed_row(rest, obj, path, view=VIEW, size=(960, 340)):
     colored = make_object(world_points(obj), "Colored")
     part("operators.objects.attributes").write_attribute(colored.data, "lb_displacement", displacement)
     colored.meshfree.coverage = 100.0
-    show(colored, "lb_displacement")
+    show(colored, "lb_displacement", TOUCHING)  # like those beside it
     for shape in (rest, obj):
         activate(shape)
         bpy.ops.meshfree.analyze(show=False)
