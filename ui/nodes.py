@@ -13,6 +13,7 @@ from .value_range import CLASSES, STEPPED
 MOST = "Viewport Points"  # input of the display: how many it draws there
 DISCS = "Discs"  # another: whether it draws discs
 STROKES = "Strokes"  # another: the attribute that has them
+FILLED = "Filled"  # another: whether dots are as large as discs
 SPLATS = "Splats"  # another: whether it draws their ellipsoids
 LENGTH, INK = "Stroke Length", "Stroke Material"  # others: what they look like
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
@@ -58,6 +59,7 @@ def display_group():
     )
     most.min_value = 0
     add_input(group, DISCS, "Bool", f"Draw discs that lie in the surface, as the attribute {DISC} says")
+    add_input(group, FILLED, "Bool", f"Draw dots as large as the discs of {DISC}, so that they leave no holes")
     add_input(group, SPLATS, "Bool", f"Draw ellipsoids, as the attributes {SCALE} and {ROTATION} say")
     add_input(
         group, STROKES, "String", "Attribute with directions along the surface, which strokes show; empty for none"
@@ -159,11 +161,15 @@ def _shaped(group, given, points, size, many):
     turned = add_node(group, "FunctionNodeAlignRotationToVector", 6, -500, axis="Z")
     length = add_node(group, "ShaderNodeVectorMath", 6, -900, operation="LENGTH")
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -300)
+    larger = add_node(group, "ShaderNodeMix", 8, -700)
+    larger.inputs["A"].default_value = 1.0
+    dots = add_node(group, "GeometryNodeSetPointRadius", 8, -500)
     discs = add_node(group, "FunctionNodeBooleanMath", 8, -100, operation="NIMPLY")
     chosen = add_node(group, "GeometryNodeSwitch", 9, -200, input_type="GEOMETRY")
     splats = add_node(group, "GeometryNodeSwitch", 9, -500, input_type="GEOMETRY")
     unknown = _math(group, 7, -1300, "LESS_THAN", length.outputs["Value"], 1e-6)  # of points added since: like a dot
-    scale = _math(group, 7, -900, "MULTIPLY", _math(group, 7, -1100, "ADD", length.outputs["Value"], unknown), size)
+    reach = _math(group, 7, -1100, "ADD", length.outputs["Value"], unknown)
+    scale = _math(group, 7, -900, "MULTIPLY", reach, size)
     for source, target in (
         (disc.outputs["Attribute"], turned.inputs["Vector"]),
         (disc.outputs["Attribute"], length.inputs[0]),
@@ -175,7 +181,11 @@ def _shaped(group, given, points, size, many):
         (given.outputs[DISCS], discs.inputs[0]),
         (many, discs.inputs[1]),
         (discs.outputs[0], chosen.inputs["Switch"]),
-        (points, chosen.inputs["False"]),
+        (given.outputs[FILLED], larger.inputs["Factor"]),
+        (reach, larger.inputs["B"]),
+        (points, dots.inputs["Points"]),
+        (_math(group, 9, -700, "MULTIPLY", larger.outputs["Result"], size), dots.inputs["Radius"]),
+        (dots.outputs["Points"], chosen.inputs["False"]),
         (_corners(group, 8, -300, placed.outputs["Instances"]), chosen.inputs["True"]),
         (given.outputs[SPLATS], splats.inputs["Switch"]),
         (chosen.outputs["Output"], splats.inputs["False"]),

@@ -35,6 +35,7 @@ from .display import (
 )
 from .nodes import (
     DISCS,
+    FILLED,
     INK,
     MOST,
     SPLATS,
@@ -219,10 +220,13 @@ def reshape(obj):
     modifier = find_display(obj)
     if modifier is not None:
         group, bound = modifier.node_group, find_deform(obj) is not None
-        turned = DISC in obj.data.attributes and not bound
+        known = DISC in obj.data.attributes
+        turned = known and not bound
         formed = obj.meshfree.point_shape == "DISCS"
         if has_input(group, DISCS):
             set_input(modifier, DISCS, turned and formed)
+        if has_input(group, FILLED):
+            set_input(modifier, FILLED, known and formed)
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
         dots = not (turned and formed and draws_discs(obj))

@@ -116,6 +116,19 @@ def test_a_limited_viewport_draws_dots_from_half_its_limit_on_and_renders_draw_d
     assert rendered_faces(obj) == 8000
 
 
+def test_dots_in_place_of_discs_are_as_large_as_these(display, modifiers, obj):
+    spacing = obj.meshfree.spacing
+    obj.meshfree.point_size = 1.5
+    ((_, _, chosen, _),) = display_points(obj)
+    assert chosen == pytest.approx(1.5 * spacing)
+    modifiers.set_input(display.find_display(obj), "Viewport Points", 1000)
+    obj.meshfree.point_shape = "DISCS"
+    ((_, _, filled, _),) = display_points(obj)
+    reach = np.linalg.norm(attribute(obj, "lb_disc"), axis=1)
+    assert np.ptp(reach) > 0.3
+    assert filled == pytest.approx(1.5 * spacing * reach, rel=1e-5)
+
+
 def test_dots_hide_no_selection_in_edit_mode(display, obj):
     modifier = display.find_display(obj)
     assert not modifier.show_in_editmode
