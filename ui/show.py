@@ -130,10 +130,12 @@ def show_groups(obj):
     plain = material is not None and is_plain(material)
     if plain and not obj.meshfree.show_groups:
         set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
-        obj.modifiers.remove(modifier)
+        if DISC not in obj.data.attributes:  # else it shows the surface
+            obj.modifiers.remove(modifier)
         if not material.users - material.use_fake_user:
             bpy.data.materials.remove(material)
-    elif modifier is None and obj.meshfree.show_groups:
+        reshape(obj)
+    elif obj.meshfree.show_groups and (modifier is None or get_input(modifier, "Material") is None):
         _add_display(obj)
         resize(obj)
         plain = True
