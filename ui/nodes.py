@@ -492,8 +492,9 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
         tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], separate.inputs[0])
         number = separate.outputs[component]
     place = number
-    if repeated:  # -1 and below have one colour, 0 and above repeat
-        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", number, -1.0), CLASSES)
+    if repeated:  # -1 and below have one colour, 0 and above repeat; on discs Cycles gives a little less than 7 for 7
+        whole = _math(tree, 1, 400, "ROUND", number)
+        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", whole, -1.0), CLASSES)
     bounds = add_node(tree, "ShaderNodeMapRange", 3, 0, name=RANGE)
     ramp = add_node(tree, "ShaderNodeValToRGB", 4, 0, name=COLORS)
     tree.links.new(place, bounds.inputs["Value"])

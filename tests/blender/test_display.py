@@ -358,8 +358,8 @@ def test_legend_lies_inside_the_picture_and_is_made_once(extension, display, obj
             assert camera.data.clip_start < depth
 
 
-def dark_share(path):
-    """Render what there is, seen from above, and return which share of it is nearly black."""
+def rendered(path):
+    """Render what there is, seen from above, and return the colors of its pixels, (n, 3)."""
     scene = bpy.context.scene
     camera = scene.camera or bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     if scene.camera is None:
@@ -374,7 +374,29 @@ def dark_share(path):
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(str(path))
     pixels = np.array(image.pixels).reshape(-1, 4)
-    return np.mean(pixels[pixels[:, 3] == 1.0][:, :3].max(axis=1) < 0.2)
+    return pixels[pixels[:, 3] == 1.0][:, :3]
+
+
+def dark_share(path):
+    """Render what there is, and return which share of it is nearly black."""
+    return np.mean(rendered(path).max(axis=1) < 0.2)
+
+
+def test_repeated_colors_are_even_on_discs(tmp_path):
+    points, _ = grid_points()
+    obj = add_object(points - points.mean(axis=0))
+    obj.data.attributes.new("lb_segment", "INT", "POINT")
+    bpy.ops.meshfree.show_surface()
+    obj.meshfree.color_map = "CATEGORICAL"
+    found = []
+    for number in (0, 7):  # of the same color
+        segment = obj.data.attributes["lb_segment"].data
+        segment.foreach_set("value", np.full(len(points), number, np.int32))
+        bpy.ops.meshfree.colormap(attribute="lb_segment")
+        found.append(rendered(tmp_path / f"{number}.png"))
+    first, repeated = found
+    assert repeated.mean(axis=0) == pytest.approx(first.mean(axis=0), abs=0.01)
+    assert repeated.std(axis=0) == pytest.approx(first.std(axis=0), abs=0.02)
 
 
 def test_iso_lines_lie_inside_the_range(obj, tmp_path):
