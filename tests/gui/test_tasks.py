@@ -88,6 +88,27 @@ class TestTasks:
         assert gui.python("everything(bpy.data.objects['Cloud']) == before")
 
 
+class TestSelection:
+    """What is selected in Edit Mode is seen."""
+
+    @pytest.mark.parametrize("shape", ["DISCS", "DOTS"])
+    def test_selected_and_not(self, gui, shape):
+        add_sphere(gui, 1500)
+        gui.python(f"bpy.ops.meshfree.show_surface(); bpy.context.object.meshfree.point_shape = {shape!r}")
+        gui.key("KP_1", "Home", "Tab", "a")
+        gui.wait_until("bpy.context.object.mode == 'EDIT'")
+        x, y, width, height = gui.region()
+        middle = (x + 0.2 * width, y + 0.2 * height, 0.5 * width, 0.7 * height)
+
+        def orange():
+            red, green, blue = gui.pixels(middle).astype(int).transpose(2, 0, 1)
+            return ((red > 220) & (green > 90) & (green < 190) & (blue < 90)).sum()
+
+        gui.wait_for(lambda: orange() > 2000, "the points are orange")
+        gui.key("alt+a")
+        gui.wait_for(lambda: orange() < 200, "no point is orange")
+
+
 class TestPicked:
     """Tools that begin at a point that one clicks."""
 
