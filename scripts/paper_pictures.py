@@ -64,7 +64,7 @@ def figure09(path):
     studio.grid(rows, path, size=(760, 500))
 
 
-def domains(points, mode, like=None, radius=studio.TOUCHING, **settings):
+def domains(points, mode, like=None, radius=0.0, **settings):
     """Add an object that shows the nodal domains of a mode, analyzed with these settings.
 
     Each has the color of its match on an earlier object, or else they are numbered in the order of the points.
@@ -91,10 +91,12 @@ def figure10(path):
     """Nodal domains of modes 2, 4 and 10 on a plane and on two parabolic cylinders."""
     from benchmarks.samplings import parabolic_cylinder
 
-    rows = [[domains(parabolic_cylinder(0.0), mode) for mode in (2, 4, 10)]]
+    # By dots: discs that are seen from behind, as the inside of these, stick out of each other.
+    radius = studio.TOUCHING
+    rows = [[domains(parabolic_cylinder(0.0), mode, radius=radius) for mode in (2, 4, 10)]]
     for bend in (0.5, 1.0):
         points = parabolic_cylinder(bend)
-        rows.append([domains(points, mode, like) for mode, like in zip((2, 4, 10), rows[0], strict=True)])
+        rows.append([domains(points, mode, like, radius) for mode, like in zip((2, 4, 10), rows[0], strict=True)])
     studio.grid(rows, path, view=(0.3, -1.0, 0.8), size=(760, 500))
 
 
@@ -106,8 +108,10 @@ def figure11(path):
     around = np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))
     noisy = points + 0.03 * around * np.random.default_rng(0).standard_normal(points.shape)  # as in the benchmark
     upright = [0, 2, 1]
-    clean = domains(points[:, upright], 6)
-    studio.grid([[clean, domains(noisy[:, upright], 6, clean)]], path, view=(0.3, -1.0, 0.4), size=(760, 360))
+    clean = domains(points[:, upright], 6, radius=studio.TOUCHING)  # by dots: so noisy discs stick out
+    studio.grid(
+        [[clean, domains(noisy[:, upright], 6, clean, studio.TOUCHING)]], path, view=(0.3, -1.0, 0.4), size=(760, 360)
+    )
 
 
 def figure15(path):
@@ -132,7 +136,7 @@ def figure16(path):
     from benchmarks.samplings import sausage
 
     points = sausage(bent=True)[0][:, [0, 2, 1]]
-    rows = [[domains(points, 2, radius=0.8, sheets=sheets)] for sheets in (False, True)]
+    rows = [[domains(points, 2, sheets=sheets)] for sheets in (False, True)]
     studio.grid(rows, path, view=(0.0, -1.0, 0.2), size=(640, 440), gap=0.25)
 
 

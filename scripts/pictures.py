@@ -124,7 +124,7 @@ def orient(path):
         layer = obj.data.attributes.new("outer", "FLOAT", "POINT")
         layer.data.foreach_set("value", np.sign(outer).astype(np.float32))
         obj.meshfree.color_map = "COOL_WARM"
-        studio.show(obj, "outer")
+        studio.show(obj, "outer", studio.TOUCHING)
         studio.set_range(obj, -1.0, 1.0)
     row((before, after), path, legend=None)
 

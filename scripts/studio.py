@@ -16,7 +16,7 @@ MODULE = "bl_ext.user_default.meshfree_laplacian"
 LEGEND_WIDTH = 0.38  # of the picture's height
 VIEW = (0.45, -1.0, 0.35)  # direction towards the camera
 LENS, FAR_LENS = 50.0, 250.0  # focal length, mm; objects in a row are seen from the same side by the latter
-TOUCHING = 1.6  # radius of points that make a closed surface, in units of their spacing
+TOUCHING = 1.6  # radius of dots that make a closed surface, in units of their spacing
 CLOSED = 2.0  # without any gap, which would show as dark holes in clay
 SIZE, WIDE = (640, 400), (800, 360)  # of pictures of the manual, in pixels
 SAMPLES = 64  # rays per pixel of these
@@ -204,9 +204,13 @@ def aim(scene, points, view, margin=0.05, room=LEGEND_WIDTH):
     return rotation
 
 
-def show(obj, attribute, radius=TOUCHING):
-    """Show an attribute of an object as colours on its points, whose radius is given in units of their spacing."""
+def show(obj, attribute, radius=0.0):
+    """Show an attribute of an object as colours on its surface, or on dots of a radius in units of their spacing."""
     activate(obj)
+    if radius:
+        obj.meshfree.point_shape = "DOTS"
+    elif part("operators.objects.attributes").DISC not in obj.data.attributes:
+        bpy.ops.meshfree.show_surface()
     bpy.ops.meshfree.colormap(attribute=attribute, radius=radius * part("operators.objects.reading").spacing(obj.data))
 
 
@@ -367,7 +371,7 @@ def deformed_row(rest, obj, path, view=VIEW, size=(960, 340)):
     colored = make_object(world_points(obj), "Colored")
     part("operators.objects.attributes").write_attribute(colored.data, "lb_displacement", displacement)
     colored.meshfree.coverage = 100.0
-    show(colored, "lb_displacement")
+    show(colored, "lb_displacement", TOUCHING)  # like those beside it
     for shape in (rest, obj):
         activate(shape)
         bpy.ops.meshfree.analyze(show=False)

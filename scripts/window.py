@@ -285,10 +285,14 @@ class Window:
             "with bpy.context.temp_override(window=main_window().id_data.windows[1]): bpy.ops.wm.window_close()"
         )
         self.wait_until("len(bpy.context.window_manager.windows) == 1")
-        (window,) = self._windows()
-        self._xdotool("windowsize", window, *map(str, SIZE), "windowfocus", window)
-        self.wait_until(f"main_window().width == {SIZE[0]}")
+        self.resize(*SIZE)
         self.point_at_view()
+
+    def resize(self, width, height):
+        """Give Blender's only window a size, and the keys."""
+        (window,) = self._windows()
+        self._xdotool("windowsize", window, str(width), str(height), "windowfocus", window)
+        self.wait_until(f"(main_window().width, main_window().height) == ({width}, {height})")
 
     def _windows(self):
         """Numbers of Blender's windows on the screen, the latest last."""

@@ -27,6 +27,13 @@ FRONT = """
 view.region_3d.view_rotation = Euler((np.pi / 2, 0.0, 0.0)).to_quaternion()
 view.region_3d.view_perspective = "ORTHO"
 """
+SURFACE = """
+import sys
+bpy.ops.meshfree.show_surface()
+modifiers = next(module for name, module in sys.modules.items() if name.endswith("operators.objects.modifiers"))
+modifiers.set_input(thing.modifiers[-1], "Viewport Points", 0)  # as with a graphics card
+thing.meshfree.point_shape = "DISCS"
+"""
 WORKING = "len(main_window().modal_operators)"
 
 
@@ -36,6 +43,7 @@ def begin(gui, *panels, count=POINTS):
     gui.new_file()
     gui.python((ROOT / "scripts" / "coral.py").read_text(encoding="utf-8"))
     gui.python(CORAL.format(count=count))
+    gui.python(SURFACE)
     gui.open_tab()
 
 
@@ -63,6 +71,7 @@ def analyzed(gui):
     gui.settle()
     gui.python("bpy.ops.meshfree.colormap(attribute='lb_eigenvector_008')")
     gui.python("bpy.context.object.select_set(False)")
+    gui.point_at_view()
 
 
 def seeing(gui):
@@ -91,6 +100,9 @@ def groups(gui):
     gui.press("meshfree.group_from_selection(role='ANCHOR'")
     box(gui, 1.1, 2.0)
     gui.press("meshfree.group_from_selection(role='HANDLE'")
+    gui.python("bpy.context.object.meshfree.show_groups = True")
+    gui.python("view.shading.type = 'MATERIAL'")
+    gui.point_at_view()
 
 
 def deform(gui):
@@ -108,6 +120,10 @@ def deform(gui):
     gui.wait_until("'Coral Handle' in bpy.data.objects", 60)
     gui.python("bpy.data.objects['Coral Handle'].location.x += 0.7")
     gui.python("bpy.data.objects['Coral Handle'].rotation_euler.y = 0.7")
+    gui.python("thing.meshfree.show_groups = True")
+    gui.python("view.shading.type = 'MATERIAL'")
+    gui.python("thing.select_set(False)")
+    gui.point_at_view()
 
 
 TAKES = (working, analyzed, seeing, groups, deform)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..operators.objects.attributes import DISPLACEMENT, DISTANCE, read_attribute
-from ..operators.objects.modifiers import DISPLAY_TAG, get_input, is_display
-from .nodes import ATTRIBUTE, COLORS, RANGE
+from ..operators.objects.attributes import DISPLACEMENT, DISTANCE, point_count, read_attribute
+from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, is_display
+from .nodes import ATTRIBUTE, COLORS, DISC_COST, MOST, RANGE
 from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"
@@ -20,6 +20,13 @@ def find_material(obj):
     modifier = find_display(obj)
     material = modifier and get_input(modifier, "Material")
     return material if material is not None and DISPLAY_TAG in material else None
+
+
+def draws_discs(obj) -> bool:
+    """Whether the viewport would draw all points of an object as discs: they are not more than a limit lets it."""
+    modifier = find_display(obj)
+    most = get_input(modifier, MOST) if has_input(modifier.node_group, MOST) else 0
+    return not most or DISC_COST * point_count(obj.data) <= most
 
 
 def shown_attribute(obj) -> str:

@@ -13,11 +13,13 @@ from .value_range import CLASSES, STEPPED
 MOST = "Viewport Points"  # input of the display: how many it draws there
 DISCS = "Discs"  # another: whether it draws discs
 STROKES = "Strokes"  # another: the attribute that has them
+FILLED = "Filled"  # another: whether dots are as large as discs
 SPLATS = "Splats"  # another: whether it draws their ellipsoids
 LENGTH, INK = "Stroke Length", "Stroke Material"  # others: what they look like
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
 BACK = "Back Side"  # another: how dark what is seen from behind is
+DISC_COST = 2  # dots that take as long to draw without a graphics card as one disc
 _SIDES = 8  # of a disc
 _SLOPE = 0.25  # by which discs fall off from their points, so that each place shows the point nearest to it
 _SHARE = 1.0 / 40.0  # length of strokes in the diagonal of the object, so that they are seen where all of it is
@@ -52,9 +54,12 @@ def display_group():
     radius.default_value = 0.01
     radius.min_value = 0.0
     add_input(group, "Material", "Material", "Colors of the points")
-    most = add_input(group, MOST, "Int", "How many points the viewport draws at most, larger ones then; 0 for all")
+    most = add_input(
+        group, MOST, "Int", "How many points the viewport draws at most, dots from half of that on; 0 for all"
+    )
     most.min_value = 0
     add_input(group, DISCS, "Bool", f"Draw discs that lie in the surface, as the attribute {DISC} says")
+    add_input(group, FILLED, "Bool", f"Draw dots as large as the discs of {DISC}, so that they leave no holes")
     add_input(group, SPLATS, "Bool", f"Draw ellipsoids, as the attributes {SCALE} and {ROTATION} say")
     add_input(
         group, STROKES, "String", "Attribute with directions along the surface, which strokes show; empty for none"
@@ -67,7 +72,7 @@ def display_group():
     neighbors = add_node(group, "GeometryNodeInputMeshVertexNeighbors", 0, -200)
     loose = add_node(group, "FunctionNodeCompare", 1, -200, data_type="INT", operation="EQUAL")
     parts = add_node(group, "GeometryNodeSeparateComponents", 1, 0)
-    drawn, larger = _thinned(group, given, parts)
+    drawn, larger, many = _thinned(group, given, parts)
     chosen = add_node(group, "FunctionNodeBooleanMath", 2, -400, operation="AND")
     size = add_node(group, "ShaderNodeMath", 2, -600, operation="MULTIPLY")
     points = add_node(group, "GeometryNodeMeshToPoints", 3, -100)
@@ -96,7 +101,7 @@ def display_group():
         (given_drawn.outputs["Selection"], every.inputs["Geometry"]),
         (size.outputs[0], points.inputs["Radius"]),
         (points.outputs["Points"], every.inputs["Geometry"]),
-        (_shaped(group, given, every.outputs["Geometry"], size.outputs[0]), joined.inputs["Geometry"]),
+        (_shaped(group, given, every.outputs["Geometry"], size.outputs[0], many), joined.inputs["Geometry"]),
         (loose.outputs["Result"], faces.inputs["Selection"]),
         (parts.outputs["Mesh"], faces.inputs["Geometry"]),
         (faces.outputs["Geometry"], joined.inputs["Geometry"]),
@@ -111,9 +116,14 @@ def display_group():
 
 
 def _thinned(group, given, parts):
-    """Add the nodes that choose which points the viewport draws; return that, and by what their radius grows.
+    """Add the nodes that choose which points the viewport draws.
 
     They are chosen at random, so that no pattern of a scanner shows, and cover what all would.
+
+    Returns
+    -------
+    drawn, larger, many : bpy.types.NodeSocket
+        Whether a point is drawn, by what its radius grows, and whether there are too many for discs.
     """
     counts = [
         add_node(group, "GeometryNodeAttributeDomainSize", 2, -800 - 200 * row, component=kind)
@@ -129,11 +139,13 @@ def _thinned(group, given, parts):
     share = _math(group, 5, -800, "POWER", share, limited)  # one where there is no limit
     random = add_node(group, "FunctionNodeRandomValue", 5, -1000, data_type="FLOAT")
     drawn = _math(group, 6, -1000, "LESS_THAN", random.outputs["Value"], _math(group, 6, -800, "ADD", share, 1e-6))
-    return drawn, _math(group, 6, -600, "POWER", share, -0.5)
+    costly = _math(group, 4, -1400, "MULTIPLY", count, float(DISC_COST))
+    costly = _math(group, 5, -1400, "GREATER_THAN", costly, given.outputs[MOST])
+    return drawn, _math(group, 6, -600, "POWER", share, -0.5), _math(group, 6, -1400, "MULTIPLY", costly, limited)
 
 
-def _shaped(group, given, points, size):
-    """Add the nodes that make points into discs where that is asked for; return what is drawn.
+def _shaped(group, given, points, size, many):
+    """Add the nodes that make points into discs where that is asked for and they are not many; return what is drawn.
 
     Flat discs stick out of each other where the surface bends outwards, like scales; cones as flat as these do not.
     """
@@ -149,10 +161,15 @@ def _shaped(group, given, points, size):
     turned = add_node(group, "FunctionNodeAlignRotationToVector", 6, -500, axis="Z")
     length = add_node(group, "ShaderNodeVectorMath", 6, -900, operation="LENGTH")
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -300)
+    larger = add_node(group, "ShaderNodeMix", 8, -700)
+    larger.inputs["A"].default_value = 1.0
+    dots = add_node(group, "GeometryNodeSetPointRadius", 8, -500)
+    discs = add_node(group, "FunctionNodeBooleanMath", 8, -100, operation="NIMPLY")
     chosen = add_node(group, "GeometryNodeSwitch", 9, -200, input_type="GEOMETRY")
     splats = add_node(group, "GeometryNodeSwitch", 9, -500, input_type="GEOMETRY")
     unknown = _math(group, 7, -1300, "LESS_THAN", length.outputs["Value"], 1e-6)  # of points added since: like a dot
-    scale = _math(group, 7, -900, "MULTIPLY", _math(group, 7, -1100, "ADD", length.outputs["Value"], unknown), size)
+    reach = _math(group, 7, -1100, "ADD", length.outputs["Value"], unknown)
+    scale = _math(group, 7, -900, "MULTIPLY", reach, size)
     for source, target in (
         (disc.outputs["Attribute"], turned.inputs["Vector"]),
         (disc.outputs["Attribute"], length.inputs[0]),
@@ -161,8 +178,14 @@ def _shaped(group, given, points, size):
         (lowered.outputs["Geometry"], placed.inputs["Instance"]),
         (turned.outputs["Rotation"], placed.inputs["Rotation"]),
         (scale, placed.inputs["Scale"]),
-        (given.outputs[DISCS], chosen.inputs["Switch"]),
-        (points, chosen.inputs["False"]),
+        (given.outputs[DISCS], discs.inputs[0]),
+        (many, discs.inputs[1]),
+        (discs.outputs[0], chosen.inputs["Switch"]),
+        (given.outputs[FILLED], larger.inputs["Factor"]),
+        (reach, larger.inputs["B"]),
+        (points, dots.inputs["Points"]),
+        (_math(group, 9, -700, "MULTIPLY", larger.outputs["Result"], size), dots.inputs["Radius"]),
+        (dots.outputs["Points"], chosen.inputs["False"]),
         (_corners(group, 8, -300, placed.outputs["Instances"]), chosen.inputs["True"]),
         (given.outputs[SPLATS], splats.inputs["Switch"]),
         (chosen.outputs["Output"], splats.inputs["False"]),
@@ -469,8 +492,9 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
         tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], separate.inputs[0])
         number = separate.outputs[component]
     place = number
-    if repeated:  # -1 and below have one colour, 0 and above repeat
-        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", number, -1.0), CLASSES)
+    if repeated:  # -1 and below have one colour, 0 and above repeat; on discs Cycles gives a little less than 7 for 7
+        whole = _math(tree, 1, 400, "ROUND", number)
+        place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", whole, -1.0), CLASSES)
     bounds = add_node(tree, "ShaderNodeMapRange", 3, 0, name=RANGE)
     ramp = add_node(tree, "ShaderNodeValToRGB", 4, 0, name=COLORS)
     tree.links.new(place, bounds.inputs["Value"])

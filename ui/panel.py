@@ -18,9 +18,9 @@ from ..operators.objects.result import area_text, is_analyzed, is_stale, read_ei
 from ..operators.objects.splats import has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
-from .display import find_display, label, range_node, shown_attribute, step_colors
+from .display import draws_discs, find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
-from .nodes import LENGTH
+from .nodes import LENGTH, MOST
 
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
@@ -70,8 +70,12 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         if job is not None:
             _draw_job(layout, job)
         reason = obstacle(obj)
-        if reason and handled_object(obj, context.scene) != obj:
-            return  # the panel of the deformation tells
+        handled = handled_object(obj, context.scene)
+        if reason and handled != obj:
+            column = layout.column(align=True)
+            column.label(text=f'Handle of "{handled.name}"', icon="OUTLINER_OB_EMPTY")
+            column.label(text="G moves it, R turns it", icon="BLANK1")
+            return  # the panel of the deformation tells more
         if reason:
             column = layout.column(align=True)
             for sentence in (reason if obstacle(obj, ("EDIT",)) else _EDITING).split(". "):
@@ -92,7 +96,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         if is_analyzed(obj):
             _draw_result(layout, obj.meshfree)
             if is_stale(obj, glance=True):
-                layout.label(text="Points or settings changed: analyze again", icon="ERROR")
+                layout.label(text="Results are stale: analyze again", icon="ERROR")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for name, text in _TASKS:
             grid.operator(f"meshfree.{name}", text=text).at_once = True
@@ -245,7 +249,8 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         _draw_mode_steps(layout, attributes, shown)
         if find_display(obj) is None:
             return
-        layout.operator("meshfree.colormap", text="Update Colors")
+        if shown in attributes:
+            layout.operator("meshfree.colormap", text="Update Colors")
         layout.use_property_split = True
         layout.use_property_decorate = False
         if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
@@ -260,6 +265,8 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             layout.prop(obj.meshfree, "point_shape")
             layout.prop(obj.meshfree, "dim_back")
         layout.prop(obj.meshfree, "point_size")
+        if not draws_discs(obj):
+            layout.prop(*input_property(find_display(obj), MOST), text=MOST)
         column = layout.column(align=True, heading="Show")
         column.prop(obj.meshfree, "legend")
         column.prop(obj.meshfree, "histogram")

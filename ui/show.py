@@ -25,6 +25,7 @@ from . import colormaps, legend
 from .display import (
     NAME,
     component,
+    draws_discs,
     find_display,
     find_material,
     is_texture,
@@ -34,6 +35,7 @@ from .display import (
 )
 from .nodes import (
     DISCS,
+    FILLED,
     INK,
     MOST,
     SPLATS,
@@ -51,7 +53,7 @@ from .nodes import (
 from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
-_MOST_WITHOUT_CARD = 20_000  # points that two processors draw five times a second, with the rest of the window
+_MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
 _NO_SPACING = 0.01  # stands in where points are too few to have one
 
 
@@ -128,10 +130,12 @@ def show_groups(obj):
     plain = material is not None and is_plain(material)
     if plain and not obj.meshfree.show_groups:
         set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
-        obj.modifiers.remove(modifier)
+        if DISC not in obj.data.attributes:  # else it shows the surface
+            obj.modifiers.remove(modifier)
         if not material.users - material.use_fake_user:
             bpy.data.materials.remove(material)
-    elif modifier is None and obj.meshfree.show_groups:
+        reshape(obj)
+    elif obj.meshfree.show_groups and (modifier is None or get_input(modifier, "Material") is None):
         _add_display(obj)
         resize(obj)
         plain = True
@@ -210,17 +214,26 @@ def resize(obj):
 
 
 def reshape(obj):
-    """Draw discs and strokes where chosen and known; strokes not while handles move the points, as they do not turn."""
+    """Draw discs and strokes where chosen and known; strokes not while handles move the points, as they do not turn.
+
+    Dots would hide which points are selected in Edit Mode, and Blender 5.2 draws all of them as selected. So there they
+    are only seen with the colors of groups, and where they show what handles move.
+    """
     modifier, deform = find_display(obj), find_deform(obj)
     if deform is not None and not is_baked(obj):
         show_live(deform)  # discs may be new
     if modifier is not None:
         group, known = modifier.node_group, DISC in obj.data.attributes
         formed = obj.meshfree.point_shape == "DISCS"
+        turned = known and formed and (deform is None or turns_discs(deform))
         if has_input(group, DISCS):
-            set_input(modifier, DISCS, known and formed and (deform is None or turns_discs(deform)))
+            set_input(modifier, DISCS, turned)
+        if has_input(group, FILLED):
+            set_input(modifier, FILLED, known and formed)
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
+        dots, bound = not (turned and draws_discs(obj)), deform is not None
+        modifier.show_in_editmode = obj.type != "MESH" or not dots or bound or obj.meshfree.show_groups
         if has_input(group, STROKES):
             stroked = known and deform is None and _has_strokes(obj)
             set_input(modifier, STROKES, shown_attribute(obj) if stroked else "")

@@ -46,6 +46,28 @@ def display_points(obj):
     ]
 
 
+def rendered_faces(obj):
+    """Count the faces of an object that a render gets."""
+    found, scene = [], bpy.context.scene
+
+    class Counting(bpy.types.RenderEngine):
+        bl_idname, bl_label = "COUNTING", "Counting"
+
+        def render(self, depsgraph):
+            found.append(len(obj.evaluated_get(depsgraph).data.polygons))
+
+    bpy.utils.register_class(Counting)
+    try:
+        scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+        scene.collection.objects.link(scene.camera)
+        scene.render.engine = "COUNTING"
+        bpy.ops.render.render()
+    finally:
+        bpy.utils.unregister_class(Counting)
+    (faces,) = found
+    return faces
+
+
 def test_analysis_shows_its_result(display, obj):
     assert display.shown_attribute(obj) == "lb_mean_curvature"
 
@@ -78,6 +100,44 @@ def test_a_limited_viewport_draws_a_share_of_the_points_which_cover_as_much(disp
     ((fewer, _, larger, _),) = display_points(obj)
     assert fewer == 1000
     assert larger == pytest.approx(radii)
+
+
+@pytest.mark.parametrize(("most", "kind"), [(0, "discs"), (2000, "discs"), (1999, "dots"), (500, "dots")])
+def test_a_limited_viewport_draws_dots_from_half_its_limit_on_and_renders_draw_discs(
+    display, modifiers, obj, most, kind
+):
+    obj.meshfree.point_shape = "DISCS"
+    modifiers.set_input(display.find_display(obj), "Viewport Points", most)
+    obj.meshfree.point_size = obj.meshfree.point_size  # tells of it
+    faces = len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons)
+    assert (faces, len(display_points(obj))) == ((8000, 0) if kind == "discs" else (0, 1))
+    modifier = display.find_display(obj)
+    assert modifier.show_in_editmode == (kind == "discs")
+    assert rendered_faces(obj) == 8000
+
+
+def test_dots_in_place_of_discs_are_as_large_as_these(display, modifiers, obj):
+    spacing = obj.meshfree.spacing
+    obj.meshfree.point_size = 1.5
+    ((_, _, chosen, _),) = display_points(obj)
+    assert chosen == pytest.approx(1.5 * spacing)
+    modifiers.set_input(display.find_display(obj), "Viewport Points", 1000)
+    obj.meshfree.point_shape = "DISCS"
+    ((_, _, filled, _),) = display_points(obj)
+    reach = np.linalg.norm(attribute(obj, "lb_disc"), axis=1)
+    assert np.ptp(reach) > 0.3
+    assert filled == pytest.approx(1.5 * spacing * reach, rel=1e-5)
+
+
+def test_dots_hide_no_selection_in_edit_mode(display, obj):
+    modifier = display.find_display(obj)
+    assert not modifier.show_in_editmode
+    obj.meshfree.point_shape = "DISCS"
+    assert modifier.show_in_editmode
+    obj.meshfree.point_shape = "DOTS"
+    assert not modifier.show_in_editmode
+    obj.meshfree.show_groups = True  # asked for
+    assert modifier.show_in_editmode
 
 
 def test_no_loose_vertex_is_drawn_over_the_points(obj):
@@ -298,8 +358,8 @@ def test_legend_lies_inside_the_picture_and_is_made_once(extension, display, obj
             assert camera.data.clip_start < depth
 
 
-def dark_share(path):
-    """Render what there is, seen from above, and return which share of it is nearly black."""
+def rendered(path):
+    """Render what there is, seen from above, and return the colors of its pixels, (n, 3)."""
     scene = bpy.context.scene
     camera = scene.camera or bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     if scene.camera is None:
@@ -314,7 +374,29 @@ def dark_share(path):
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(str(path))
     pixels = np.array(image.pixels).reshape(-1, 4)
-    return np.mean(pixels[pixels[:, 3] == 1.0][:, :3].max(axis=1) < 0.2)
+    return pixels[pixels[:, 3] == 1.0][:, :3]
+
+
+def dark_share(path):
+    """Render what there is, and return which share of it is nearly black."""
+    return np.mean(rendered(path).max(axis=1) < 0.2)
+
+
+def test_repeated_colors_are_even_on_discs(tmp_path):
+    points, _ = grid_points()
+    obj = add_object(points - points.mean(axis=0))
+    obj.data.attributes.new("lb_segment", "INT", "POINT")
+    bpy.ops.meshfree.show_surface()
+    obj.meshfree.color_map = "CATEGORICAL"
+    found = []
+    for number in (0, 7):  # of the same color
+        segment = obj.data.attributes["lb_segment"].data
+        segment.foreach_set("value", np.full(len(points), number, np.int32))
+        bpy.ops.meshfree.colormap(attribute="lb_segment")
+        found.append(rendered(tmp_path / f"{number}.png"))
+    first, repeated = found
+    assert repeated.mean(axis=0) == pytest.approx(first.mean(axis=0), abs=0.01)
+    assert repeated.std(axis=0) == pytest.approx(first.std(axis=0), abs=0.02)
 
 
 def test_iso_lines_lie_inside_the_range(obj, tmp_path):

@@ -197,6 +197,15 @@ class TestGroupColors:
         assert not grouped.modifiers
         assert not bpy.data.materials
 
+    def test_on_a_surface_without_an_analysis(self, grouped, module):
+        bpy.ops.meshfree.show_surface()
+        grouped.meshfree.show_groups = True
+        assert set(self.colors(module, grouped)) == set(ROLES)
+        grouped.meshfree.show_groups = False
+        assert len(grouped.modifiers) == 1  # which shows the surface
+        assert module("ui.display").find_material(grouped) is None
+        assert not bpy.data.materials
+
     def test_without_points(self, module, capfd):
         obj = add_object([])
         obj.meshfree.show_groups = True

@@ -192,6 +192,24 @@ def test_panel_tells_calmly_of_groups_without_points():
     assert "No points assigned yet" not in draw()
 
 
+def test_panel_offers_what_tools_wrote_and_updates_only_what_is_on_show(modifiers):
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.show_surface()
+    assert "Update Colors" not in draw()
+    bpy.ops.meshfree.principal_curvatures()
+    assert {"Shape Index", "Curvedness", "Curvature 1", "Direction 1", "Update Colors"} <= set(draw())
+    assert "Viewport Points" not in draw()
+    modifiers.set_input(obj.modifiers[0], "Viewport Points", 500)
+    assert "Viewport Points" in draw()
+
+
+def test_panel_of_a_handle_says_what_to_do():
+    obj = add_object(sphere_points())
+    bpy.ops.meshfree.deform_bind(at_once=True)
+    assert bpy.context.object != obj
+    assert draw()[:2] == ['Handle of "Cloud"', "G moves it, R turns it"]
+
+
 def test_panel_of_a_new_object():
     add_object(sphere_points())
     texts = draw()
@@ -238,7 +256,7 @@ def test_panel_marks_stale_results():
     obj = add_object(sphere_points())
     bpy.ops.meshfree.analyze()
     obj.data.vertices[0].co.x += 0.001
-    assert "Points or settings changed: analyze again" in draw()
+    assert "Results are stale: analyze again" in draw()
 
 
 def test_panel_names_scale_faces_modifiers_and_sharing():
