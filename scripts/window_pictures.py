@@ -23,6 +23,28 @@ view.region_3d.view_rotation = Euler((1.25, 0.0, 0.45)).to_quaternion()
 view.region_3d.view_distance, view.region_3d.view_location = 8.0, (0.75, 0.0, 0.0)
 view.shading.use_scene_world = False
 """
+SPLATS = """
+import importlib
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from mathutils import Euler
+core = importlib.import_module("bl_ext.user_default.meshfree_laplacian.core")
+turns = importlib.import_module(core.__name__ + ".splats.ellipsoids")
+frames = importlib.import_module(core.__name__ + ".geometry.quadrics").frames
+points = Coral().sample(8000)
+laplacian = core.build_laplacian(points)
+axes = turns.quaternions_of(np.moveaxis(frames(laplacian.normals)[:, :, ::-1], 0, 2))  # two tangents and the normal
+size = np.sqrt(laplacian.areas)[:, None] * [0.6, 0.6, 0.05]
+colors = 1.6 * np.sin(points @ np.array([[2.0, 1.0, 0.0], [0.0, 2.0, 1.0], [1.0, 0.0, 2.0]]))
+given = core.Splats(points, size, axes, np.full(len(points), 0.95), colors, np.zeros((len(points), 0, 3)))
+with TemporaryDirectory() as folder:
+    core.write_splats(Path(folder) / "Coral.ply", given)
+    bpy.ops.meshfree.import_points(filepath=str(Path(folder) / "Coral.ply"), up="Z")
+view = view3d()[0].spaces.active
+view.region_3d.view_rotation = Euler((1.35, 0.0, 0.3)).to_quaternion()
+view.region_3d.view_distance, view.region_3d.view_location = 8.5, (0.75, 0.0, 0.0)
+view.shading.type = "MATERIAL"
+"""
 FRONT = """
 view.region_3d.view_rotation = Euler((np.pi / 2, 0.0, 0.0)).to_quaternion()
 view.region_3d.view_perspective = "ORTHO"
@@ -126,7 +148,21 @@ def deform(gui):
     gui.point_at_view()
 
 
-TAKES = (working, analyzed, seeing, groups, deform)
+def splats(gui):
+    """Gaussian splats on their way with a handle."""
+    gui.open_panels("MESHFREE_PT_deform")
+    gui.new_file()
+    gui.python((ROOT / "scripts" / "coral.py").read_text(encoding="utf-8"))
+    gui.python(SPLATS)
+    gui.open_tab()
+    gui.press("meshfree.deform_bind(at_once=True", across=0.75)
+    gui.wait_until("any(obj.type == 'EMPTY' for obj in bpy.data.objects)", 120)
+    gui.python("bpy.context.object.location.x += 0.9")
+    gui.python("bpy.context.object.rotation_euler.y = 0.7")
+    gui.settle()
+
+
+TAKES = (working, analyzed, seeing, groups, deform, splats)
 
 
 def main(gui, names):

@@ -88,7 +88,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         _draw_summary(layout, obj)
         if has_splats(obj.data):
             _draw_splats(layout, obj.meshfree)
-        if DISC not in obj.data.attributes:
+        elif DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
         row = layout.row(align=True)
         row.operator("meshfree.analyze").modes = obj.meshfree.modes
