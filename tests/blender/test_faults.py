@@ -45,7 +45,10 @@ def bound():
 
 
 def animated():
-    obj = bound()
+    return with_keyframes(bound())
+
+
+def with_keyframes(obj):
     empty = obj.meshfree.deform.handle_items[0].empty
     for frame in (1, 3):
         empty.location.z += 0.2
@@ -80,12 +83,7 @@ def splats(size=1.0):
 def bound_splats():
     obj = splats()
     bpy.ops.meshfree.deform_bind()
-    empty = obj.meshfree.deform.handle_items[0].empty
-    for frame in (1, 3):
-        empty.location.z += 0.2
-        empty.keyframe_insert("location", frame=frame)
-    bpy.context.scene.frame_set(2)
-    return obj
+    return with_keyframes(obj)
 
 
 def own_positions(obj):
