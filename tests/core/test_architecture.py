@@ -80,6 +80,7 @@ SIDEWAYS = {  # applications that build on others
     ("deformation", "graph"),
     ("fields", "graph"),
     ("geodesics", "graph"),
+    ("meshing", "sides"),
     ("transport", "geodesics"),
     ("minimal_surface", "boundary_curve"),
     ("segmentation", "graph"),
