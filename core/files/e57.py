@@ -1,5 +1,6 @@
 """E57, the files of terrestrial laser scanners: scans that XML describes, each with its pose."""
 
+import itertools
 import os
 import struct
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from .lines import brief
 from .table import NORMAL, SCANNER, PointTable
 
 _HEAD = "<8sI12xQQQ"  # magic, version, offset and length of the description, size of a page
-_LONGEST = 64_000_000  # bytes of a description; that of a thousand scans has some millions
+_LONGEST = 32_000_000  # bytes of a description; that of a thousand scans has some millions
 _RATIO = 100  # of values to the file, which has 1 to 8 bytes for each, and none for those that are all equal ...
 _HARMLESS = 64e6  # ... or fewer bytes than this
 _LEAST, _GREATEST = -(2**63), 2**63 - 1  # whole numbers
@@ -59,7 +60,9 @@ def read_e57(path) -> PointTable:
         if 8 * values > max(_RATIO * os.fstat(file.fileno()).st_size, _HARMLESS):
             count = sum(scan.count for scan in scans)
             raise InvalidPointsError(f"{path} is too short for the {count:,} points that it names. Copy it again.")
-        tables = [_read_scan(file, scan, path) for scan in scans]
+        places = [place_of(scan.offset) for scan in scans]
+        ends = dict(itertools.pairwise([*sorted(places), np.inf]))  # none begins before another has ended
+        tables = [_read_scan(file, place, ends[place], scan, path) for place, scan in zip(places, scans, strict=True)]
     table = _join(tables) if tables else PointTable(np.empty((0, 3)))
     texts = {field.name: None for scan in scans for field in scan.fields if field.kind == "String"}
     if texts:
@@ -125,8 +128,8 @@ def _field(element):
     return _Field(name, kind, width, low, high, float(element.get("scale", 1.0)), float(element.get("offset", 0.0)))
 
 
-def _read_scan(file, scan, path):
-    streams = read_streams(file, place_of(scan.offset), [field.width for field in scan.fields], scan.count, path)
+def _read_scan(file, place, end, scan, path):
+    streams = read_streams(file, place, end, [field.width for field in scan.fields], scan.count, path)
     fields, columns = {}, {}
     for field in scan.fields:
         stream = streams.pop(0)
@@ -171,7 +174,7 @@ def _values(stream, field, count):
     values = values.view(np.int64)
     if field.kind == "ScaledInteger":
         return values * field.scale + field.offset
-    return values.astype(np.int32) if -(2**31) <= field.low and field.high < 2**31 else values
+    return values.astype(np.int32) if field.low >= -(2**31) and field.high < 2**31 else values
 
 
 def _from_spherical(points):

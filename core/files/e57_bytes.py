@@ -72,14 +72,14 @@ def _crc_table():
     return table
 
 
-def read_streams(file, place, widths, count, path) -> list:
+def read_streams(file, place, end, widths, count, path) -> list:
     """Read the values of points, field by field, from the packets that they are divided among.
 
     Parameters
     ----------
     file : file object
-    place : int
-        Of the section of the points, without checksums.
+    place, end : int
+        Of the section of the points, without checksums; it ends there at the latest.
     widths : list of int
         Bits of a value of each field; what has 0 is left out.
     count : int
@@ -93,10 +93,10 @@ def read_streams(file, place, widths, count, path) -> list:
         As `unpack` takes them.
     """
     kind, length, first = struct.unpack(_SECTION, read_bytes(file, place, struct.calcsize(_SECTION), path))
-    begin, end = place_of(first), place + length
-    if kind != _POINTS or not place < begin <= end:
+    begin = place_of(first)
+    if kind != _POINTS or not place < begin <= place + length <= end:
         raise ValueError("it has no points where it says so")
-    data = read_bytes(file, begin, end - begin, path)
+    data = read_bytes(file, begin, place + length - begin, path)
     needed = [-(-count * width // 8) for width in widths]
     if sum(needed) > len(data):
         raise too_short(path, 8 * len(data) // sum(widths), count)

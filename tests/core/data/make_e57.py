@@ -13,7 +13,7 @@ _I = np.arange(COUNT)
 _POSE = ((0.5, 0.5, 0.5, 0.5), (446_000.125, 4_000_000.25, 120.5))  # x to y to z to x, and a place
 _TURN = ((0.8, 0.0, 0.0, 0.6), (10.0, -20.0, 1.5))  # about z, by the angle whose cosine is 0.28
 
-# Of each file its scans: fields in order as (kind, limits or scale and offset, values as they are stored), and the pose.
+# Of each file its scans: of each field the kind, limits with scale and offset, and values as they are stored; the pose.
 FILES = {
     "single": [
         (
