@@ -61,7 +61,8 @@ def read_e57(path) -> PointTable:
             count = sum(scan.count for scan in scans)
             raise InvalidPointsError(f"{path} is too short for the {count:,} points that it names. Copy it again.")
         places = [place_of(scan.offset) for scan in scans]
-        ends = dict(itertools.pairwise([*sorted(places), np.inf]))  # none begins before another has ended
+        # The same bytes are read for one scan only, or a small file could name them many times.
+        ends = dict(reversed([*itertools.pairwise([*sorted(places), np.inf])]))
         tables = [_read_scan(file, place, ends[place], scan, path) for place, scan in zip(places, scans, strict=True)]
     table = _join(tables) if tables else PointTable(np.empty((0, 3)))
     texts = {field.name: None for scan in scans for field in scan.fields if field.kind == "String"}
