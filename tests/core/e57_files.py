@@ -68,6 +68,15 @@ def points(places, kind="f8"):
     return {f"cartesian{axis}": real(column, kind) for axis, column in zip("XYZ", np.transpose(places), strict=True)}
 
 
+def pose(rotation, translation):
+    """Return XML of how a scan is turned, by w x y z, and where the scanner stood."""
+    parts = (
+        f"<{name}>{''.join(f'<{axis}>{value!r}</{axis}>' for axis, value in zip(axes, values, strict=True))}</{name}>"
+        for name, axes, values in (("rotation", "wxyz", rotation), ("translation", "xyz", translation))
+    )
+    return f"<pose>{''.join(parts)}</pose>"
+
+
 def make_packets(streams, sizes):
     """Divide streams among packets, each taking bytes by sizes in turn, and put other packets between."""
     result, places, sizes = [], [0] * len(streams), cycle(sizes)

@@ -16,12 +16,10 @@ from scipy.spatial.transform import Rotation
 from core import PointCloudError
 from core.files import read_points, write_points
 from tests.core.data.make_e57 import COUNT, FILES
-from tests.core.e57_files import checksum, integer, make_e57, points, real, scaled, seal, text, unseal
+from tests.core.e57_files import checksum, integer, make_e57, points, pose, real, scaled, seal, text, unseal
 
 DATA = Path(__file__).parent / "data"
 PLACES = np.round(np.random.default_rng(0).uniform(-5.0, 5.0, (40, 3)), 3)
-ROTATION = "<rotation type='Structure'><w>{}</w><x>{}</x><y>{}</y><z>{}</z></rotation>"
-TRANSLATION = "<translation><x>{}</x><y>{}</y><z>{}</z></translation>"
 
 
 def read(folder, data):
@@ -149,17 +147,25 @@ def test_numbers_without_limits_have_64_bits(tmp_path):
 
 @pytest.mark.parametrize("quaternion", [(1, 0, 0, 0), (0, 1, 0, 0), (2, -1, 0.5, 3), (-0.1, 0.2, 0.3, -0.4)])
 def test_rotations_are_those_of_scipy(tmp_path, quaternion):
-    pose = f"<pose>{ROTATION.format(*quaternion)}{TRANSLATION.format(1, -2, 4e6)}</pose>"
     w, *vector = quaternion
     expected = Rotation.from_quat([*vector, w]).apply(PLACES)
-    table = read(tmp_path, make_e57((points(PLACES), 40, pose)))
+    table = read(tmp_path, make_e57((points(PLACES), 40, pose(quaternion, (1, -2, 4e6)))))
     assert_allclose(table.points, expected + [1, -2, 4e6], rtol=0.0, atol=1e-8)
     assert_array_equal(table.attributes["scanner"], np.tile([1, -2, 4e6], (40, 1)))
 
 
+def test_a_pose_without_one_of_its_parts(tmp_path):
+    """libE57Format leaves zeros out of what it writes."""
+    turned = read(tmp_path, make_e57((points(PLACES), 40, "<pose><rotation><w/><x>1</x></rotation></pose>")))
+    assert_allclose(turned.points, PLACES * (1, -1, -1), rtol=0.0, atol=1e-15)
+    assert turned.attributes == {}
+    moved = read(tmp_path, make_e57((points(PLACES), 40, "<pose><translation><z>2</z></translation></pose>")))
+    assert_array_equal(moved.points, PLACES + (0, 0, 2))
+
+
 def test_single_precision_about_a_far_scanner_is_fine(tmp_path):
-    pose = f"<pose>{TRANSLATION.format(4e6, 0, 0)}</pose>"
-    assert read(tmp_path, make_e57((points(PLACES, "f4"), 40, pose))).notices == []
+    far = pose((1, 0, 0, 0), (4e6, 0, 0))
+    assert read(tmp_path, make_e57((points(PLACES, "f4"), 40, far))).notices == []
     assert "steps of 0.25" in read(tmp_path, make_e57((points(PLACES + 4e6, "f4"), 40, ""))).notices[0]
 
 
@@ -249,7 +255,7 @@ def test_files_that_are_cut_off(tmp_path, name, share):
 
 
 FIELDS = points(PLACES) | {"i": integer(range(40), 0, 63)}
-SCAN = (FIELDS, 40, f"<pose>{ROTATION.format(1, 0, 0, 0)}{TRANSLATION.format(0, 0, 0)}</pose>")
+SCAN = (FIELDS, 40, pose((1, 0, 0, 0), (0, 0, 0)))
 
 
 def patched(place, code, value):
