@@ -86,8 +86,8 @@ def _find_scans(file, path):
 
 
 def _parse(text):
-    """Return the root of a tree of XML, tags with the prefixes that they have in the text."""
-    builder, parser = TreeBuilder(), expat.ParserCreate()
+    """Return the root of a tree of XML in UTF-8, whatever it says, tags with the prefixes that they have in the text."""
+    builder, parser = TreeBuilder(), expat.ParserCreate("UTF-8")
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = _refuse_doctype

@@ -291,7 +291,7 @@ BROKEN = {
     "description short": (patched(32, "<Q", 300), "its description is no XML"),
     "no XML": (described("<data3D", "<<"), "its description is no XML"),
     "entities": (described("\n<e57", f"\n{LOL}<e57"), "has a DOCTYPE, which E57 files never have"),
-    "encoding": (described("UTF-8", "UTF-16"), "its description is no XML"),
+    "encoding": (make_e57(SCAN).replace(b"data3D", b"data\xe93", 1), "its description is no XML"),
     "no scans": (described("data3D type", "data2D type").replace(b"/data3D", b"/data2D"), "has no points"),
     "no points": (
         described("<prototype", "<x><prototype").replace(b"totype><cod", b"totype></x><cod"),
@@ -352,6 +352,11 @@ def test_files_that_lie(tmp_path, what):
     finally:
         tracemalloc.stop()
     assert peak < 2e6 + 50 * len(data)
+
+
+@pytest.mark.parametrize("encoding", ["UTF-16", "unknown"])
+def test_descriptions_are_in_one_encoding(tmp_path, encoding):
+    assert_array_equal(read(tmp_path, described("UTF-8", encoding)).points, PLACES)
 
 
 def test_the_file_that_broken_ones_are_made_of_is_read(tmp_path):
