@@ -16,7 +16,7 @@ from .table import NORMAL, SCANNER, PointTable
 
 _HEAD = "<8sI12xQQQ"  # magic, version, offset and length of the description, size of a page
 _LONGEST = 32_000_000  # bytes of a description; that of a thousand scans has some millions
-_RATIO = 100  # of values to the file, which has 1 to 8 bytes for each, and none for those that are all equal ...
+_RATIO = 100  # of values, 8 bytes each, to the file; fields that are the same everywhere take no room in it ...
 _HARMLESS = 64e6  # ... or fewer bytes than this
 _LEAST, _GREATEST = -(2**63), 2**63 - 1  # whole numbers
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
@@ -86,7 +86,7 @@ def _find_scans(file, path):
 
 
 def _parse(text):
-    """Return the root of a tree of XML in UTF-8, whatever it says, tags with the prefixes that they have in the text."""
+    """Return the root of a tree of XML, whose tags keep their prefixes; in UTF-8, which is what E57 files use."""
     builder, parser = TreeBuilder(), expat.ParserCreate("UTF-8")
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -238,7 +238,7 @@ def _join(tables):
 
 
 def _stacked(parts, tables, missing):
-    """Return the values of all tables, (n,) or (n, k), of those that have none so many of a missing one."""
+    """Return the parts of all tables one after another; a table without one gets the missing value at each point."""
     return np.concatenate(
         [
             np.broadcast_to(missing, (len(table.points), *missing.shape)) if part is None else part
