@@ -70,11 +70,11 @@ def points(places, kind="f8"):
 
 def pose(rotation, translation):
     """Return XML of how a scan is turned, by w x y z, and where the scanner stood."""
-    parts = (
-        f"<{name}>{''.join(f'<{axis}>{float(value)!r}</{axis}>' for axis, value in zip(axes, values, strict=True))}</{name}>"
-        for name, axes, values in (("rotation", "wxyz", rotation), ("translation", "xyz", translation))
-    )
-    return f"<pose>{''.join(parts)}</pose>"
+    result = ""
+    for name, axes, values in (("rotation", "wxyz", rotation), ("translation", "xyz", translation)):
+        numbers = (f"<{axis}>{float(value)!r}</{axis}>" for axis, value in zip(axes, values, strict=True))
+        result += f"<{name}>{''.join(numbers)}</{name}>"
+    return f"<pose>{result}</pose>"
 
 
 def make_packets(streams, sizes):
