@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
 from .arrays import read_array
+from .e57 import read_e57
 from .las import read_las
 from .lines import brief
 from .pcd import read_pcd
@@ -33,6 +34,7 @@ _READERS = {
     ".npz": read_array,
     ".las": read_las,
     ".laz": read_las,
+    ".e57": read_e57,
 }
 READABLE = tuple(_READERS)
 WRITABLE = (".ply", ".xyz", ".csv")

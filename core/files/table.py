@@ -10,6 +10,7 @@ from ..errors import InvalidPointsError, TooFewPointsError
 from .lines import brief
 
 NORMAL = "normal"  # the attribute that files call nx ny nz
+SCANNER = "scanner"  # the attribute of places, where the scanner stood that saw a point, which move with the points
 _NORMALS = ("nx", "ny", "nz")
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _AXES = ("x", "y", "z")

@@ -38,7 +38,7 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
-    """Import the points of LAS, LAZ, PLY, PCD, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as vertices"""
+    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as vertices"""
 
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"

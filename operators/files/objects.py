@@ -7,6 +7,7 @@ from bpy.props import StringProperty
 from ...core import PointCloudError
 from ...core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, replacing
 from ...core.files.table import NORMAL as FILE_NORMAL
+from ...core.files.table import SCANNER
 from ..objects.attributes import (
     NORMAL,
     PREFIX,
@@ -62,7 +63,8 @@ def add_object(name, table, collection, known=None, with_attributes=True):
     if with_attributes:
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large for single precision becomes infinite
             for column, values in table.attributes.items():
-                add_column(mesh, column, values)
+                is_place = column == SCANNER and values.ndim == 2
+                add_column(mesh, column, values - origin if is_place else values)
         if table.colors is not None:
             layer = mesh.color_attributes.new("Color", "BYTE_COLOR", "POINT")
             layer.data.foreach_set("color_srgb", table.colors.reshape(-1))
@@ -104,7 +106,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     Returns
     -------
     PointTable
-        With normals of the world. `single` tells that single precision does for the coordinates.
+        With normals and places of scanners of the world. `single` tells that single precision does for the coordinates.
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     with np.errstate(invalid="ignore"):  # infinite points have no place when they are turned
@@ -120,6 +122,8 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     normals = [table.attributes.pop(name) for name in vectors]
     if normals:
         table.attributes[FILE_NORMAL] = _world_normals(normals[0], matrix)
+    if np.ndim(table.attributes.get(SCANNER)) == 2:
+        table.attributes[SCANNER] = table.attributes[SCANNER].astype(np.float64) @ matrix.T + place_of(obj)
     if with_colors:
         table.colors = _read_colors(data)
     return table

@@ -253,13 +253,14 @@ def test_unreadable_files(run, tmp_path):
     (tmp_path / "bad.ply").write_text("this is no PLY")
     (tmp_path / "bad.blend").write_text("this is no Blender file")
     (tmp_path / "empty.obj").write_text("")
-    (tmp_path / "scan.e57").write_text("")
+    (tmp_path / "scan.e57").write_text("ASTM-E57")
     (tmp_path / "scan.laz").write_text("")
     inputs = sorted(tmp_path.iterdir())
     code, lines = run("analyze", *inputs)
     assert code == 1
     assert all(line["error"] for line in lines)
     assert len(lines) == 5
+    assert "scan.e57 is no E57 file" in lines[-2]["error"]
     assert "scan.laz is no LAS file" in lines[-1]["error"]
 
 

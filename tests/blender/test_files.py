@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.blender.clouds import add_object, attribute, everything, local_points, sphere_points
 from tests.blender.conftest import MODULE
+from tests.core import e57_files
 
 FAR = np.array([446_123.0, 4_000_456.0, 78.0])
 SURVEY = np.round(50.0 * sphere_points(1000), 3) + FAR  # in metres, with millimetres
@@ -52,6 +53,19 @@ def write_pcd(path, points):
     path.write_bytes(f"{head}DATA binary\n".encode() + points.astype("<f8").tobytes())
 
 
+def write_e57(path, points):
+    """In whole millimeters from where the scanner stood, about its x axis turned by half a turn."""
+    low = np.floor(points.min(axis=0))
+    steps = np.round((points - low) * (1000, -1000, -1000)).astype(int)
+    limit = int(np.abs(steps).max())
+    fields = {
+        f"cartesian{axis}": e57_files.scaled(column, -limit, limit, 0.001)
+        for axis, column in zip("XYZ", steps.T, strict=True)
+    }
+    fields["intensity"] = e57_files.integer(range(len(points)), 0, len(points))
+    path.write_bytes(e57_files.seal(e57_files.make_e57((fields, len(points), e57_files.pose((0, 1, 0, 0), low)))))
+
+
 WRITERS = {
     "a.ply": write_file,
     "a.obj": write_obj,
@@ -64,6 +78,7 @@ WRITERS = {
     "a.pcd": write_pcd,
     "a.las": write_las,
     "a.laz": write_las,
+    "a.e57": write_e57,
 }
 
 
@@ -292,6 +307,7 @@ def test_laser_scans_are_imported(extension, tmp_path, name):
     [
         ("missing.ply", None, "There is no file"),
         ("a.laz", b"LASF", "is no LAS file: it does not begin with the header of one. Export it again"),
+        ("a.e57", b"ASTM-E57", "is no E57 file: it does not begin with the header of one. Export it again"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n", "line 5: '' does not belong"),
         ("a.xyz", b"", "there are none"),
         ("a.csv", b"x,y,z\n", "there are none"),
@@ -421,7 +437,7 @@ class TestMenus:
         ours = handlers.pop("MESHFREE_FH_points")
         assert ours.bl_import_operator == "meshfree.import_points"
         extensions = set(ours.bl_file_extensions.split(";"))
-        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".pcd", ".las", ".laz"}
+        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".pcd", ".las", ".laz", ".e57"}
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
 
@@ -434,6 +450,57 @@ def test_what_laser_scanners_measure_becomes_attributes(tmp_path, name):
     assert_array_equal(attribute(obj, "classification"), np.full(len(SURVEY), 6))
     assert_array_equal(attribute(obj, "return_number"), np.zeros(len(SURVEY)))
     assert obj.data.color_attributes["Color"].data[0].color_srgb[:] == pytest.approx((1.0, 0.0, 0.0, 1.0), abs=0.01)
+
+
+class TestPlacesOfScanners:
+    PLACES = (
+        (446_100.0, 4_000_500.0, 80.0),
+        (446_100.0, 4_000_460.0, 200.0),
+    )  # inside and above the surveyed ellipsoid
+
+    def write(self, path):
+        """Write the survey as seen by two scanners."""
+        parts = np.array_split(SURVEY, 2)
+        scans = [
+            (e57_files.points(part - place), len(part), e57_files.pose((1, 0, 0, 0), place))
+            for part, place in zip(parts, self.PLACES, strict=True)
+        ]
+        path.write_bytes(e57_files.seal(e57_files.make_e57(*scans)))
+        return np.repeat(self.PLACES, [len(part) for part in parts], axis=0)
+
+    def test_they_move_with_the_points(self, tmp_path):
+        places = self.write(tmp_path / "a.e57")
+        obj = run_import(tmp_path / "a.e57")
+        assert_array_equal(attribute(obj, "scan"), places[:, 2] == 200.0)
+        assert_allclose(local_points(obj) + np.array(obj["lb_offset"]), SURVEY, rtol=0.0, atol=STEP)
+        assert_allclose(attribute(obj, "scanner"), places - obj["lb_offset"], rtol=0.0, atol=STEP)
+
+    def test_they_are_turned_upright_with_the_points(self, tmp_path):
+        places = self.write(tmp_path / "a.e57")[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
+        obj = run_import(tmp_path / "a.e57", up="Y")
+        assert_allclose(attribute(obj, "scanner"), places - obj["lb_offset"], rtol=0.0, atol=STEP)
+
+    def test_they_are_exported_where_they_are(self, tmp_path):
+        places = self.write(tmp_path / "a.e57")
+        obj = run_import(tmp_path / "a.e57")
+        obj.location.x = 1000.0
+        obj.rotation_euler.z = np.pi / 2.0
+        bpy.context.view_layer.update()
+        bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.ply"))
+        expected = (places - obj["lb_offset"])[:, [1, 0, 2]] * (-1.0, 1.0, 1.0) + (1000.0, 0.0, 0.0) + obj["lb_offset"]
+        assert_allclose(read_file(tmp_path / "a.ply").attributes["scanner"], expected, rtol=0.0, atol=1e-3)
+
+    def test_normals_are_oriented_by_them(self, tmp_path):
+        """Half of a plane is seen from above, the other half from below."""
+        x, y = (values.ravel() for values in np.meshgrid(np.arange(40.0), np.arange(20.0)))
+        scans = []
+        for side, place in ((0.0, (20.0, 10.0, 50.0)), (100.0, (120.0, 10.0, -50.0))):
+            points = np.stack([x + side, y, np.zeros(x.size)], axis=1)
+            scans.append((e57_files.points(points - place), x.size, e57_files.pose((1, 0, 0, 0), place)))
+        (tmp_path / "a.e57").write_bytes(e57_files.seal(e57_files.make_e57(*scans)))
+        obj = run_import(tmp_path / "a.e57")
+        bpy.ops.meshfree.orient_normals(method="ATTRIBUTE", source="scanner", holds="POSITIONS")
+        assert_allclose(attribute(obj, "lb_normal")[:, 2], np.repeat([1.0, -1.0], x.size), atol=1e-3)
 
 
 def test_values_beyond_single_precision(tmp_path):

@@ -284,7 +284,7 @@ class TestArrays:
                 read_points(tmp_path / name)
 
 
-@pytest.mark.parametrize(("name", "text"), [("a.e57", "not a file with points"), ("a.ply", "no file")])
+@pytest.mark.parametrize(("name", "text"), [("a.dxf", "not a file with points"), ("a.ply", "no file")])
 def test_files_that_are_not_read(tmp_path, name, text):
     with pytest.raises(PointCloudError, match=text):
         read_points(tmp_path / name)

@@ -14,6 +14,7 @@ from numpy.testing import assert_array_equal
 
 from core import NotEnoughMemoryError, PointCloudError
 from core.files import READABLE, choose_origin, is_coarse, read_points
+from tests.core import e57_files
 
 POINTS = np.round(np.random.default_rng(0).uniform(0.0, 100.0, (30, 3)), 3)
 NUMBERS = [  # in place of others
@@ -103,6 +104,16 @@ def make_pcd(kind):
     return head + len(runs).to_bytes(4, "little") + (30 * 20).to_bytes(4, "little") + runs
 
 
+def make_e57(count=30):
+    """Make a file of two scans, before it is sealed; the first may claim to have more points."""
+    fields = e57_files.points(POINTS) | {"intensity": e57_files.integer(range(30), -5, 99)}
+    fields |= {"cartesianInvalidState": e57_files.integer(30 * [0], 0, 2)}
+    fields |= {f"color{name}": e57_files.integer(range(30), 0, 255) for name in ("Red", "Green", "Blue")}
+    other = {f"spherical{name}": e57_files.real(range(30), "f4") for name in ("Range", "Azimuth", "Elevation")}
+    pose = e57_files.pose((0.5, 0.5, 0.5, 0.5), (1.0, 2.0, 3.0))
+    return e57_files.make_e57((fields, count, pose), (other, 30, pose), sizes=(300, 41))
+
+
 GOOD = {
     "ascii.ply": make_ply("ascii"),
     "little.ply": make_ply("little"),
@@ -123,6 +134,7 @@ GOOD = {
     "plain.las": make_las(packed=False),
     "old.laz": make_las(packed=True, point_format=2),
     "layered.laz": make_las(packed=True),
+    "scan.e57": e57_files.seal(make_e57()),
 }
 
 
@@ -182,11 +194,14 @@ CHANGES = [truncate, flip, flip, patch, replace_word, replace_word, replace_word
 
 
 def change(name, random):
-    """Return a broken variant of a good file; of an archive half of the time with a broken array in it."""
-    data, packed = GOOD[name], name.endswith("npz") and pick(random, (True, False))
-    data = make_array() if packed else data
+    """Return a broken variant of a good file; half of the time only what an archive or checksums are made of."""
+    data, packed = GOOD[name], name.endswith(("npz", "e57")) and pick(random, (True, False))
+    if packed:
+        data = make_e57() if name.endswith("e57") else make_array()
     for _ in range(pick(random, (1, 1, 1, 2, 3))):
         data = pick(random, CHANGES)(data, random) or b"\n"
+    if packed and name.endswith("e57"):
+        return e57_files.seal(data)
     return make_archive(data, pick(random, (0, 8))) if packed else data
 
 
@@ -335,6 +350,8 @@ LARGE = {
     "claim.las": lambda: patch_las(make_las(packed=False), 247, 10**12) + NOISE,
     "claim.laz": lambda: patch_las(make_las(packed=True), 247, 10**12) + NOISE,
     "records.las": lambda: patch_las(make_las(packed=False), 100, 2**32 - 1, 4) + NOISE,
+    "claim.e57": lambda: e57_files.seal(make_e57(10**14)) + NOISE,
+    "short.e57": lambda: e57_files.seal(make_e57(10**5)) + NOISE,
     "zip.npz": lambda: b"PK\3\4" + NOISE,
     "nul.obj": lambda: b"v 1 2 3" + bytes(1_000_000),
 }

@@ -1,0 +1,247 @@
+"""E57, the files of terrestrial laser scanners: scans that XML describes, each with its pose."""
+
+import itertools
+import os
+import struct
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+import numpy as np
+
+from ..errors import InvalidPointsError
+from .e57_bytes import PAGE, place_of, read_bytes, read_streams, unpack
+from .lines import brief
+from .table import NORMAL, SCANNER, PointTable
+
+_HEAD = "<8sI12xQQQ"  # magic, version, offset and length of the description, size of a page
+_LONGEST = 32_000_000  # bytes of a description; that of a thousand scans has some millions
+_RATIO = 100  # of values, 8 bytes each, to the file; fields that are the same everywhere take no room in it ...
+_HARMLESS = 64e6  # ... or fewer bytes than this
+_LEAST, _GREATEST = -(2**63), 2**63 - 1  # whole numbers
+_CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
+_SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+_NORMALS = ("nor:normalX", "nor:normalY", "nor:normalZ")
+_COLORS = ("colorRed", "colorGreen", "colorBlue")
+_KINDS = ("Integer", "ScaledInteger", "Float", "String")
+
+
+class _Field(NamedTuple):
+    name: str
+    kind: str  # of `_KINDS`
+    width: int  # bits of a value; texts are not read
+    low: int = 0  # limits of whole numbers, before they are scaled
+    high: int = 1
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+class _Scan(NamedTuple):
+    element: Element  # that describes it
+    fields: list
+    count: int  # of its points
+    offset: int  # in the file
+
+
+def read_e57(path) -> PointTable:
+    """Read the points of all scans of an E57 file, where their poses put them, with all fields that are numbers.
+
+    Each point gets the place of its scanner as a vector, if the file tells it, and the number of its scan, if there are
+    several. Those that are marked as invalid are left out.
+
+    Raises
+    ------
+    InvalidPointsError
+        It is no E57 file, or broken; the text says where.
+    """
+    with open(path, "rb") as file:
+        scans = [scan for scan in _find_scans(file, path) if scan.count]
+        values = sum(scan.count * max(len(scan.fields), 3) for scan in scans)
+        if 8 * values > max(_RATIO * os.fstat(file.fileno()).st_size, _HARMLESS):
+            count = sum(scan.count for scan in scans)
+            raise InvalidPointsError(f"{path} is too short for the {count:,} points that it names. Copy it again.")
+        places = [place_of(scan.offset) for scan in scans]
+        # The same bytes are read for one scan only, or a small file could name them many times.
+        ends = dict(reversed([*itertools.pairwise([*sorted(places), np.inf])]))
+        tables = [_read_scan(file, place, ends[place], scan, path) for place, scan in zip(places, scans, strict=True)]
+    table = _join(tables) if tables else PointTable(np.empty((0, 3)))
+    texts = {field.name: None for scan in scans for field in scan.fields if field.kind == "String"}
+    if texts:
+        table.notices.append(f"{path.name}: left out {brief(', '.join(texts))}, which holds no numbers.")
+    missed = sum(scan.count for scan in scans) - len(table.points)
+    if missed:
+        table.notices.append(f"{path.name}: left out {missed} points that the scanner marked as invalid.")
+    return table
+
+
+def _find_scans(file, path):
+    head = file.read(struct.calcsize(_HEAD)).ljust(struct.calcsize(_HEAD), b"\0")
+    magic, version, begin, length, page = struct.unpack(_HEAD, head)
+    if (magic, version, page) != (b"ASTM-E57", 1, PAGE):
+        raise InvalidPointsError(f"{path} is no E57 file: it does not begin with the header of one. Export it again.")
+    if length > _LONGEST:
+        raise InvalidPointsError(f"{path} describes itself in {length:,} bytes, which is too long. Export it again.")
+    root = _parse(read_bytes(file, place_of(begin), length, path).tobytes())
+    return [_describe(scan) for scan in root.findall("data3D/vectorChild")]
+
+
+def _parse(text):
+    """Return the root of a tree of XML, whose tags keep their prefixes; in UTF-8, which is what E57 files use."""
+    builder, parser = TreeBuilder(), expat.ParserCreate("UTF-8")
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = _refuse_doctype
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise ValueError(f"its description is no XML: {error}") from error
+    return builder.close()
+
+
+def _refuse_doctype(*_):
+    """A few entities that it declares could stand for any amount of text."""
+    raise ValueError("its description has a DOCTYPE, which E57 files never have")
+
+
+def _describe(scan):
+    points, prototype = scan.find("points"), scan.find("points/prototype")
+    if prototype is None:
+        raise ValueError("it describes a scan without its points")
+    count, offset = int(points.get("recordCount", "0")), int(points.get("fileOffset", "0"))
+    if count < 0:
+        raise ValueError(f"it describes a scan of {count} points")
+    fields = [_field(element) for element in prototype.iter() if element.get("type") in _KINDS]
+    return _Scan(scan, fields, count, offset)
+
+
+def _field(element):
+    name, kind = element.tag, element.get("type")
+    if kind == "Float":
+        return _Field(name, kind, 32 if element.get("precision") == "single" else 64)
+    if kind == "String":
+        return _Field(name, kind, 0)
+    low, high = int(element.get("minimum", _LEAST)), int(element.get("maximum", _GREATEST))
+    if not _LEAST <= low <= high <= _GREATEST:
+        raise ValueError(f"the values of {brief(name)} cannot be from {low} to {high}")
+    width = (high - low).bit_length()
+    if kind == "Integer":
+        return _Field(name, kind, width, low, high)
+    return _Field(name, kind, width, low, high, float(element.get("scale", 1.0)), float(element.get("offset", 0.0)))
+
+
+def _read_scan(file, place, end, scan, path):
+    streams = read_streams(file, place, end, [field.width for field in scan.fields], scan.count, path)
+    fields, columns = {}, {}
+    for field in scan.fields:
+        stream = streams.pop(0)
+        if field.kind != "String":
+            fields[field.name], columns[field.name] = field, _values(stream, field, scan.count)
+    cartesian = fields.keys() >= set(_CARTESIAN)
+    names = _CARTESIAN if cartesian else _SPHERICAL
+    if not fields.keys() >= set(names):
+        raise InvalidPointsError(
+            f"{path} has a scan without coordinates among its fields {brief(', '.join(fields))}. Each point needs"
+            f" {', '.join(_CARTESIAN)} or {', '.join(_SPHERICAL)}."
+        )
+    points = np.stack([columns.pop(name) for name in names], axis=1, dtype=np.float64)
+    kept = columns.pop("cartesianInvalidState" if cartesian else "sphericalInvalidState", 0) == 0
+    kept = kept & ~np.isnan(points).any(axis=1)
+    if not kept.all():
+        points, columns = points[kept], {name: values[kept] for name, values in columns.items()}
+    if not cartesian:
+        points = _from_spherical(points)
+    table = PointTable(
+        points, columns, single=all(fields[name].kind == "Float" and fields[name].width == 32 for name in names)
+    )
+    if fields.keys() >= set(_COLORS):
+        table.colors = np.ones((len(points), 4), np.float32)
+        for axis, name in enumerate(_COLORS):
+            low, high = _color_range(scan.element, fields[name])
+            shares = (columns.pop(name) - low) / (high - low)
+            table.colors[:, axis] = np.fmin(np.fmax(shares, 0.0), 1.0)  # NaN becomes 0
+    if fields.keys() >= set(_NORMALS):
+        columns[NORMAL] = np.stack([columns.pop(name) for name in _NORMALS], axis=1)
+    _put(table, scan.element)
+    return table
+
+
+def _values(stream, field, count):
+    """Return the values of a field, (n,): floats, or whole numbers, which may be scaled to floats."""
+    if field.kind == "Float":
+        code = f"f{field.width // 8}"
+        return stream[: count * field.width // 8].view(f"<{code}").astype(code, copy=False)
+    values = unpack(stream, field.width, count)
+    values += np.uint64(field.low % 2**64)  # below zero, too: sums go round
+    values = values.view(np.int64)
+    if field.kind == "ScaledInteger":
+        return values * field.scale + field.offset
+    return values.astype(np.int32) if field.low >= -(2**31) and field.high < 2**31 else values
+
+
+def _from_spherical(points):
+    """Return the places of ranges, azimuths and elevations, (n, 3)."""
+    distance, azimuth, elevation = points.T
+    flat = distance * np.cos(elevation)
+    return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)], axis=1)
+
+
+def _color_range(scan, field):
+    """Return the values of no and of full color: those that the scan tells, or else those that the field can have."""
+    told = [_number(scan, f"colorLimits/{field.name}{end}", np.nan) for end in ("Minimum", "Maximum")]
+    own = [field.scale * limit + field.offset for limit in (field.low, field.high)]
+    return next(limits for limits in (told, own, (0.0, 255.0)) if limits[0] < limits[1])
+
+
+def _put(table, scan):
+    """Turn and move points and normals from where the scanner is the origin, if the file tells where it was."""
+    if scan.find("pose/rotation") is not None:
+        w, x, y, z = (_number(scan, f"pose/rotation/{name}") for name in "wxyz")
+        square = w * w + x * x + y * y + z * z
+        if not 0.0 < square < np.inf:
+            raise ValueError("a scan has a rotation that is none")
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        turn = np.eye(3) + (2.0 / square) * (w * cross + cross @ cross)
+        table.points = table.points @ turn.T
+        if NORMAL in table.attributes:
+            table.attributes[NORMAL] = (table.attributes[NORMAL] @ turn.T).astype(np.float32)
+    if scan.find("pose/translation") is not None:
+        place = np.array([_number(scan, f"pose/translation/{name}") for name in "xyz"])
+        if not np.isfinite(place).all():
+            raise ValueError("a scanner stood at a place that is none")
+        table.points += place
+        table.attributes[SCANNER] = np.tile(place, (len(table.points), 1))
+        table.single = table.single and not place.any()
+
+
+def _number(scan, path, default=0.0):
+    """Return a number that describes a scan; where its element is empty it is zero."""
+    element = scan.find(path)
+    return default if element is None else float(element.text or 0.0)
+
+
+def _join(tables):
+    """Return one table of several, whose columns are gone afterwards; what a scan lacks is zero, its colors white."""
+    if len(tables) == 1:
+        return tables[0]
+    for index, table in enumerate(tables):
+        table.attributes["scan"] = np.full(len(table.points), index, np.int32)
+    likes = {name: values[:0] for table in tables for name, values in table.attributes.items()}
+    result = PointTable(
+        np.concatenate([table.points for table in tables]), single=any(table.single for table in tables)
+    )
+    for name, like in likes.items():
+        parts = [table.attributes.pop(name, None) for table in tables]
+        result.attributes[name] = _stacked(parts, tables, np.zeros(like.shape[1:], like.dtype))
+    if any(table.colors is not None for table in tables):
+        result.colors = _stacked([table.colors for table in tables], tables, np.ones(4, np.float32))
+    return result
+
+
+def _stacked(parts, tables, missing):
+    """Return the parts of all tables one after another; a table without one gets the missing value at each point."""
+    return np.concatenate(
+        [
+            np.broadcast_to(missing, (len(table.points), *missing.shape)) if part is None else part
+            for part, table in zip(parts, tables, strict=True)
+        ]
+    )

@@ -1,0 +1,148 @@
+"""The bytes of E57 files: pages with checksums, sections of packets, and in them numbers of any bits."""
+
+import os
+import struct
+from functools import cache
+
+import numpy as np
+
+from ..errors import InvalidPointsError
+from .rows import too_short
+
+PAGE = 1024  # bytes ...
+_BODY = 1020  # ... and those before the checksum
+_BLOCK = 4096  # pages that are read at once
+_SECTION = "<B7xQQ8x"  # kind, length, place of the first packet
+_PACKET = "<BxHH"  # kind, length less one, number of streams
+_POINTS, _INDEX, _VALUES, _EMPTY = 1, 0, 1, 2  # kinds of sections and of packets
+
+
+def place_of(offset) -> int:
+    """Return how many bytes lie before an offset in the file if checksums are not counted."""
+    page, rest = divmod(offset, PAGE)
+    if page < 0 or rest >= _BODY:
+        raise ValueError(f"nothing can begin at its byte {offset}")
+    return page * _BODY + rest
+
+
+def read_bytes(file, place, count, path):
+    """Read bytes of an open file from a place on, both without checksums, which are compared.
+
+    Returns
+    -------
+    ndarray, (count,) uint8
+
+    Raises
+    ------
+    InvalidPointsError
+        The file ends before, or has changed since it was written.
+    """
+    first, last = place // _BODY, -(-(place + count) // _BODY)
+    if last * PAGE > os.fstat(file.fileno()).st_size:
+        raise InvalidPointsError(f"{path} is too short for what it describes. Copy it again.")
+    result = np.empty((last - first, _BODY), np.uint8)
+    file.seek(first * PAGE)
+    for row in range(0, len(result), _BLOCK):
+        rows = result[row : row + _BLOCK]
+        pages = np.fromfile(file, np.uint8, len(rows) * PAGE).reshape(-1, PAGE)
+        wrong = np.flatnonzero(_checksums(pages) != pages.view(">u4")[:, -1])
+        if len(wrong):
+            raise InvalidPointsError(
+                f"{path} is broken: the checksum of its page {first + row + wrong[0] + 1} of {PAGE} bytes is another."
+                " Copy it again."
+            )
+        rows[:] = pages[:, :_BODY]
+    return result.reshape(-1)[place - first * _BODY :][:count]
+
+
+def _checksums(pages):
+    """Return the CRC-32C of each page: of all at once, two bytes at a time."""
+    table, sums = _crc_table(), np.full(len(pages), 0xFFFFFFFF, np.int64)
+    for words in pages.view("<u2").T[: _BODY // 2].astype(np.int64):
+        sums = table[(sums ^ words) & 0xFFFF] ^ (sums >> 16)
+    return sums ^ 0xFFFFFFFF
+
+
+@cache
+def _crc_table():
+    """Return what each two bytes do to a CRC-32C, (65536,)."""
+    table = np.arange(2**16)
+    for _ in range(16):
+        table = (table >> 1) ^ np.where(table & 1, 0x82F63B78, 0)
+    return table
+
+
+def read_streams(file, place, end, widths, count, path) -> list:
+    """Read the values of points, field by field, from the packets that they are divided among.
+
+    Parameters
+    ----------
+    file : file object
+    place, end : int
+        Of the section of the points, without checksums; it ends there at the latest.
+    widths : list of int
+        Bits of a value of each field; what has 0 is left out.
+    count : int
+        How many points there are; a shorter section is refused before there is memory for them.
+    path : pathlib.Path
+        The file, for the texts of errors.
+
+    Returns
+    -------
+    list of ndarray, (m,) uint8
+        As `unpack` takes them.
+    """
+    kind, length, first = struct.unpack(_SECTION, read_bytes(file, place, struct.calcsize(_SECTION), path))
+    begin = place_of(first)
+    if kind != _POINTS or not place < begin <= place + length <= end:
+        raise ValueError("it has no points where it says so")
+    data = read_bytes(file, begin, place + length - begin, path)
+    needed = [-(-count * width // 8) for width in widths]
+    if sum(needed) > len(data):
+        raise too_short(path, 8 * len(data) // sum(widths), count)
+    streams = [np.zeros(-(-count // 8) * width + 9, np.uint8) for width in widths]
+    filled, head = [0] * len(widths), struct.calcsize(_PACKET)
+    place = 0
+    while filled != needed:
+        if place + head > len(data):
+            found = min(8 * size // width for size, width in zip(filled, widths, strict=True) if width)
+            raise too_short(path, found, count)
+        kind, length, number = struct.unpack_from(_PACKET, data, place)
+        end, at = place + length + 1, place + head + 2 * number
+        if kind not in (_INDEX, _VALUES, _EMPTY) or end % 4 or end > len(data):
+            raise ValueError("its points are not divided as they should be")
+        if kind == _VALUES:
+            sizes = data[place + head : at].view("<u2").tolist() if at <= end else []
+            if len(sizes) != len(widths) or at + sum(sizes) > end:
+                raise ValueError("a packet of its points does not hold what it says")
+            for index, size in enumerate(sizes):
+                part = data[at : at + min(size, needed[index] - filled[index])]
+                streams[index][filled[index] : filled[index] + len(part)] = part
+                filled[index] += len(part)
+                at += size
+        place = end
+    return streams
+
+
+def unpack(stream, width, count):
+    """Return whole numbers of so many bits each, up to 64, the lowest bit first.
+
+    Parameters
+    ----------
+    stream : ndarray, (m,) uint8
+        Eight numbers lie in as many bytes as one has bits; nine bytes more are there than those of all eights.
+    width, count : int
+
+    Returns
+    -------
+    ndarray, (count,) uint64
+    """
+    result = np.empty((-(-count // 8), 8), np.uint64)
+    for index in range(8):
+        place, shift = divmod(index * width, 8)
+        column = np.ndarray(len(result), "<u8", stream, place, (width,)) >> np.uint64(shift)
+        if shift + width > 64:
+            rest = np.ndarray(len(result), np.uint8, stream, place + 8, (width,))
+            column |= rest.astype(np.uint64) << np.uint64(64 - shift)
+        result[:, index] = column & np.uint64(2**width - 1)
+    return result.reshape(-1)[:count]
