@@ -1,9 +1,11 @@
 """Rotations nearest to many 3 x 3 matrices at once."""
 
 import numpy as np
+from scipy import sparse
 
 _STEPS = 12  # of Newton's method; seven reach full precision for singular values within 1 : 20
 _TOLERANCE = 1e-10
+TRACE = 1e-8  # how strongly what turns freely is held to a turn known from elsewhere, relative to what turns it
 
 
 def nearest_rotations(matrices):
@@ -54,6 +56,27 @@ def nearest_rotations(matrices):
     if len(failed):
         result[:, :, failed] = _decompose(np.moveaxis(unit[:, :, failed], 2, 0))
     return result
+
+
+def rotations_in_groups(matrices, group):
+    """Find the nearest rotations where a matrix may leave a turn about an axis free: then it is the one of its group.
+
+    Parameters
+    ----------
+    matrices : ndarray, (3, 3, n)
+        As of `nearest_rotations`.
+    group : ndarray, (n,) int
+        Numbers from 0 on; the turn of a group is that of the sum of its matrices.
+
+    Returns
+    -------
+    ndarray, (3, 3, n)
+    """
+    count = len(group)
+    members = sparse.csr_array((np.ones(count), group, np.arange(count + 1)))
+    turn = nearest_rotations((matrices.reshape(9, -1) @ members).reshape(3, 3, -1))
+    size = np.sqrt(np.einsum("acn,acn->n", matrices, matrices))
+    return nearest_rotations(matrices + TRACE * np.where(size > 0.0, size, 1.0) * turn[:, :, group])
 
 
 def _cofactors(x):

@@ -9,7 +9,7 @@ from ..blocks import blocks
 from ..errors import PointCloudError
 from ..geometry import as_indices
 from ..operator import dissect, factorize, narrow_laplacian, sparsify
-from ..rotations import nearest_rotations
+from ..rotations import TRACE, nearest_rotations, rotations_in_groups
 from .gradients import DeformationGradients, coupled
 from .graph import coupled_components
 
@@ -297,9 +297,9 @@ class Deformer:
 
         Of the points that move, where they are now; (3, 3, m).
         """
-        centered = now - now.mean(axis=0)
-        products = (self._edges @ centered).reshape(3, len(now), 3)
-        return nearest_rotations(np.ascontiguousarray(products.transpose(2, 0, 1)))
+        centered = np.ascontiguousarray((now - now.mean(axis=0)).T)
+        products = np.array([(self._edges @ column).reshape(3, -1) for column in centered])
+        return rotations_in_groups(products, self._component)
 
     def _fit_components(self, target):
         """Return the turn of each component, (c, 3, 3), identity in the linear mode, and its new centre, (c, 3)."""
@@ -316,10 +316,12 @@ class Deformer:
         if self.rotation_aware:
             pairs = np.einsum("ka,kb->kab", target - after[component], rest - before[component])
             products = (total @ pairs.reshape(-1, 9)).reshape(-1, 3, 3)
-            # A trace of the identity keeps a component from turning about an axis that all its constraints lie on.
             spread = total @ np.sum((rest - before[component]) ** 2, axis=1)
-            products += 1e-9 * spread[:, None, None] * np.eye(3)
-            turn = np.moveaxis(nearest_rotations(np.moveaxis(products, 0, 2)), 2, 0)
+            for _ in range(2):
+                # A trace of the identity keeps a component from turning about an axis that all its constraints lie on.
+                # It pulls at the turn; one of that turn instead does not any more.
+                pulled = products + TRACE * spread[:, None, None] * turn
+                turn = np.moveaxis(nearest_rotations(np.moveaxis(pulled, 0, 2)), 2, 0)
         shift = after - np.einsum("pab,pb->pa", turn, before)
         return turn, shift
 

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from ..arguments import check_positions
 from ..geometry import frames
-from ..rotations import nearest_rotations
+from ..rotations import rotations_in_groups
 
 _FAINT = 1e-3  # share of what its area asks below which a point counts as coupled to none
 _ROUND = 0.05  # share of the smaller extent of a neighbourhood, squared, in both: a half where it is round
@@ -36,6 +36,7 @@ class DeformationGradients:
         rest = laplacian.points[own]
         rest = rest - rest.mean(axis=0) if len(own) else rest
         self._products = _step_products(laplacian.stiffness[own][:, own].tocoo(), rest)
+        self._component = np.unique(laplacian.component[own], return_inverse=True)[1].reshape(-1)
         self._at_rest = self._pairs(rest)
         # Normal, then two tangents, as columns. Sums over strided arrays take ten times as long.
         self._frames = np.ascontiguousarray(np.moveaxis(frames(laplacian.normals[own]), 0, 2))
@@ -53,7 +54,7 @@ class DeformationGradients:
             return np.tile(np.eye(3), (self._count, 1, 1))
         now = now[self._own]
         after, before = self._pairs(now - now.mean(axis=0)), self._at_rest
-        turn = nearest_rotations(after)
+        turn = rotations_in_groups(after, self._component)
         spread = np.einsum("aan->n", before)
         size = np.einsum("abn,abn->n", turn, after) / np.where(spread > 0.0, spread, 1.0)
         alike = size * turn  # the similarity that fits best
