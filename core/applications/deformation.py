@@ -10,7 +10,7 @@ from ..errors import PointCloudError
 from ..geometry import as_indices
 from ..operator import dissect, factorize, narrow_laplacian, sparsify
 from ..rotations import TRACE, nearest_rotations, rotations_in_groups
-from .gradients import DeformationGradients, coupled
+from .gradients import DeformationGradients, coupled, sums_over_steps
 from .graph import coupled_components
 
 NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
@@ -297,9 +297,7 @@ class Deformer:
 
         Of the points that move, where they are now; (3, 3, m).
         """
-        centered = np.ascontiguousarray((now - now.mean(axis=0)).T)
-        products = np.array([(self._edges @ column).reshape(3, -1) for column in centered])
-        return rotations_in_groups(products, self._component)
+        return rotations_in_groups(sums_over_steps(self._edges, now - now.mean(axis=0)), self._component)
 
     def _fit_components(self, target):
         """Return the turn of each component, (c, 3, 3), identity in the linear mode, and its new centre, (c, 3)."""

@@ -37,15 +37,10 @@ class DeformationGradients:
         rest = rest - rest.mean(axis=0) if len(own) else rest
         self._products = _step_products(laplacian.stiffness[own][:, own].tocoo(), rest)
         self._component = np.unique(laplacian.component[own], return_inverse=True)[1].reshape(-1)
-        self._at_rest = self._pairs(rest)
+        self._at_rest = sums_over_steps(self._products, rest)
         # Normal, then two tangents, as columns. Sums over strided arrays take ten times as long.
         self._frames = np.ascontiguousarray(np.moveaxis(frames(laplacian.normals[own]), 0, 2))
         self._tangents = np.ascontiguousarray(self._frames[:, 1:])
-
-    def _pairs(self, points):
-        """Return the sums over neighbours of w_ij (x_j - x_i)(p_j - p_i)^T, (3, 3, m), p the points at rest."""
-        # Column by column: half of the time that three at once take.
-        return np.array([(self._products @ column).reshape(3, -1) for column in np.ascontiguousarray(points.T)])
 
     def at(self, positions):
         """Return the gradients, (n, 3, 3), for the points after the deformation, (n, 3) [L]."""
@@ -53,7 +48,7 @@ class DeformationGradients:
         if not len(self._own):
             return np.tile(np.eye(3), (self._count, 1, 1))
         now = now[self._own]
-        after, before = self._pairs(now - now.mean(axis=0)), self._at_rest
+        after, before = sums_over_steps(self._products, now - now.mean(axis=0)), self._at_rest
         turn = rotations_in_groups(after, self._component)
         spread = np.einsum("aan->n", before)
         size = np.einsum("abn,abn->n", turn, after) / np.where(spread > 0.0, spread, 1.0)
@@ -134,6 +129,20 @@ def coupled(laplacian):
     weight = np.maximum(-pairs.data, 0.0) * np.einsum("ka,ka->k", step, step)
     sums = np.bincount(pairs.row, weight, minlength=len(laplacian.points))
     return (laplacian.component >= 0) & (sums > _FAINT * 4.0 * laplacian.areas)
+
+
+def sums_over_steps(products, points):
+    """Return the sums over neighbours of w_ij (x_j - x_i)(p_j - p_i)^T, (3, 3, m), p the points at rest.
+
+    Parameters
+    ----------
+    products : csr_array, (3 m, m)
+        Of the points at rest and the weights.
+    points : ndarray, (m, 3)
+        Where they are now.
+    """
+    # Column by column: half of the time that three at once take.
+    return np.array([(products @ column).reshape(3, -1) for column in np.ascontiguousarray(points.T)])
 
 
 def _step_products(stiffness, rest):

@@ -110,11 +110,15 @@ def to_columns(table) -> dict:
         values = np.round(255.0 * table.colors).astype(np.uint8)
         columns.update(zip(("red", "green", "blue", "alpha"), values.T, strict=True))
     for name, values in attributes.items():
-        parts = {name: values}
-        if values.ndim == 2:
-            parts = {f"{name}_{axis}": part for axis, part in zip(_AXES[: len(values.T)], values.T, strict=True)}
-        columns.update((_free_name(part, columns), numbers) for part, numbers in parts.items())
+        columns.update((_free_name(part, columns), numbers) for part, numbers in split_columns(name, values).items())
     return columns
+
+
+def split_columns(name, values) -> dict:
+    """Return an attribute as columns of numbers by their names: vectors as one of each axis."""
+    if values.ndim == 1:
+        return {name: values}
+    return {f"{name}_{axis}": part for axis, part in zip(_AXES[: len(values.T)], values.T, strict=True)}
 
 
 def _free_name(name, columns):

@@ -21,7 +21,7 @@ from bpy.app.handlers import persistent
 
 from ...core import Cancelled, CoarseDeformer, Deformer, Splats
 from ..objects.attributes import MOVED_DISC
-from ..objects.carried import discs_at_rest, moved_discs, moved_splats
+from ..objects.carried import discs_at_rest, local_gradients, moved_discs, moved_splats
 from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import laplacian_options
 from ..objects.reading import boundary_points
@@ -218,22 +218,16 @@ def displaced(live, goal, discs, steps=None, start=None, progress=None):
     else:
         solver = live.prepare(progress).exact
         points = solver.solve(goal @ live.matrix.T, steps=steps, progress=progress)
-    inverse = np.linalg.inv(live.matrix)
-    displacement = (points - rest) @ inverse.T
+    displacement = (points - rest) @ np.linalg.inv(live.matrix).T
     splats = live.splats
     if splats is None and discs is None:
         return Moved(points, displacement, {})
-    gradients = _changed(solver.gradients(points), inverse, live.matrix)
+    gradients = local_gradients(solver.gradients(points), live.matrix)
     if splats is None:
         return Moved(points, displacement, {MOVED_DISC: moved_discs(discs, gradients)})
     if steps is None:  # harmonics take longer than all else, and can wait
         splats = replace(splats, harmonics=splats.harmonics[:, :0])
     return Moved(points, displacement, moved_splats(splats.deformed(live.rest + displacement, gradients)))
-
-
-def _changed(maps, left, right):
-    """Return the products of a matrix, many matrices, (n, 3, 3), and a matrix: by two large products, not n small."""
-    return np.moveaxis(np.tensordot(left, (maps.reshape(-1, 3) @ right).reshape(-1, 3, 3), (1, 1)), 1, 0)
 
 
 def plan_prepared(obj):

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ...core import Splats
+from ...core.files.table import split_columns
 from ...core.splats import NEEDED, SplatFile
 from ..objects.attributes import PREFIX, STORABLE, read_attribute, write_attribute
 from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, shown_splats
@@ -110,7 +111,5 @@ def with_results(splats, data):
     columns = {} if splats.file is None else dict(splats.file.columns)
     for layer in data.attributes:
         if layer.name.startswith(PREFIX) and layer.data_type in STORABLE:
-            values = read_attribute(data, layer.name)
-            names = [layer.name] if values.ndim == 1 else [f"{layer.name}_{axis}" for axis in "xyz"]
-            columns.update(zip(names, values.reshape(len(splats), -1).T, strict=False))
+            columns.update(split_columns(layer.name, read_attribute(data, layer.name)))
     return replace(splats, file=(splats.file or SplatFile({}))._replace(columns=columns))

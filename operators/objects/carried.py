@@ -66,6 +66,13 @@ def discs_at_rest(obj):
     return read_attribute(obj.data, DISC) if carries(obj) and not has_splats(obj.data) else None
 
 
+def local_gradients(gradients, matrix):
+    """Return deformation gradients, (n, 3, 3), of points that a matrix, (3, 3), takes from local space, as there."""
+    # Two large products: n small ones take five times as long.
+    right = (gradients.reshape(-1, 3) @ matrix).reshape(-1, 3, 3)
+    return np.moveaxis(np.tensordot(np.linalg.inv(matrix), right, (1, 1)), 1, 0)
+
+
 def moved_discs(vectors, gradients):
     """Return discs, normals times radii, (n, 3), after a deformation with these gradients, (n, 3, 3)."""
     radii = np.linalg.norm(vectors, axis=1)

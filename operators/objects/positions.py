@@ -5,7 +5,7 @@ from bpy.props import EnumProperty
 
 from ...core import PointCloudError
 from .attributes import DISC, check_size, own_positions, read_attribute, write_attribute, write_own_positions
-from .carried import moved_discs
+from .carried import local_gradients, moved_discs
 from .modifiers import is_own
 from .reading import key_positions, shape_keys
 from .splats import has_splats, read_splats, write_splats
@@ -76,7 +76,7 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
     moved = reading.local(points - reading.points)
     check_size("position", moved)
     if gradients is not None:
-        local = np.linalg.inv(reading.matrix) @ gradients @ reading.matrix
+        local = local_gradients(gradients, reading.matrix)
         if has_splats(obj.data):
             write_splats(obj.data, read_splats(obj.data).deformed(own_positions(obj.data) + moved, local))
             return None
