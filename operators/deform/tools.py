@@ -8,6 +8,7 @@ from mathutils import Matrix, Vector
 from ...core import PointCloudError, opposite_ends
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
+    DISC,
     REST,
     own_positions,
     point_count,
@@ -15,7 +16,7 @@ from ..objects.attributes import (
     write_attribute,
     write_own_positions,
 )
-from ..objects.carried import apply_discs, carried
+from ..objects.carried import carried, shown_moved
 from ..objects.groups import ANCHOR, HANDLE, assign, check_assignable, group_weights, handle_names, has_group
 from ..objects.handlers import tell
 from ..objects.modifiers import get_input
@@ -310,7 +311,8 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
             write_splats(obj.data, shown_splats(obj))
         else:
             write_own_positions(obj.data, positions)
-            apply_discs(obj.data, get_input(find_deform(obj), "Strength"))
+            for values in shown_moved(obj, get_input(find_deform(obj), "Strength")).values():
+                write_attribute(obj.data, DISC, values)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
         write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True, moved={})
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"
@@ -342,11 +344,12 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
     def _store(self, context, obj):
         """Keep the deformation as attributes that a modifier shows."""
-        data, kept = obj.data, [item for item in carried(obj.data) if item.moved in obj.data.attributes]
-        name = _free_name(obj, "Deform")
+        data, name = obj.data, _free_name(obj, "Deform")
+        moved = shown_moved(obj, get_input(find_deform(obj), "Strength"))
+        kept = [item for item in carried(data) if item.moved in moved]
         write_attribute(data, name, shown_displacement(obj), "FLOAT_VECTOR")
         for item in kept:
-            write_attribute(data, stored_name(name, item.name), read_attribute(data, item.moved), item.data_type)
+            write_attribute(data, stored_name(name, item.name), moved[item.moved], item.data_type)
         put_back(context, obj)
         add_shape(obj, name, kept)
         return f'{obj.name}: the deformation is the modifier "{name}", shown by its Value'

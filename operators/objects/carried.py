@@ -15,7 +15,7 @@ from .attributes import (
     read_attribute,
     write_attribute,
 )
-from .splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats
+from .splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats, shown_splats
 
 
 class Carried(NamedTuple):
@@ -89,11 +89,15 @@ def moved_splats(splats) -> dict:
     return {SPLAT_SCALE: splats.scales, SPLAT_ROTATION: splats.rotations, **harmonics}
 
 
-def apply_discs(data, strength):
-    """Take the discs after a deformation, of which such a share is shown, as those at rest, if there are any."""
-    if MOVED_DISC in data.attributes:
-        rest, moved = read_attribute(data, DISC), read_attribute(data, MOVED_DISC)
-        write_attribute(data, DISC, rest + strength * (moved - rest))
+def shown_moved(obj, strength) -> dict:
+    """Return what goes along as a deformation shows it, by a share of it, by the names of its attributes."""
+    data = obj.data
+    if not moved_names(data):
+        return {}
+    if has_splats(data):
+        return moved_splats(shown_splats(obj))
+    rest, moved = read_attribute(data, DISC), read_attribute(data, MOVED_DISC)
+    return {MOVED_DISC: rest + strength * (moved - rest)}
 
 
 def write_moved(data, moved):

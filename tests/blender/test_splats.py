@@ -147,10 +147,14 @@ def test_a_bake_shows_the_splats_of_each_frame(core, rest):
     close(splats_of(core, shown(obj)), seen[3])
 
 
-def test_a_stored_deformation_shows_splats_as_they_were(core, rest, modifiers):
+@pytest.mark.parametrize("strength", [1.0, 0.5])
+def test_a_stored_deformation_shows_splats_as_they_were(core, rest, modifiers, strength):
     obj, empty = bound(rest)
     empty.location += Vector((0.0, 1.0, 0.5))
+    empty.rotation_euler.x = 0.6
     bpy.ops.meshfree.deform_update()
+    modifiers.set_input(next(item for item in obj.modifiers if item.name == "Mesh-Free Deform"), "Strength", strength)
+    obj.update_tag()
     moved = splats_of(core, shown(obj))
     assert bpy.ops.meshfree.deform_to_shape_key() == {"FINISHED"}
     assert bpy.ops.meshfree.deform_unbind() == {"FINISHED"}
@@ -158,7 +162,8 @@ def test_a_stored_deformation_shows_splats_as_they_were(core, rest, modifiers):
     for value, wanted in ((1.0, moved), (0.0, rest)):
         modifiers.set_input(obj.modifiers["Deform"], "Value", value)
         obj.update_tag()
-        close(splats_of(core, shown(obj)), wanted)
+        # Half-way Blender leaves out small turns, which we do not.
+        close(splats_of(core, shown(obj)), wanted, 1e-5 if strength == 1.0 else 1e-3)
 
 
 def test_a_bake_without_harmonics_leaves_them(core, rest):
