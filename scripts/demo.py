@@ -20,7 +20,7 @@ POINTS = 20_000
 
 def load_scan(path, up):
     """Open a scan as the command line does, and put it upright."""
-    obj, _ = studio.part("operators.files.objects").load(path)
+    obj, _ = studio.part("operators.files.opening").load(path)
     if up == "Y":
         obj.rotation_mode = "XYZ"
         obj.rotation_euler.x += math.pi / 2.0
