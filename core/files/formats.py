@@ -15,6 +15,7 @@ from .las import read_las
 from .lines import brief
 from .pcd import read_pcd
 from .ply import read_ply, write_ply
+from .ptx import read_ptx
 from .table import PointTable, check_places, without_missed
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
@@ -28,6 +29,7 @@ _READERS = {
     ".pcd": read_pcd,
     ".xyz": read_columns,
     ".pts": read_scan,
+    ".ptx": read_ptx,
     ".csv": read_columns,
     ".txt": read_columns,
     ".npy": read_array,
@@ -37,15 +39,19 @@ _READERS = {
     ".e57": read_e57,
 }
 READABLE = tuple(_READERS)
+TEXTS = tuple(suffix for suffix, read in _READERS.items() if read in (read_columns, read_scan))  # rows of columns
 WRITABLE = (".ply", ".xyz", ".csv")
 
 
-def read_points(path) -> PointTable:
+def read_points(path, columns="") -> PointTable:
     """Read the points of a file of one of the kinds in `READABLE`.
 
     Parameters
     ----------
     path : pathlib.Path
+    columns : str
+        Names of the columns of a file of one of the kinds in `TEXTS`, in their order, such as "x y z - r g b", where -
+        leaves one out, and ... at the end all that follow. Empty to find them.
 
     Returns
     -------
@@ -54,13 +60,17 @@ def read_points(path) -> PointTable:
     Raises
     ------
     PointCloudError
-        There is no such file, or no points in it, or it is broken; the text says where.
+        There is no such file, or no points in it, or it is broken; the text says where. Or columns are named that the
+        file does not have.
     """
     suffix = path.suffix.lower()
     if suffix not in _READERS:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
+    if columns.strip() and suffix not in TEXTS:
+        raise PointCloudError(f"{path} names its columns itself. Give Columns only with {', '.join(TEXTS)}.")
     with reading(path):
-        table = without_missed(_READERS[suffix](path), path)
+        given = (path, columns) if columns.strip() else (path,)
+        table = without_missed(_READERS[suffix](*given), path)
     step = float(np.spacing(np.float32(check_places(table.points, path))))
     if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
         table.notices.append(
