@@ -172,14 +172,22 @@ def load(rows, places, others, name):
 
 
 def load_whole(rows, index):
-    """Read a column of whole numbers that are too large for doubles; None if they are none, or too large."""
+    """Read a column of whole numbers that are too large for doubles.
+
+    Returns
+    -------
+    ndarray, (n,), or None
+        None if they are no whole numbers, or too large for 64 bits.
+    bool
+        Whether they are whole numbers but for missing ones, so that doubles lose digits.
+    """
     texts = _load(rows, [index], f"U{_DIGITS}")[:, 0]
     for kind in (np.int64, np.uint64):
         try:
-            return texts.astype(kind)
+            return texts.astype(kind), False
         except (ValueError, OverflowError):
             continue
-    return None
+    return None, bool(np.char.isdecimal(np.char.lstrip(texts[texts != "nan"], "+-")).all())
 
 
 def _load(rows, columns, dtype=float):
@@ -231,6 +239,8 @@ def _find_faults(rows, places, others):
     for number, line in enumerate(rows.lines(), start=rows.first + 1):
         words = split_row(line, rows.delimiter) if line.strip() else []
         if not any(words):
+            if len(words) > 1 and not rows.filled:
+                return dict.fromkeys(places, "")
             continue
         faults = {}
         for index in places + others:
@@ -253,4 +263,4 @@ def _count_missing(rows, values, columns, name):
         return []
     missing = np.isnan(values).sum(axis=0)
     texts = [f"{count} of {name(index)}" for index, count in zip(columns, missing, strict=True) if count]
-    return [f"{rows.path.name}: cells without a number are NaN: {brief(', '.join(texts))}."]
+    return [f"{rows.path.name}: cells without a number are NaN: {brief(', '.join(texts))}."] if texts else []

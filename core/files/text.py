@@ -55,7 +55,11 @@ def _read_text(blocks, path, columns, usual=None):
     rows = find_rows(blocks, path)
     layout = given_layout(columns, rows) if columns else find_layout(rows, usual or {})
     others, values, notices = load(rows, layout.places, layout.others, layout.label)
-    extra = {layout.label(index): _exact(rows, index, values[:, 3 + n]) for n, index in enumerate(others)}
+    extra = {}
+    for index, column in zip(others, values.T[3:], strict=True):
+        extra[layout.label(index)], lost = _exact(rows, index, column)
+        if lost:
+            notices.append(f"{path.name}: {layout.label(index)} has whole numbers whose last digits are rounded.")
     nameless = [layout.label(index) for index in others if not layout.names[index]]
     if nameless:
         guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless)
@@ -70,11 +74,11 @@ def _read_text(blocks, path, columns, usual=None):
 
 
 def _exact(rows, index, values):
-    """Return values as whole numbers if doubles would lose their digits."""
+    """Return values as whole numbers if doubles would lose their digits, and whether some are lost nevertheless."""
     if not (np.abs(values) >= _EXACT).any():
-        return values
-    whole = load_whole(rows, index)
-    return values if whole is None else whole
+        return values, False
+    whole, lost = load_whole(rows, index)
+    return (values if whole is None else whole), lost
 
 
 def _renamed(columns, names):
@@ -93,6 +97,7 @@ def _tell_guess(path, places, labels, names):
         for what, kind in (
             ("colors", ("r", "g", "b", "alpha")),
             ("normals", ("nx", "ny", "nz")),
+            ("intensity", ("intensity",)),
             ("attributes", labels),
         )
     ]
