@@ -66,7 +66,9 @@ def _draw_points(menu, context):
 
 
 def _draw_import(self, _context):
-    self.layout.operator("meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.csv/.npy)")
+    self.layout.operator(
+        "meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.ptx/.csv/.npy)"
+    )
 
 
 def _draw_export(self, _context):

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProp
 from bpy_extras.io_utils import ImportHelper
 
 from ...core import PointCloudError, Splats, read_splats, surface_discs
-from ...core.files import READABLE, numbered_files, order_frames, read_points
+from ...core.files import READABLE, TEXTS, numbered_files, order_frames, read_points
 from ...core.splats import holds_splats
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
@@ -38,12 +38,11 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
-    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as vertices"""
+    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, PTX, CSV, text and numpy files as vertices"""
 
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-    asks = ("up", "kind", "attributes", "surface", "sequence", "frame")
 
     filepath: StringProperty(
         name="File Path",
@@ -81,6 +80,12 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Import the other columns too: colors, normals, intensity and so on",
         default=True,
     )
+    columns: StringProperty(
+        name="Columns",
+        description="Names of the columns of text files in their order, such as x y z - r g b, where - leaves one out"
+        " and ... at the end all that follow; empty to find them",
+        options={"SKIP_SAVE"},
+    )
     surface: BoolProperty(
         name="Show as Surface",
         description=f"Draw points as discs in the surface that they lie on, up to {_QUICK:,} of them; not a sequence",
@@ -98,6 +103,13 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Let the 3D views look at the imported points, unless a script imports them",
         default=True,
     )
+
+    @property
+    def asks(self):
+        """Name the settings of the dialog; columns are asked for where text is chosen, or nothing yet."""
+        names = [item.name for item in self.files if item.name] or [self.filepath]
+        text = any(Path(name).suffix.lower() in ("", *TEXTS) for name in names)
+        return ("up", "kind", "attributes", *(["columns"] if text else []), "surface", "sequence", "frame")
 
     @classmethod
     def obstacle(cls, context):
@@ -118,8 +130,8 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         if self.sequence:
             paths = order_frames(paths) if len(paths) > 1 else numbered_files(paths[0].parent)
         self._paths = paths
-        surface = self.surface and not self.sequence
-        return self.work(context, [], lambda progress: _read_all(paths, surface, progress))
+        surface, columns = self.surface and not self.sequence, self.columns
+        return self.work(context, [], lambda progress: _read_all(paths, columns, surface, progress))
 
     def finish(self, context, objects, results):
         """Add an object for each table."""
@@ -230,7 +242,7 @@ def _frame_selected(context):
                 bpy.ops.view3d.view_selected()
 
 
-def _read_all(paths, surface, progress):
+def _read_all(paths, columns, surface, progress):
     """Read some files, those that were just read from memory: Adjust Last Operation imports them again.
 
     Returns
@@ -242,14 +254,18 @@ def _read_all(paths, surface, progress):
     for number, path in enumerate(paths):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
-        key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
-        tables.append(cache.fetch(key, lambda path=path: (read_splats if holds_splats(path) else read_points)(path)))
+        key = ("file", str(path), columns, state and (state.st_mtime_ns, state.st_size))
+        tables.append(cache.fetch(key, lambda path=path: _read(path, columns)))
     if not surface:
         return [(table, None) for table in tables]
     total = sum(len(table.points) for table in tables if not isinstance(table, Splats))
     if total > _QUICK:
         return [(table, f"Discs of {total:,} points take a while: press Show as Surface") for table in tables]
     return [(table, None if isinstance(table, Splats) else _find_discs(table.points, progress)) for table in tables]
+
+
+def _read(path, columns):
+    return read_points(path, columns) if columns or not holds_splats(path) else read_splats(path)
 
 
 def _find_discs(points, progress):

@@ -13,7 +13,7 @@ from .objects import add_object, point_table, save_arrays
 from .splats import add_splats, splats_to_write, with_results
 
 
-def load(path, name: str = "", option: str = "--object"):
+def load(path, name: str = "", option: str = "--object", columns: str = ""):
     """Open a file in place of everything that is loaded.
 
     Parameters
@@ -24,6 +24,8 @@ def load(path, name: str = "", option: str = "--object"):
         The object's name; empty for the active one, or else the only mesh.
     option : str
         Of the command line, by which one names it.
+    columns : str
+        Names of the columns of a file of text; empty to find them.
 
     Returns
     -------
@@ -39,8 +41,9 @@ def load(path, name: str = "", option: str = "--object"):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        add, read = (add_splats, read_splats) if holds_splats(path) else (add_object, read_points)
-        given = read(path)
+        splats = not columns and holds_splats(path)
+        add = add_splats if splats else add_object
+        given = read_splats(path) if splats else read_points(path, columns)
         notices = given.notices
         bpy.ops.wm.read_homefile(use_empty=True)
         add(path.stem, given, bpy.context.scene.collection)

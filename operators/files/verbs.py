@@ -60,6 +60,12 @@ class ObjectVerb(Verb):
 
     def add_options(self, parser):
         parser.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
+        parser.add_argument(
+            "--columns",
+            default="",
+            metavar="NAMES",
+            help='names of the columns of text files, such as "x y z - r g b"; else those found',
+        )
         settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
         for name in _SETTINGS:
             add_setting(parser, settings[name])
@@ -71,7 +77,8 @@ class ObjectVerb(Verb):
 
     def open(self, path, option, arguments):
         """Open a file in place of all that is loaded; return the object that an option names, set up, and notices."""
-        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}")
+        columns = arguments.columns if option == "object" else ""
+        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}", columns)
         reason = obstacle(obj)
         if reason:
             raise PointCloudError(reason)

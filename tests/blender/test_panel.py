@@ -331,11 +331,12 @@ def test_dialogs_show_every_setting(name):
     properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if not item.is_hidden]
     properties = [item for item in properties if item.type != "POINTER" and item.identifier != "filepath"]
     values = {item.identifier: item.default for item in properties}
+    hidden = {"files": (), "filepath": ""} if name == "import_points" else {}
     choices = [item for item in properties if item.type == "ENUM"]
     variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]
     texts = []
     for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
-        settings = Settings(layout=Layout(texts), **values | variant)
+        settings = Settings(layout=Layout(texts), **values | variant | hidden)
         settings.asks = value_of(operator.asks, settings)
         settings.is_repeated = lambda context: False
         operator.draw(settings, bpy.context)
