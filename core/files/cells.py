@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InvalidPointsError
 from .lines import brief, is_number
 
-_DELIMITERS = (";", "\t", None, ",")  # in this order; None is white space
+_DELIMITERS = (";", "\t", "|", None, ",")  # in this order; None is white space
 _HEADER = 20  # lines that are no comments before the first point at most
 _SAMPLE = 100  # rows that tell what columns hold
 _ROUNDS = 20  # times that rows are read anew without a column that turned out to hold no numbers

@@ -5,6 +5,7 @@ from .lines import is_number
 from .names import find_places, is_known
 
 _MARKS = "#/%! "
+_MOST_DIGITS = 15  # of a number of a point
 
 
 def find_names(rows, numeric) -> list:
@@ -38,7 +39,7 @@ def _split(line, delimiter):
     body = line.strip(" \r\n").lstrip(_MARKS) if is_comment(line) else line.strip(" \r\n")
     bodies = [body, body.partition(":")[2]] if is_comment(line) and ":" in body else [body]
     for text in bodies:
-        for separator in dict.fromkeys((delimiter or ",", ",", ";", "\t", None)):
+        for separator in dict.fromkeys((delimiter or ",", ",", ";", "\t", "|", None)):
             parts = text.split(separator) if separator else _without_units(text).split()
             names = [name.strip().strip("\"'").strip() for name in parts]
             if len(names) > 2:
@@ -77,21 +78,25 @@ def _fit(names, marked, rows, numeric):
     return _distinct(names) if found and found.sure else []
 
 
-def counts(rows):
-    """Tell whether the first column counts the rows."""
-    words = [row[0] for row in rows.sample]
-    return (
-        len(words) > 2
-        and all(word.isdecimal() for word in words)
-        and [int(word) for word in words] == [*range(int(words[0]), int(words[0]) + len(words))]
-    )
+def counts(rows, index=0) -> bool:
+    """Tell whether a column counts the rows."""
+    words = [row[index] for row in rows.sample if index < len(row)]
+    if len(words) < 3 or not all(word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS for word in words):
+        return False
+    first = int(words[0])
+    return [int(word) for word in words] == [*range(first, first + len(words))]
+
+
+def unnamed(index) -> str:
+    """Return what a column without a name is called, by its number in the file."""
+    return f"column_{index + 1}"
 
 
 def _distinct(names):
     """Number names that come again."""
     result = []
     for index, name in enumerate(names):
-        name = f"column_{index + 1}" if name == "" else name
+        name = unnamed(index) if name == "" else name
         again = sum(other == name for other in names[:index]) if name else 0
         result.append(f"{name}_{again + 1}" if again else name)
     return result
