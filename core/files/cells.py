@@ -207,6 +207,8 @@ def _blocks(rows):
 
 def _plain(lines, delimiter, _):
     """Return lines as numpy reads them: it knows comments with # alone, decimal points, and no quotes."""
+    if delimiter is not None and any(map(str.isspace, lines)):
+        lines = ["" if line.isspace() else line for line in lines]
     text = "\n".join(lines)
     slashes, commas, quotes = "//" in text, delimiter != "," and "," in text, '"' in text
     if not (slashes or commas or quotes):

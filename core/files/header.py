@@ -1,5 +1,7 @@
 """The names of the columns of a text, from the lines before its rows."""
 
+import re
+
 from .cells import is_comment
 from .lines import is_number
 from .names import find_places, is_known
@@ -37,23 +39,18 @@ def find_names(rows, numeric) -> list:
 def _split(line, delimiter):
     """Yield the words of a line that may be names, by all that could separate them."""
     body = line.strip(" \r\n").lstrip(_MARKS) if is_comment(line) else line.strip(" \r\n")
-    bodies = [body, body.partition(":")[2]] if is_comment(line) and ":" in body else [body]
+    bodies = [body.partition(":")[2], body] if is_comment(line) and ":" in body else [body]
     for text in bodies:
         for separator in dict.fromkeys((delimiter or ",", ",", ";", "\t", "|", None)):
-            parts = text.split(separator) if separator else _without_units(text).split()
+            parts = text.split(separator) if separator else _closed(text).split()
             names = [name.strip().strip("\"'").strip() for name in parts]
             if len(names) > 2:
                 yield names
 
 
-def _without_units(text):
-    """Return text without what stands in brackets: it may have spaces before and in it."""
-    depth, result = 0, []
-    for character in text:
-        depth += character in "[("
-        result.append("" if depth else character)
-        depth = max(depth - (character in "])"), 0)
-    return "".join(result)
+def _closed(text):
+    """Return text with its brackets closed up to the words before them, so that white space divides names alone."""
+    return re.sub(r"\s*([\[(])([^\])]*)", lambda match: match[1] + "_".join(match[2].split()), text)
 
 
 def _fit(names, marked, rows, numeric):
