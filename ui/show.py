@@ -6,6 +6,7 @@ import bpy
 import gpu
 import numpy as np
 
+from .. import core
 from ..operators.deform.binding import positions_now
 from ..operators.deform.nodes import find_deform, is_baked, show_live, turns_discs
 from ..operators.objects.attributes import (
@@ -19,7 +20,7 @@ from ..operators.objects.attributes import (
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
-from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
+from ..operators.objects.reading import TYPES, fingerprint, spacing
 from ..operators.objects.splats import has_splats
 from . import colormaps, legend
 from .display import (
@@ -208,7 +209,7 @@ def resize(obj):
         if kept.spacing_of != points:
             kept.spacing_of, kept.spacing = points, spacing(obj.data)
     elif not kept.spacing:
-        kept.spacing = typical_distance(positions_now(obj))
+        kept.spacing = core.geometry.typical_distance(positions_now(obj))
     set_input(modifier, "Radius", _radius(kept))
     reshape(obj)
 

@@ -7,7 +7,8 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ...core import PointCloudError, write_splats
+from ... import core
+from ...core import PointCloudError
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
 from ..objects.place import place_of
@@ -126,7 +127,7 @@ class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
 
         def write(path, progress):
             progress("Write", 0.0)
-            write_splats(path, splats)
+            core.write_splats(path, splats)
             return f"{name}: {len(splats):,} splats written to {path.name}{hint}"
 
         return write

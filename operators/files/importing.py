@@ -9,9 +9,9 @@ import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...core import PointCloudError, Splats, read_splats, surface_discs
+from ... import core
+from ...core import PointCloudError
 from ...core.files import READABLE, numbered_files, order_frames, read_points
-from ...core.splats import holds_splats
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
 from ..objects.handlers import tell
@@ -145,7 +145,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         shared = known_offset(context.scene)
         surfaces, clouds = [], []
         for path, (table, found) in zip(self._paths, read, strict=True):
-            if isinstance(table, Splats):
+            if isinstance(table, core.Splats):
                 clouds.append(self._add_splats(context, path.stem, table))
                 continue
             turned = _turned_up(table, self.up) if self.up != "Z" else table
@@ -243,20 +243,27 @@ def _read_all(paths, surface, progress):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
         key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
-        tables.append(cache.fetch(key, lambda path=path: (read_splats if holds_splats(path) else read_points)(path)))
+        tables.append(cache.fetch(key, lambda path=path: _read(path)))
     if not surface:
         return [(table, None) for table in tables]
-    total = sum(len(table.points) for table in tables if not isinstance(table, Splats))
+    total = sum(len(table.points) for table in tables if not isinstance(table, core.Splats))
     if total > _QUICK:
         return [(table, f"Discs of {total:,} points take a while: press Show as Surface") for table in tables]
-    return [(table, None if isinstance(table, Splats) else _find_discs(table.points, progress)) for table in tables]
+    return [
+        (table, None if isinstance(table, core.Splats) else _find_discs(table.points, progress)) for table in tables
+    ]
+
+
+def _read(path):
+    """Read one file, as splats where it holds such."""
+    return core.read_splats(path) if core.splats.holds_splats(path) else read_points(path)
 
 
 def _find_discs(points, progress):
     """Find how the display is to draw points as a surface, (n, 3); a text where they are none."""
     points = points - points.mean(axis=0)  # far from the origin their squares would have no digits left
     try:
-        found = cache.fetch(cache.content("discs", points), lambda: surface_discs(points, progress=progress))
+        found = cache.fetch(cache.content("discs", points), lambda: core.surface_discs(points, progress=progress))
         shown = discs(found.normals, found.radii, points)
         check_size(DISC, shown)
     except PointCloudError as error:

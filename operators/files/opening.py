@@ -2,9 +2,9 @@
 
 import bpy
 
-from ...core import PointCloudError, read_splats, write_splats
+from ... import core
+from ...core import PointCloudError
 from ...core.files import WRITABLE, read_points, write_points
-from ...core.splats import holds_splats
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
@@ -39,7 +39,7 @@ def load(path, name: str = "", option: str = "--object"):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        add, read = (add_splats, read_splats) if holds_splats(path) else (add_object, read_points)
+        add, read = (add_splats, core.read_splats) if core.splats.holds_splats(path) else (add_object, read_points)
         given = read(path)
         notices = given.notices
         bpy.ops.wm.read_homefile(use_empty=True)
@@ -80,7 +80,7 @@ def save(path, obj, arrays, shown=""):
     if suffix == ".npz":
         save_arrays(path, arrays)
     elif suffix == ".ply" and has_splats(obj.data):
-        write_splats(path, with_results(splats_to_write(obj), obj.data))
+        core.write_splats(path, with_results(splats_to_write(obj), obj.data))
     elif suffix in WRITABLE:
         table = point_table(bpy.context, obj)
         write_points(path, table, double=not table.single)

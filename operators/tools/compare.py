@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 from bpy.props import FloatProperty
 
-from ...core import PointCloudError, surface_deviation
+from ... import core
+from ...core import PointCloudError
 from ..objects.attributes import COMPARED, DEVIATION, tag_changed, write_attribute
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
@@ -34,7 +35,7 @@ class Compare(Tool):
             normals = operator(lambda stage, fraction: progress(stage, 0.4 * fraction)).normals
             with naming(name):
                 laplacian = other_operator(lambda stage, fraction: progress(stage, 0.4 + 0.4 * fraction))
-            found = surface_deviation(
+            found = core.surface_deviation(
                 reading.points + shift,
                 normals,
                 laplacian,

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
-from ...core import mesh_surface, values_on_mesh
+from ... import core
 from ..objects.attributes import DIRECTION_1, DISC, NORMAL, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
 from ..objects.groups import add_group
@@ -48,8 +48,8 @@ class MeshSurface(Tool):
         detail, kept = self.detail, _Kept(obj)
 
         def make(laplacian, progress):
-            mesh = mesh_surface(laplacian, detail, progress=progress)
-            carrying = values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
+            mesh = core.mesh_surface(laplacian, detail, progress=progress)
+            carrying = core.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
             return mesh, carrying
 
         def compute(progress):

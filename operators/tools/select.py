@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
-from ...core import PointCloudError, floaters, grow
+from ... import core
+from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.counting import renew_counts
@@ -181,7 +182,7 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
         chosen = selected(obj)
         _, laplacian = analyzed(context, obj)
         distance = self.distance or 4.0 * np.sqrt(np.median(laplacian.areas))
-        grown = grow(laplacian, chosen, distance)
+        grown = core.grow(laplacian, chosen, distance)
         return lambda: select(context, obj, grown)
 
 
@@ -326,7 +327,7 @@ class MESHFREE_OT_select_floaters(SelectionOperator, bpy.types.Operator):
     surface = False
 
     def prepare(self, context, obj):
-        chosen = floaters(read_splats(obj.data))
+        chosen = core.floaters(read_splats(obj.data))
         if not chosen.any():
             raise PointCloudError(f'None of the {len(chosen):,} splats of "{obj.name}" is a floater.')
         return lambda: select(context, obj, chosen)
