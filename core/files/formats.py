@@ -15,7 +15,7 @@ from .las import read_las
 from .lines import brief
 from .pcd import read_pcd
 from .ply import read_ply, write_ply
-from .table import PointTable, check_places
+from .table import PointTable, check_places, without_missed
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
 
@@ -60,7 +60,7 @@ def read_points(path) -> PointTable:
     if suffix not in _READERS:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
     with reading(path):
-        table = _READERS[suffix](path)
+        table = without_missed(_READERS[suffix](path), path)
     step = float(np.spacing(np.float32(check_places(table.points, path))))
     if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
         table.notices.append(

@@ -127,6 +127,30 @@ def _free_name(name, columns):
     return next(free for free in chain([name], numbered) if free not in columns)
 
 
+def without_missed(table, path) -> PointTable:
+    """Return a table without the points that have no place: sensors with a raster of rays write NaN where they miss.
+
+    Parameters
+    ----------
+    table : PointTable
+        Gets a notice, and loses what is left out itself.
+    path : pathlib.Path
+        The file, for the texts.
+    """
+    kept = np.isfinite(table.points).all(axis=1)
+    missed = len(kept) - np.count_nonzero(kept)
+    if not missed:
+        return table
+    what = "NaN or infinity" if np.isinf(table.points).any() else "NaN"
+    if missed == len(kept):
+        raise TooFewPointsError(f"{path} has no points: all {missed} are without a place ({what}). Export it again.")
+    table.points = table.points[kept]
+    table.attributes = {name: values[kept] for name, values in table.attributes.items()}
+    table.colors = None if table.colors is None else table.colors[kept]
+    table.notices.append(f"{path.name}: left out {missed} points that the sensor missed ({what}).")
+    return table
+
+
 def check_places(points, path) -> float:
     """Refuse a file without points, or with coordinates that are no places, and return the largest coordinate."""
     if len(points) == 0:

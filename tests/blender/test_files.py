@@ -312,7 +312,7 @@ def test_laser_scans_are_imported(extension, tmp_path, name):
         ("a.xyz", b"", "there are none"),
         ("a.csv", b"x,y,z\n", "there are none"),
         ("a.pts", b"5\n1 2 3\n", "announces 5 points, but 1 lines follow"),
-        ("a.obj", b"v 1 2 nan\n", "1 of 1 points"),
+        ("a.obj", b"v 1 2 nan\n", "all 1 are without a place"),
     ],
 )
 def test_broken_files_leave_nothing(tmp_path, name, data, text):
