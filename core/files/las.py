@@ -6,7 +6,7 @@ import struct
 import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError
-from .table import PointTable
+from .table import PointTable, unit_colors
 
 _COLUMNS = ("intensity", "classification", "return_number", "nir")  # that become attributes, where a file has them
 _COLORS = ("red", "green", "blue")
@@ -161,7 +161,5 @@ def _read(reader, path):
             f"{path} ends after {done} of the {count} points that its header names. Copy it again."
         )
     if colors is not None and colors.any():  # all black are those of scanners without a camera
-        full = 255.0 if colors.max() <= 255 else 65535.0  # some programs use the low byte alone
-        table.colors = np.ones((count, 4), np.float32)
-        np.divide(colors, np.float32(full), out=table.colors[:, :3], casting="same_kind")
+        table.colors = unit_colors(colors)
     return table
