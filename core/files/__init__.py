@@ -1,5 +1,6 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
+from .choices import Choices, parse_classes
 from .formats import READABLE, WRITABLE, read_points, reading, write_points
 from .frames import numbered_files, order_frames
 from .mesh import MESHES, write_mesh

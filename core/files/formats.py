@@ -10,14 +10,18 @@ import numpy as np
 
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
 from .arrays import read_array
+from .choices import Choices
 from .e57 import read_e57
 from .las import read_las
 from .lines import brief
+from .origin import look_like_degrees
 from .pcd import read_pcd
 from .ply import read_ply, write_ply
 from .table import PointTable, check_places, without_missed
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
+
+_DEGREE = 1e5  # metres
 
 # What the modules that readers use raise about broken files; RuntimeError of archives with a password.
 _FAULTS = (ValueError, OverflowError, EOFError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile)
@@ -36,16 +40,19 @@ _READERS = {
     ".laz": read_las,
     ".e57": read_e57,
 }
+_CHOOSING = (".las", ".laz")  # whose readers take choices
 READABLE = tuple(_READERS)
 WRITABLE = (".ply", ".xyz", ".csv")
 
 
-def read_points(path) -> PointTable:
+def read_points(path, choices=Choices()) -> PointTable:
     """Read the points of a file of one of the kinds in `READABLE`.
 
     Parameters
     ----------
     path : pathlib.Path
+    choices : Choices
+        What of it is read, where its kind leaves a choice.
 
     Returns
     -------
@@ -60,14 +67,29 @@ def read_points(path) -> PointTable:
     if suffix not in _READERS:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
     with reading(path):
-        table = without_missed(_READERS[suffix](path), path)
-    step = float(np.spacing(np.float32(check_places(table.points, path))))
-    if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
-        table.notices.append(
-            f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in"
-            " double precision, or with a shift."
-        )
+        given = (path, choices) if suffix in _CHOOSING else (path,)
+        table = without_missed(_READERS[suffix](*given), path)
+    check_places(table.points, path)
+    table.notices += _doubts(table, path)
     return table
+
+
+def _doubts(table, path):
+    """Yield what a user should know about the coordinates of a table."""
+    steps = np.spacing(np.abs(table.points).max(axis=0).astype(np.float32))
+    if table.degrees or look_like_degrees(table.points):
+        known = "are" if table.degrees else "look like"
+        yield (
+            f"{path.name}: x and y {known} degrees of longitude and latitude, in which lengths, areas and curvatures mean"
+            " nothing. Project the points to meters first."
+        )
+        steps[:2] *= _DEGREE
+    if table.single and steps.max() * 8192.0 > np.ptp(table.points, axis=0).max():
+        step = np.spacing(np.float32(np.abs(table.points).max()))
+        yield (
+            f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in double"
+            " precision, or with a shift."
+        )
 
 
 @contextmanager

@@ -30,6 +30,8 @@ class PointTable:
         Red, green, blue and alpha from 0 to 1, in sRGB.
     single : bool
         Whether the coordinates were kept in single precision.
+    degrees : bool
+        Whether x and y are known to be longitude and latitude.
     notices : list of str
         What was left out.
     """
@@ -38,6 +40,7 @@ class PointTable:
     attributes: dict = field(default_factory=dict)
     colors: np.ndarray | None = None
     single: bool = False
+    degrees: bool = False
     notices: list = field(default_factory=list)
 
 

@@ -56,7 +56,7 @@ def add_object(name, table, collection, known=None, with_attributes=True):
     -------
     bpy.types.Object
     """
-    origin = choose_origin(table.points, known)
+    origin = choose_origin(table.points, known, degrees=table.degrees)
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(table.points))
     mesh.attributes["position"].data.foreach_set("vector", (table.points - origin).astype(np.float32).reshape(-1))
