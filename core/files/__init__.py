@@ -2,7 +2,7 @@
 
 from .choices import Choices, parse_classes
 from .formats import READABLE, WRITABLE, read_points, reading, write_points
-from .frames import numbered_files, order_frames
+from .frames import frame_number, numbered_files, order_frames
 from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse
 from .ply import PlyVertices, read_vertex_columns, read_vertex_names, write_vertex_columns

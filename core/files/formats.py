@@ -80,8 +80,8 @@ def _doubts(table, path):
     if table.degrees or look_like_degrees(table.points):
         known = "are" if table.degrees else "look like"
         yield (
-            f"{path.name}: x and y {known} degrees of longitude and latitude, in which lengths, areas and curvatures mean"
-            " nothing. Project the points to meters first."
+            f"{path.name}: x and y {known} degrees of longitude and latitude, in which lengths, areas and curvatures"
+            " mean nothing. Project the points to meters first."
         )
         steps[:2] *= _DEGREE
     if table.single and steps.max() * 8192.0 > np.ptp(table.points, axis=0).max():

@@ -28,7 +28,7 @@ def look_like_degrees(points) -> bool:
     return bool(
         largest.max() <= 180.0
         and largest.min() <= 90.0
-        and 0.0 < extent[:2].min()
+        and extent[:2].min() > 0.0
         and _NARROW * extent[:2].max() <= extent[2]
         and _FAR * extent[:2].max() <= largest.max()
     )
