@@ -1,8 +1,8 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
-from .choices import Choices, parse_classes
-from .formats import READABLE, WRITABLE, read_points, reading, write_points
+from .formats import READABLE, SCANS, WRITABLE, read_points, reading, write_points
 from .frames import frame_number, numbered_files, order_frames
+from .las_choices import LasChoices, parse_classes
 from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse
 from .ply import PlyVertices, read_vertex_columns, read_vertex_names, write_vertex_columns

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
 from .arrays import read_array
-from .choices import Choices
+from .las_choices import LasChoices
 from .e57 import read_e57
 from .las import read_las
 from .lines import brief
@@ -40,19 +40,19 @@ _READERS = {
     ".laz": read_las,
     ".e57": read_e57,
 }
-_CHOOSING = (".las", ".laz")  # whose readers take choices
+SCANS = (".las", ".laz")
 READABLE = tuple(_READERS)
 WRITABLE = (".ply", ".xyz", ".csv")
 
 
-def read_points(path, choices=Choices()) -> PointTable:
+def read_points(path, las=LasChoices()) -> PointTable:
     """Read the points of a file of one of the kinds in `READABLE`.
 
     Parameters
     ----------
     path : pathlib.Path
-    choices : Choices
-        What of it is read, where its kind leaves a choice.
+    las : LasChoices
+        Which points of a file of one of the kinds in `SCANS` are read.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def read_points(path, choices=Choices()) -> PointTable:
     if suffix not in _READERS:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
     with reading(path):
-        given = (path, choices) if suffix in _CHOOSING else (path,)
+        given = (path, las) if suffix in SCANS else (path,)
         table = without_missed(_READERS[suffix](*given), path)
     check_places(table.points, path)
     table.notices += _doubts(table, path)

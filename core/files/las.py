@@ -6,7 +6,7 @@ import struct
 import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError, TooFewPointsError
-from .choices import Choices
+from .las_choices import LasChoices
 from .table import PointTable, unit_colors
 
 _COLUMNS = ("intensity", "classification", "return_number", "nir")  # that become attributes, where a file has them
@@ -25,7 +25,7 @@ _MOST_DEGREES = 360.0
 _GEOGRAPHIC = (1024, 2)  # key of GeoTIFF and its value
 
 
-def read_las(path, choices=Choices()) -> PointTable:
+def read_las(path, choices=LasChoices()) -> PointTable:
     """Read a LAS or LAZ file: coordinates, intensity, class, return, colors and what its maker added.
 
     Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not.

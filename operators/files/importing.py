@@ -10,7 +10,16 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProp
 from bpy_extras.io_utils import ImportHelper
 
 from ...core import PointCloudError, Splats, read_splats, surface_discs
-from ...core.files import READABLE, Choices, frame_number, numbered_files, order_frames, parse_classes, read_points
+from ...core.files import (
+    READABLE,
+    SCANS,
+    LasChoices,
+    frame_number,
+    numbered_files,
+    order_frames,
+    parse_classes,
+    read_points,
+)
 from ...core.splats import holds_splats
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
@@ -26,7 +35,6 @@ from .splats import add_splats, is_drawn, mark
 
 OWN = tuple(suffix for suffix in READABLE if suffix not in (".ply", ".obj"))  # Blender reads those by itself, too
 
-_SCANS = (".las", ".laz")
 _QUICK = 80_000  # points whose discs are found in less than two seconds
 _DRAWN = 200_000  # splats whose ellipsoids are drawn by themselves
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
@@ -118,7 +126,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def asks(self):
         """Names of the settings: some are those of sequences, and of a kind of file."""
         sequence = ("sequence", "numbers") if self.sequence else ("sequence",)
-        scans = ("classes", "withheld") if any(path.suffix.lower() in _SCANS for path in self._chosen()) else ()
+        scans = ("classes", "withheld") if any(path.suffix.lower() in SCANS for path in self._chosen()) else ()
         return "up", "kind", "attributes", *scans, "surface", *sequence, "frame"
 
     @classmethod
@@ -134,7 +142,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     @reporting
     def execute(self, context):
         self._framed = self._attended and self.frame
-        paths, choices = self._chosen(), Choices(parse_classes(self.classes), self.withheld)
+        paths, choices = self._chosen(), LasChoices(parse_classes(self.classes), self.withheld)
         if self.sequence:
             paths = order_frames(paths) if len(paths) > 1 else numbered_files(paths[0].parent)
         self._paths = paths

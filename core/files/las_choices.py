@@ -1,4 +1,4 @@
-"""What of a file is read, where its kind leaves a choice."""
+"""Which points of LAS files are read."""
 
 import re
 from dataclasses import dataclass
@@ -9,15 +9,15 @@ _GREATEST = 255  # class of LAS
 
 
 @dataclass(frozen=True)
-class Choices:
-    """What of a file is read, where its kind leaves a choice.
+class LasChoices:
+    """Which points of LAS files are read.
 
     Attributes
     ----------
     classes : frozenset of int
-        Of LAS, those whose points are read; empty for all.
+        Those whose points are read; empty for all.
     withheld : bool
-        Of LAS, whether points are read that are flagged as withheld, which stands for deleted.
+        Whether points are read that are flagged as withheld, which stands for deleted.
     """
 
     classes: frozenset = frozenset()
