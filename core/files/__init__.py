@@ -1,6 +1,6 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
-from .formats import READABLE, SCANS, WRITABLE, read_points, reading, write_points
+from .formats import READABLE, SCANS, TEXTS, WRITABLE, read_points, reading, write_points
 from .frames import frame_number, numbered_files, order_frames
 from .las_choices import LasChoices, parse_classes
 from .mesh import MESHES, write_mesh

@@ -10,13 +10,14 @@ import numpy as np
 
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
 from .arrays import read_array
-from .las_choices import LasChoices
 from .e57 import read_e57
 from .las import read_las
+from .las_choices import LasChoices
 from .lines import brief
 from .origin import look_like_degrees
 from .pcd import read_pcd
 from .ply import read_ply, write_ply
+from .ptx import read_ptx
 from .table import PointTable, check_places, without_missed
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
@@ -32,6 +33,7 @@ _READERS = {
     ".pcd": read_pcd,
     ".xyz": read_columns,
     ".pts": read_scan,
+    ".ptx": read_ptx,
     ".csv": read_columns,
     ".txt": read_columns,
     ".npy": read_array,
@@ -42,15 +44,19 @@ _READERS = {
 }
 SCANS = (".las", ".laz")
 READABLE = tuple(_READERS)
+TEXTS = tuple(suffix for suffix, read in _READERS.items() if read in (read_columns, read_scan))  # rows of columns
 WRITABLE = (".ply", ".xyz", ".csv")
 
 
-def read_points(path, las=LasChoices()) -> PointTable:
+def read_points(path, columns="", las=LasChoices()) -> PointTable:
     """Read the points of a file of one of the kinds in `READABLE`.
 
     Parameters
     ----------
     path : pathlib.Path
+    columns : str
+        Names of the columns of a file of one of the kinds in `TEXTS`, in their order, such as "x y z - r g b", where -
+        leaves one out, and ... at the end all that follow. Empty to find them.
     las : LasChoices
         Which points of a file of one of the kinds in `SCANS` are read.
 
@@ -61,14 +67,17 @@ def read_points(path, las=LasChoices()) -> PointTable:
     Raises
     ------
     PointCloudError
-        There is no such file, or no points in it, or it is broken; the text says where.
+        There is no such file, or no points in it, or it is broken; the text says where. Or columns are named that the
+        file does not have.
     """
     suffix = path.suffix.lower()
     if suffix not in _READERS:
         raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
+    if columns.strip() and suffix not in TEXTS:
+        raise PointCloudError(f"{path} names its columns itself. Give Columns only with {', '.join(TEXTS)}.")
     with reading(path):
-        given = (path, las) if suffix in SCANS else (path,)
-        table = without_missed(_READERS[suffix](*given), path)
+        given = {"columns": columns} if columns.strip() else {"las": las} if suffix in SCANS else {}
+        table = without_missed(_READERS[suffix](path, **given), path)
     check_places(table.points, path)
     table.notices += _doubts(table, path)
     return table

@@ -25,7 +25,7 @@ _MOST_DEGREES = 360.0
 _GEOGRAPHIC = (1024, 2)  # key of GeoTIFF and its value
 
 
-def read_las(path, choices=LasChoices()) -> PointTable:
+def read_las(path, las=LasChoices()) -> PointTable:
     """Read a LAS or LAZ file: coordinates, intensity, class, return, colors and what its maker added.
 
     Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not.
@@ -48,7 +48,7 @@ def read_las(path, choices=LasChoices()) -> PointTable:
             # Not in parallel: that takes memory for as many points as a file names in a chunk.
             with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader:
                 _check_size(file, reader.header, path)
-                return _read(reader, path, choices)
+                return _read(reader, path, las)
         except (laspy.errors.LaspyException, lazrs.LazrsError) as error:
             raise ValueError(f"{error}") from error  # `read_points` tells it as it tells numpy's
 

@@ -291,7 +291,7 @@ def _read_all(paths, choices, surface, progress):
 
 
 def _read(path, choices):
-    return read_splats(path) if holds_splats(path) else read_points(path, choices)
+    return read_splats(path) if holds_splats(path) else read_points(path, las=choices)
 
 
 def _find_discs(points, progress):

@@ -179,17 +179,21 @@ class TestText:
         assert {name: values.tolist() for name, values in table.attributes.items()} == {"id": [7, 8], "heat": [0.5, -1]}
         assert_allclose(table.colors, [[1.0, 0.0, 0.2, 1.0], [0.0, 0.0, 0.0, 1.0]])
 
-    def test_columns_without_names_are_left_out(self, tmp_path):
+    def test_columns_without_names_are_kept(self, tmp_path):
         (tmp_path / "a.xyz").write_text("1 2 3 4 5\n6 7 8 9 10\n")
         table = read_points(tmp_path / "a.xyz")
-        assert table.attributes == {}
-        assert table.notices == ["a.xyz: left out 2 columns that no header names."]
+        assert {name: values.tolist() for name, values in table.attributes.items()} == {
+            "column_4": [4, 9],
+            "column_5": [5, 10],
+        }
+        assert "column_1, column_2, column_3 as x y z; column_4, column_5 as attributes" in table.notices[0]
 
-    def test_an_incomplete_column_is_left_out(self, tmp_path):
+    def test_an_empty_cell_is_no_number(self, tmp_path):
         (tmp_path / "a.csv").write_text("x,y,z,heat\n1,2,3,4\n5,6,7,\n")
         table = read_points(tmp_path / "a.csv")
         assert table.points.tolist() == [[1.0, 2.0, 3.0], [5.0, 6.0, 7.0]]
-        assert table.notices == ["a.csv: left out all columns but x y z, for line 3 has '' where a number should be."]
+        assert_array_equal(table.attributes["heat"], [4.0, np.nan])
+        assert table.notices == ["a.csv: cells without a number are NaN: 1 of heat."]
 
     @pytest.mark.parametrize(
         ("text", "error"),

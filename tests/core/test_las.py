@@ -268,7 +268,7 @@ class TestWhatIsChosen:
 
     def test_or_kept_with_their_flag(self, tmp_path):
         write_flagged(tmp_path / "a.las")
-        table = read_points(tmp_path / "a.las", LasChoices(withheld=True))
+        table = read_points(tmp_path / "a.las", las=LasChoices(withheld=True))
         assert table.points[:, 2].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
         assert table.attributes["withheld"].tolist() == [0, 1, 0, 0, 1]
         assert "2 points are withheld" in table.notices[0]
@@ -280,7 +280,7 @@ class TestWhatIsChosen:
 
     def test_classes(self, tmp_path):
         write_flagged(tmp_path / "a.las")
-        table = read_points(tmp_path / "a.las", LasChoices(parse_classes("2, 5")))
+        table = read_points(tmp_path / "a.las", las=LasChoices(parse_classes("2, 5")))
         assert table.points[:, 2].tolist() == [0.0, 2.0]
         assert "left out 1 points of other classes" in table.notices[1]
 
@@ -288,7 +288,7 @@ class TestWhatIsChosen:
         count = 2**17 + 10
         classes = np.arange(count) % 7
         write_flagged(tmp_path / "a.las", 7, np.arange(count) % 10 == 0, classes)
-        table = read_points(tmp_path / "a.las", LasChoices(parse_classes("3-4")))
+        table = read_points(tmp_path / "a.las", las=LasChoices(parse_classes("3-4")))
         kept = np.flatnonzero(np.isin(classes, [3, 4]) & (np.arange(count) % 10 > 0))
         assert_array_equal(table.points[:, 0], kept)
         assert_array_equal(table.attributes["classification"], classes[kept])
@@ -303,7 +303,7 @@ class TestWhatIsChosen:
     def test_when_nothing_is_left_it_says_what_there_is(self, tmp_path):
         write_flagged(tmp_path / "a.las")
         with pytest.raises(PointCloudError, match="no points of the classes 9. Choose some of 2 .1 points., 5"):
-            read_points(tmp_path / "a.las", LasChoices(parse_classes("9")))
+            read_points(tmp_path / "a.las", las=LasChoices(parse_classes("9")))
         write_flagged(tmp_path / "a.las", withheld=np.ones(5, bool))
         with pytest.raises(PointCloudError, match="no points but 5 withheld points"):
             read_points(tmp_path / "a.las")
