@@ -1,5 +1,6 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
+from .digits import Digits, join_digits, split_digits
 from .formats import READABLE, SCANS, TEXTS, WRITABLE, read_points, reading, write_points
 from .frames import frame_number, numbered_files, order_frames
 from .las_choices import LasChoices, parse_classes

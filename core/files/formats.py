@@ -133,7 +133,7 @@ def reading(path):
         ) from error
 
 
-def write_points(path, table, double=True):
+def write_points(path, table, double=True) -> list:
     """Write a table to a file of one of the kinds in `WRITABLE`; an older file stays if that fails.
 
     Parameters
@@ -142,12 +142,17 @@ def write_points(path, table, double=True):
     table : PointTable
     double : bool
         Whether coordinates are kept in double precision.
+
+    Returns
+    -------
+    list of str
+        What is written otherwise than it was given.
     """
     suffix = path.suffix.lower()
     if suffix not in WRITABLE:
         raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(WRITABLE)}.")
     with replacing(path) as part:
         if suffix == ".ply":
-            write_ply(part, table, double)
-        else:
-            write_columns(part, table, "," if suffix == ".csv" else " ", double)
+            return write_ply(part, table, double)
+        write_columns(part, table, "," if suffix == ".csv" else " ", double)
+        return []

@@ -29,6 +29,7 @@ from ..objects.reading import discs
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
+from .columns import tell_columns
 from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
@@ -235,7 +236,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
 
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""
-        for notice in table.notices:
+        for notice in (*table.notices, *tell_columns(obj)):
             self.report({"WARNING"}, notice)
         offset = offset_of(obj)
         shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
