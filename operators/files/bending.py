@@ -77,13 +77,14 @@ class Deform(Verb):
         laplacian = core.build_laplacian(points, left_out=out)
         deformer = core.CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
         moved = deformer.solve(goal)
+        written = []
         if splats is None:
-            write_points(output, replace(table, points=moved), double=not table.single)
+            written = write_points(output, replace(table, points=moved), double=not table.single)
         else:
             core.write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
         notices = (table if splats is None else splats).notices
         farthest = float(np.linalg.norm(moved - points, axis=1).max())
-        notices = [*notices, *deformer.notices]
+        notices = [*notices, *deformer.notices, *written]
         return {"points": len(points), "farthest": farthest, "left_out": len(out), "notices": notices}
 
 

@@ -11,7 +11,16 @@ from bpy_extras.io_utils import ImportHelper
 
 from ... import core
 from ...core import PointCloudError
-from ...core.files import READABLE, numbered_files, order_frames, read_points
+from ...core.files import (
+    READABLE,
+    SCANS,
+    LasChoices,
+    frame_number,
+    numbered_files,
+    order_frames,
+    parse_classes,
+    read_points,
+)
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
 from ..objects.handlers import tell
@@ -20,6 +29,7 @@ from ..objects.reading import discs
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
+from .columns import tell_columns
 from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
@@ -43,8 +53,6 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-    asks = ("up", "kind", "attributes", "surface", "sequence", "frame")
-
     filepath: StringProperty(
         name="File Path",
         description="File to import",
@@ -93,11 +101,34 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         default=False,
         options={"SKIP_SAVE"},
     )
+    numbers: BoolProperty(
+        name="Follow Numbers",
+        description="Show each file of a sequence at the frame of its number; where numbers are missing, the file"
+        " before stays",
+        default=False,
+    )
+    classes: StringProperty(
+        name="Classes",
+        description="Import only points of these classes of LAS files, such as 2 5 or 3-5 (2 is the ground); empty for"
+        " all",
+    )
+    withheld: BoolProperty(
+        name="Withheld Points",
+        description="Import points of LAS files, too, that are flagged as withheld, which stands for deleted",
+        default=False,
+    )
     frame: BoolProperty(
         name="Frame in View",
         description="Let the 3D views look at the imported points, unless a script imports them",
         default=True,
     )
+
+    @property
+    def asks(self):
+        """Names of the settings: some are those of sequences, and of a kind of file."""
+        sequence = ("sequence", "numbers") if self.sequence else ("sequence",)
+        scans = ("classes", "withheld") if any(path.suffix.lower() in SCANS for path in self._chosen()) else ()
+        return "up", "kind", "attributes", *scans, "surface", *sequence, "frame"
 
     @classmethod
     def obstacle(cls, context):
@@ -112,14 +143,18 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     @reporting
     def execute(self, context):
         self._framed = self._attended and self.frame
-        names = [item.name for item in self.files if item.name]
-        folder = Path(bpy.path.abspath(self.directory))
-        paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
+        paths, choices = self._chosen(), LasChoices(parse_classes(self.classes), self.withheld)
         if self.sequence:
             paths = order_frames(paths) if len(paths) > 1 else numbered_files(paths[0].parent)
         self._paths = paths
         surface = self.surface and not self.sequence
-        return self.work(context, [], lambda progress: _read_all(paths, surface, progress))
+        return self.work(context, [], lambda progress: _read_all(paths, choices, surface, progress))
+
+    def _chosen(self):
+        """Return the files that are named."""
+        names = [item.name for item in self.files if item.name]
+        folder = Path(bpy.path.abspath(self.directory))
+        return [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
 
     def finish(self, context, objects, results):
         """Add an object for each table."""
@@ -188,16 +223,20 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         return obj
 
     def _join(self, context):
-        """Let one object show those just imported, one at each frame from the scene's first one on."""
+        """Let one object show those just imported: one at each frame from the scene's first one on, or by numbers."""
         frames, first = context.selected_objects, context.scene.frame_start
-        sequence = add_sequence(context, self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence", frames, first)
+        name = self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence"
+        numbers = [frame_number(path) for path in self._paths] if self.numbers else range(first, first + len(frames))
+        sequence = add_sequence(context, name, frames, numbers)
         sequence.select_set(True)
         context.view_layer.objects.active = sequence
-        self.report({"INFO"}, f"{sequence.name}: frames {first} to {first + len(frames) - 1}")
+        missing = numbers[-1] - numbers[0] + 1 - len(numbers)
+        rest = f"; {missing} of them have no file and show the one before" if missing else ""
+        self.report({"INFO"}, f"{sequence.name}: frames {numbers[0]} to {numbers[-1]}{rest}")
 
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""
-        for notice in table.notices:
+        for notice in (*table.notices, *tell_columns(obj)):
             self.report({"WARNING"}, notice)
         offset = offset_of(obj)
         shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
@@ -230,7 +269,7 @@ def _frame_selected(context):
                 bpy.ops.view3d.view_selected()
 
 
-def _read_all(paths, surface, progress):
+def _read_all(paths, choices, surface, progress):
     """Read some files, those that were just read from memory: Adjust Last Operation imports them again.
 
     Returns
@@ -242,8 +281,8 @@ def _read_all(paths, surface, progress):
     for number, path in enumerate(paths):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
-        key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
-        tables.append(cache.fetch(key, lambda path=path: _read(path)))
+        key = ("file", str(path), state and (state.st_mtime_ns, state.st_size), choices)
+        tables.append(cache.fetch(key, lambda path=path: _read(path, choices)))
     if not surface:
         return [(table, None) for table in tables]
     total = sum(len(table.points) for table in tables if not isinstance(table, core.Splats))
@@ -254,9 +293,9 @@ def _read_all(paths, surface, progress):
     ]
 
 
-def _read(path):
+def _read(path, choices):
     """Read one file, as splats where it holds such."""
-    return core.read_splats(path) if core.splats.holds_splats(path) else read_points(path)
+    return core.read_splats(path) if core.splats.holds_splats(path) else read_points(path, las=choices)
 
 
 def _find_discs(points, progress):

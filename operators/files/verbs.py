@@ -134,8 +134,7 @@ class Analyze(ObjectVerb):
         if sharing_objects(obj):  # by choice, or it would not be writable
             obj.data = obj.data.copy()
         write_result(obj, analysis, arguments.write_limit)
-        if output is not None:
-            opening.save(output, obj, _arrays(obj, analysis))
+        written = [] if output is None else opening.save(output, obj, _arrays(obj, analysis))
         return {
             "points": len(analysis.measures.areas),
             "total_area": analysis.total_area,
@@ -143,7 +142,7 @@ class Analyze(ObjectVerb):
             "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
             **matched,
             "seconds": _rounded(analysis.seconds),
-            "notices": analysis.notices,
+            "notices": [*analysis.notices, *written],
         }
 
 
@@ -187,22 +186,21 @@ class Apply(ObjectVerb):
             results = compute_all(plans, stages)
         ((*notices, line),) = tool.write_all(bpy.context, [obj], results)
         figures = self.figures(tool, results[0])
-        if output is not None:
-            self.save(tool, obj, output)
+        written = [] if output is None else self.save(tool, obj, output)
         return {
             "points": point_count(obj.data),
             "done": line,
             **figures,
             "seconds": _rounded(stages.seconds),
-            "notices": notices,
+            "notices": [*notices, *written],
         }
 
     def prepare(self, tool, obj, path, arguments):
         """Give the tool what its settings do not hold."""
 
-    def save(self, tool, obj, output):
-        """Write the output."""
-        opening.save(output, obj, files.attribute_arrays(obj), tool.shown)
+    def save(self, tool, obj, output) -> list:
+        """Write the output, and return what is written otherwise than it is."""
+        return opening.save(output, obj, files.attribute_arrays(obj), tool.shown)
 
     def figures(self, tool, result) -> dict:
         """Return numbers to print, beside the line about what was done."""

@@ -4,6 +4,15 @@ import numpy as np
 
 OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
 
+COLUMNS = "lb_columns"  # another one: what numbers of its attributes were in the file, in JSON; see operators/files
+
+
+def copy_place(obj, other):
+    """Let an object tell the same about its file as another one whose points and attributes it has."""
+    for name in (OFFSET, COLUMNS):
+        if name in other:
+            obj[name] = other[name]
+
 
 def offset_of(obj):
     """Return what is added to an object's coordinates in the world to get those of its file, (3,) float64."""

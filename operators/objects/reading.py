@@ -56,12 +56,12 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
             f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under'
             " Points and Groups"
         )
+    if any(map(is_sequence, obj.modifiers)):
+        return (
+            f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'
+            " collection in the Outliner, and select its objects"
+        )
     if not point_count(obj.data):
-        if any(map(is_sequence, obj.modifiers)):
-            return (
-                f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'
-                " collection in the Outliner, and select its objects"
-            )
         return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
 

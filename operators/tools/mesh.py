@@ -10,7 +10,7 @@ from ..objects.attributes import DIRECTION_1, DISC, NORMAL, STORABLE, point_coun
 from ..objects.color_choices import COLOR_CHOICES
 from ..objects.groups import add_group
 from ..objects.handlers import tell
-from ..objects.place import OFFSET
+from ..objects.place import copy_place
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 
@@ -66,8 +66,7 @@ class MeshSurface(Tool):
         for collection in obj.users_collection:
             collection.objects.link(made)
         made.matrix_world = obj.matrix_world
-        if OFFSET in obj:
-            made[OFFSET] = obj[OFFSET]
+        copy_place(made, obj)
         opened = _close(made.data, _GAP if self.keep_open else 0)
         carried.write(made)
         for name in COLOR_CHOICES:

@@ -182,6 +182,38 @@ class TestSeveralFiles:
         assert everywhere() == before
 
 
+class TestClassesAndWithheldPoints:
+    @pytest.fixture
+    def path(self, tmp_path):
+        """A scan of ground, trees and noise, of which every tenth point is withheld."""
+        import laspy
+
+        las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+        las.x, las.y, las.z = sphere_points().T
+        las.classification, las.withheld = np.arange(1000) % 3 + 5, np.arange(1000) % 10 == 0
+        las.write(str(tmp_path / "a.las"))
+        return tmp_path / "a.las"
+
+    def test_withheld_ones_are_left_out(self, path):
+        assert len(run_import(path).data.vertices) == 900
+
+    def test_or_kept_by_choice(self, path):
+        obj = run_import(path, withheld=True)
+        assert_array_equal(attribute(obj, "withheld"), np.arange(1000) % 10 == 0)
+
+    def test_classes_by_choice(self, path):
+        obj = run_import(path, classes="5, 7")
+        assert len(obj.data.vertices) < 900
+        assert set(attribute(obj, "classification")) == {5, 7}
+
+    def test_what_is_no_class_is_told(self, path):
+        with pytest.raises(RuntimeError, match="'ground' is no class of LAS"):
+            run_import(path, classes="ground")
+        with pytest.raises(RuntimeError, match="no points of the classes 2. Choose some of 5"):
+            run_import(path, classes="2")
+        assert not bpy.data.objects
+
+
 class TestColumns:
     def test_become_attributes(self, tmp_path):
         rows = np.column_stack([sphere_points(), np.arange(1000), np.tile([255, 0, 51], (1000, 1)), sphere_points()])
@@ -312,7 +344,7 @@ def test_laser_scans_are_imported(extension, tmp_path, name):
         ("a.xyz", b"", "there are none"),
         ("a.csv", b"x,y,z\n", "there are none"),
         ("a.pts", b"5\n1 2 3\n", "announces 5 points, but 1 lines follow"),
-        ("a.obj", b"v 1 2 nan\n", "1 of 1 points"),
+        ("a.obj", b"v 1 2 nan\n", "all 1 are without a place"),
     ],
 )
 def test_broken_files_leave_nothing(tmp_path, name, data, text):
