@@ -13,7 +13,7 @@ from ...core import PointCloudError, Splats, read_splats, surface_discs
 from ...core.files import READABLE, numbered_files, order_frames, read_points
 from ...core.splats import holds_splats
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
+from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
 from ..objects.handlers import tell
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
@@ -166,6 +166,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         _convert(context, every if self.kind == "POINTCLOUD" else clouds)
         for obj in every:
             obj.select_set(True)
+            deselect(obj.data)  # else the first group would hold all points
         for obj in clouds:
             mark(obj.data)
             if self.surface and not self.sequence and point_count(obj.data) <= _DRAWN and not is_drawn(obj.data):

@@ -126,6 +126,15 @@ def write_own_positions(data, positions):
     tag_changed(data)
 
 
+def deselect(data):
+    """Let no point of a mesh or a point cloud be selected; new ones are, or count as such."""
+    nothing = np.zeros(point_count(data), dtype=bool)
+    if isinstance(data, bpy.types.Mesh):
+        data.vertices.foreach_set("select", nothing)
+    else:
+        write_attribute(data, SELECTION, nothing, "BOOLEAN")
+
+
 def tag_changed(data):
     """Tell Blender that the data of a mesh or a point cloud changed."""
     if isinstance(data, bpy.types.Mesh):
