@@ -5,8 +5,11 @@ import bpy
 from ..operators.deform.bake import MESHFREE_OT_deform_bake
 from ..operators.files.exporting import MESHFREE_OT_export_points
 from ..operators.files.importing import MESHFREE_OT_import_points
-from ..operators.objects.groups import ROLES, has_group
+from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, has_group
 from ..operators.running.application import ApplicationOperator
+from ..operators.tools.select import selection
+
+_OPTIONAL = LOW, HIGH, VALUE  # one or two of them do
 
 
 def draw_setting(layout, settings, name: str, obj):
@@ -22,13 +25,26 @@ def draw_setting(layout, settings, name: str, obj):
 
 
 def search_group(layout, settings, name: str, obj):
-    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned."""
+    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned.
+
+    Where one is missing, it says what counts instead.
+    """
     group = getattr(settings, name)
     owner, groups = (obj, "vertex_groups") if obj.type == "MESH" else (obj.data, "attributes")
     awaited = group in ROLES and not has_group(obj, group)
     layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
-    if awaited:
-        layout.label(text="No points assigned yet", icon="INFO")
+    if awaited and group not in _OPTIONAL:
+        layout.label(text=_instead(obj, group), icon="INFO")
+
+
+def _instead(obj, group):
+    """Say what counts where a group is missing that is to be assigned."""
+    if group != SOURCE:
+        return "Uses the boundaries that are found" if group == FIXED else "No points assigned yet"
+    count = int(selection(obj).sum())
+    if count == 0:
+        return "Select a point in Edit Mode first"
+    return "Uses the selected point" if count == 1 else f"Uses the {count:,} selected points"
 
 
 def _draw_asked(operator, context):

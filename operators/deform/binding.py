@@ -23,7 +23,7 @@ from ..objects.attributes import (
     write_attribute,
 )
 from ..objects.carried import carries, moved_names, write_moved
-from ..objects.counting import members, summarize
+from ..objects.counting import members, weighted_checksum
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
 from ..objects.handlers import tell
 from ..objects.options import settings_values
@@ -89,13 +89,13 @@ def constrain(names, weights, anchors) -> Constraints:
     moved, kept = np.flatnonzero(weights.max(axis=0) > 0.0), np.flatnonzero(anchors > 0.0)
     owner = weights.argmax(axis=0)[moved]
     strength = np.concatenate([weights.max(axis=0)[moved], anchors[kept]])
-    checksum = _groups_checksum(names, [summarize(held) for held in (*weights, anchors)])
+    checksum = _groups_checksum(names, [weighted_checksum(held) for held in (*weights, anchors)])
     return Constraints(names, moved, owner, kept, strength, checksum)
 
 
-def _groups_checksum(names, found) -> str:
-    """Checksum of the members of the groups of the handles, given by name, and of the anchors."""
-    return f"{zlib.crc32(repr((names, [group.weighted for group in found])).encode()):08x}"
+def _groups_checksum(names, weighted) -> str:
+    """Checksum of the groups of the handles, given by name, and of the anchors, by the checksums of their weights."""
+    return f"{zlib.crc32(repr((names, weighted)).encode()):08x}"
 
 
 def _groups_now(obj, glance, trusting):
@@ -106,7 +106,8 @@ def _groups_now(obj, glance, trusting):
         return None
     by_empty = _moved_by_empties(obj)
     edited = [group.rows for name, group in zip(names, found[:-1], strict=True) if name not in by_empty]
-    return _groups_checksum(names, found), np.concatenate(edited) if edited else np.empty(0, int)
+    checksum = _groups_checksum(names, [group.weighted for group in found])
+    return checksum, np.concatenate(edited) if edited else np.empty(0, int)
 
 
 def forget_bound():

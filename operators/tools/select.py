@@ -10,7 +10,19 @@ from ...core import PointCloudError, floaters, grow
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.counting import renew_counts
-from ..objects.groups import HANDLE, SOURCE, assign, check_assignable, chosen_members, is_chosen, role_group
+from ..objects.groups import (
+    HANDLE,
+    SOURCE,
+    assign,
+    check_assignable,
+    chosen_members,
+    chosen_weights,
+    group_weights,
+    has_group,
+    is_chosen,
+    rivals,
+    role_group,
+)
 from ..objects.handlers import tell
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.splats import read_splats
@@ -250,6 +262,8 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             ("ANCHOR", "Anchor", "Points that stay where they are"),
             ("FIXED", "Fixed", "The boundary that a minimal surface keeps"),
             ("SOURCE", "Source", "Points from which distances are measured"),
+            ("LOW", "Low", "Points with the low value of a field, at one end"),
+            ("HIGH", "High", "Points with the high value of a field, at the other end"),
             ("VALUE", "Value", "Points with given values of a field, as weights"),
             ("BOUNDARY", "Boundary", "Points at which the surface ends; it becomes the Boundary Group of the settings"),
         ],
@@ -273,6 +287,14 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         name="Front Only", description="Leave out points whose normals point away from the viewer", default=False
     )
 
+    @classmethod
+    def description(cls, context, properties):
+        """Say what a button does; an empty text leaves it to the docstring."""
+        return {
+            "ADD": "Add the selected points to the group, which keeps those that it holds",
+            "REMOVE": "Remove the selected points from the group",
+        }.get(properties.action, "")
+
     @property
     def surface(self):
         """Whether it needs the operator on the points, for their normals."""
@@ -287,18 +309,31 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     f'All selected points of "{obj.name}" face away from the viewer. Turn off Front Only, or'
                     " look from the other side."
                 )
-        name = self.name or role_group(obj, self.role.title())
+        role = self.role.title()
+        name = self.name or role_group(obj, role)
         check_assignable(obj, name, must_exist=self.action == "REMOVE")
+        others = rivals(obj, role) if name == role and self.action != "REMOVE" else []
+        for other in others:
+            check_assignable(obj, other, must_exist=True)
+        gone = _replaced(obj, name, chosen) if self.action == "REPLACE" else 0
 
         def change():
+            for other in others:
+                assign(obj, other, chosen, "REMOVE", 1.0)
             assign(obj, name, chosen, self.action, self.weight)
             groups_changed(obj)
             if self.role == "BOUNDARY" and self.action != "REMOVE":
                 obj.meshfree.boundary_group = name
             done = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
-            return f'{np.count_nonzero(chosen):,} points {done} the group "{name}"'
+            left = f", in place of {gone:,} others" if gone else ""
+            return f'{np.count_nonzero(chosen):,} points {done} the group "{name}"{left}'
 
         return change
+
+
+def _replaced(obj, name, chosen):
+    """Count the points that a group holds beside the chosen ones, (n,) bool."""
+    return np.count_nonzero(np.isfinite(group_weights(obj, name, np.nan)) & ~chosen) if has_group(obj, name) else 0
 
 
 class MESHFREE_OT_select_boundary(SelectionOperator, bpy.types.Operator):
@@ -343,7 +378,9 @@ class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
     name: StringProperty(name="Name", description="Name of the group", default=HANDLE, maxlen=63)
 
     def prepare(self, context, obj):
-        chosen = chosen_members(obj, self.name, "Name")
+        chosen = np.isfinite(chosen_weights(obj, self.name, "Name", least=0, outside=np.nan))
+        if not chosen.any():
+            raise PointCloudError(f'"{self.name}" of "{obj.name}" holds no points. Assign some to it in Edit Mode.')
         return lambda: select(context, obj, chosen)
 
 

@@ -1,5 +1,8 @@
 """Selecting points and assigning them to groups, in Edit Mode and in Object Mode."""
 
+import importlib
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -105,6 +108,70 @@ def test_what_the_group_held_before(obj, action, count):
     bpy.ops.meshfree.group_from_selection(role="SOURCE", action=action, weight=0.5)
     expected = {"new": new, "both": old | new, "rest": old & ~new}[count]
     assert (in_group(obj, "Source") == expected).all()
+
+
+def test_assigning_twice_by_the_panel_keeps_the_first_set(obj):
+    first = selected(obj)
+    press("VALUE")
+    choose(obj, lambda points: points[:, 2] < -0.95)
+    second = selected(obj)
+    press("VALUE")
+    assert (in_group(obj, "Value") == (first | second)).all()
+    press("VALUE", remove=True)
+    assert (in_group(obj, "Value") == first).all()
+
+
+def press(role, remove=False):
+    """Press the button of a role in the panel."""
+    entries = [settings for name, settings in draw_points() if name == "meshfree.group_from_selection"]
+    (entry,) = [item for item in entries if item["role"] == role and (item["action"] == "REMOVE") == remove]
+    assert bpy.ops.meshfree.group_from_selection(**entry) == {"FINISHED"}
+
+
+def draw_points():
+    """Draw the panel of points, and return its buttons with their settings."""
+    buttons = []
+
+    class Layout:
+        enabled = True
+
+        def operator(self, name, **_):
+            settings = SimpleNamespace()
+            buttons.append((name, vars(settings)))
+            return settings
+
+        def __getattr__(self, name):
+            return lambda *_, **__: self
+
+    panel = SimpleNamespace(layout=Layout())
+    bpy.types.MESHFREE_PT_points.draw(panel, bpy.context)
+    return buttons
+
+
+def test_what_a_group_held_is_not_gone_without_a_word(obj, capfd):
+    bpy.ops.meshfree.group_from_selection(role="VALUE")
+    choose(obj, lambda points: points[:, 2] < -0.98)
+    count = np.count_nonzero(selected(obj))
+    bpy.ops.meshfree.group_from_selection(role="VALUE")
+    assert f'Cloud: {count:,} points are in the group "Value", in place of ' in capfd.readouterr().out
+
+
+def test_a_point_has_one_of_the_given_values(obj):
+    chosen = selected(obj)
+    for role in ("VALUE", "LOW", "HIGH"):
+        bpy.ops.meshfree.group_from_selection(role=role, action="ADD")
+        for name in {group.name for group in obj.vertex_groups}:
+            assert (in_group(obj, name) == (chosen & (name == role.title()))).all()
+
+
+def test_the_number_in_the_panel_counts_all_members(extension, obj):
+    members = importlib.import_module(f"{extension.__name__}.operators.objects.counting").members
+    count = np.count_nonzero(selected(obj))
+    bpy.ops.meshfree.group_from_selection(role="VALUE", weight=0.0)
+    assert members(obj, "Value").count == members(obj, "Value", glance=True).count == count > 5
+    obj.data.vertices.foreach_set("select", np.zeros(1200, dtype=bool))
+    bpy.ops.meshfree.select_group(name="Value")
+    assert np.count_nonzero(selected(obj)) == count
 
 
 def test_nothing_selected(obj):

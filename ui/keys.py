@@ -1,0 +1,22 @@
+"""Keys, as the user's preferences list them: what Blender does with a key comes before, where it does something."""
+
+import bpy
+
+_added = []  # keymaps of Blender, and our items in them
+
+
+def attach():
+    """Add the keys, unless there is no window that could hear them."""
+    config = bpy.context.window_manager.keyconfigs.addon
+    if config is None:
+        return
+    # No handler of a tool would do: it would hear Esc before what began earlier, such as the drag of a handle.
+    keymap = config.keymaps.new("Window")
+    _added.append((keymap, keymap.keymap_items.new("meshfree.stop", "ESC", "PRESS")))
+
+
+def detach():
+    """Take the keys away again."""
+    while _added:
+        keymap, item = _added.pop()
+        keymap.keymap_items.remove(item)
