@@ -3,6 +3,7 @@
 import bpy
 
 from ..operators.deform.bake import MESHFREE_OT_deform_bake
+from ..operators.deform.tools import MESHFREE_OT_deform_apply, keyed_empties
 from ..operators.files.exporting import MESHFREE_OT_export_points
 from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, has_group
@@ -55,6 +56,15 @@ def _draw_tool(operator, context):
     _draw(operator, context, operator.adjustable if operator.is_repeated(context) else operator.asks)
 
 
+def _draw_apply(operator, context):
+    if keyed_empties(operator.subject(context)):  # which it asks about; afterwards they are gone
+        column = operator.layout.column(align=True)
+        column.label(text=f"The shape of frame {context.scene.frame_current} will be at rest.", icon="INFO")
+        column.label(text="Keyframes of its handles would bend it once", icon="BLANK1")
+        column.label(text="more, so they are removed. Bake keeps motion.", icon="BLANK1")
+    operator.layout.prop(operator, "keep_keyframes")
+
+
 def _draw(operator, context, names):
     operator.layout.use_property_split = True
     for name in names:
@@ -65,3 +75,4 @@ def _draw(operator, context, names):
 ApplicationOperator.draw = _draw_tool
 for kind in (MESHFREE_OT_export_points, MESHFREE_OT_import_points, MESHFREE_OT_deform_bake):
     kind.draw = _draw_asked
+MESHFREE_OT_deform_apply.draw = _draw_apply
