@@ -11,8 +11,17 @@ def attach():
     if config is None:
         return
     # No handler of a tool would do: it would hear Esc before what began earlier, such as the drag of a handle.
-    keymap = config.keymaps.new("Window")
-    _added.append((keymap, keymap.keymap_items.new("meshfree.stop", "ESC", "PRESS")))
+    _add(config.keymaps.new("Window"), "meshfree.stop", "ESC", "PRESS")
+    for mode in ("Mesh", "Point Cloud"):  # the Edit Mode of each
+        keymap = config.keymaps.new(mode)
+        _add(keymap, "meshfree.select_point", "LEFTMOUSE", "CLICK")
+        _add(keymap, "meshfree.select_point", "LEFTMOUSE", "CLICK", shift=True).properties.extend = True
+
+
+def _add(keymap, *how, **modifiers):
+    item = keymap.keymap_items.new(*how, **modifiers)
+    _added.append((keymap, item))
+    return item
 
 
 def detach():

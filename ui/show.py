@@ -7,7 +7,6 @@ import gpu
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ..operators.deform.binding import positions_now
 from ..operators.deform.nodes import find_deform, is_baked, show_live, turns_discs
 from ..operators.objects.attributes import (
     ALONG_SURFACE,
@@ -15,6 +14,7 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
+    positions_now,
     read_attribute,
 )
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, has_group, role_group

@@ -16,8 +16,9 @@ from ...core import PointCloudError
 from ..objects.attributes import (
     DISPLACEMENT,
     REST,
-    own_positions,
+    in_edit_mesh,
     point_count,
+    positions_now,
     read_attribute,
     tag_changed,
     write_attribute,
@@ -242,11 +243,6 @@ def is_there(obj, scene=None) -> bool:
     return scene in found if scene is not None else bool(found)
 
 
-def in_edit_mesh(obj) -> bool:
-    """Whether a mesh is in Edit Mode, by this object or another one, so that its data are out of reach as arrays."""
-    return obj.type == "MESH" and obj.data.is_editmode
-
-
 def relative_matrix(obj, empty, depsgraph=None):
     """Return the matrix of an empty in the space of an object, (4, 4) float64, as a depsgraph has evaluated them."""
     if depsgraph is not None:
@@ -287,16 +283,6 @@ def empty_change(obj, item, depsgraph=None):
 def solver_settings(settings) -> tuple:
     """Values of the settings that the factors depend on."""
     return settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0
-
-
-def positions_now(obj):
-    """Read the positions of the points in local space, with changes of Edit Mode that are not yet in the mesh."""
-    if not in_edit_mesh(obj):
-        return own_positions(obj.data)
-    obj.update_from_editmode()
-    positions = np.empty((len(obj.data.vertices), 3), np.float32)
-    obj.data.vertices.foreach_get("co", positions.reshape(-1))
-    return positions
 
 
 def read_rest(obj):

@@ -8,8 +8,8 @@ import pytest
 
 from tests.blender.clouds import add_object, sphere_points
 
-# They have the name of a group, or a menu of their own.
-NOT_IN_MENUS = {"select_group", "apply_preset", "add_preset"}
+# They have the name of a group, a menu of their own, or the place of a click.
+NOT_IN_MENUS = {"select_group", "apply_preset", "add_preset", "select_point"}
 
 
 class Menu:

@@ -53,6 +53,7 @@ OPERATORS = (
     "select_group",
     "select_grow",
     "select_boundary",
+    "select_point",
     "separate_by_segment",
     "show_splats",
     "show_surface",

@@ -187,6 +187,55 @@ def test_an_attribute_of_that_name(obj):
         bpy.ops.meshfree.group_from_selection(role="HANDLE")
 
 
+class TestSelectPoint:
+    """What a click does: the point in front, though others behind it are nearer to the mouse."""
+
+    @pytest.fixture
+    def edited(self, obj):
+        obj.rotation_euler, obj.location = (0.3, 0.2, 0.1), (1.0, 2.0, 3.0)
+        obj.data.vertices.foreach_set("select", np.arange(1200) < 3)
+        bpy.context.view_layer.update()
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_mode(type="VERT")
+        yield obj
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    def chosen(self, obj):
+        obj.update_from_editmode()
+        return np.flatnonzero(selected(obj)).tolist()
+
+    def test_the_near_side(self, edited):
+        matrix = np.array(edited.matrix_world)
+        for x, y in np.random.default_rng(2).uniform(-0.6, 0.6, (20, 2)):
+            bpy.ops.meshfree.select_point(eye=(1.0 + x, 2.0 + y, 9.0), direction=(0.0, 0.0, -1.0))
+            (index,) = self.chosen(edited)
+            place = np.array(edited.data.vertices[index].co) @ matrix[:3, :3].T
+            assert place[2] > 0.4
+            assert np.hypot(place[0] - x, place[1] - y) < 0.15
+
+    def test_one_more_and_one_less(self, edited):
+        ray = {"eye": (1.0, 2.0, 9.0), "direction": (0.0, 0.0, -1.0)}
+        bpy.ops.meshfree.select_point(**ray, extend=True)
+        (new,) = set(self.chosen(edited)) - {0, 1, 2}
+        bpy.ops.meshfree.select_point(**ray, extend=True)
+        assert self.chosen(edited) == [0, 1, 2]
+        bpy.ops.meshfree.select_point(**ray)
+        assert self.chosen(edited) == [new]
+
+    def test_nothing_there(self, edited):
+        with pytest.raises(RuntimeError, match="No point is seen along the ray"):
+            bpy.ops.meshfree.select_point(eye=(20.0, 2.0, 9.0), direction=(0.0, 0.0, -1.0))
+        assert self.chosen(edited) == [0, 1, 2]
+
+    def test_hidden_points_are_seen_through(self, edited):
+        ray = {"eye": (1.0, 2.0, 9.0), "direction": (0.0, 0.0, -1.0)}
+        bpy.ops.meshfree.select_point(**ray)
+        (front,) = self.chosen(edited)
+        bpy.ops.mesh.hide()
+        bpy.ops.meshfree.select_point(**ray)
+        assert self.chosen(edited) not in ([front], [])
+
+
 def test_hidden_points_are_never_selected(obj, mode):
     hidden = np.arange(1200) % 2 == 0
     bpy.ops.object.mode_set(mode="OBJECT")
