@@ -32,7 +32,7 @@ def _modules():
         surface,
     )
     from .operators.tools import select as selecting
-    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
+    from .ui import applications, colormap, keys, legend, menus, overlay, panel, points, presets, range_selection, show
     from .ui import deform as deform_panel
 
     return (
@@ -73,6 +73,7 @@ def _modules():
         applications,
         deform_panel,
         menus,
+        keys,
         overlay,
     )
 

@@ -37,6 +37,7 @@ _NAMES = {  # the public ones, by the module or package that is imported when on
         "exponential",
         "fair_points",
         "fairing",
+        "front_point",
         "geodesic_distance",
         "grow",
         "harmonic_field",

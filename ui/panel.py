@@ -25,7 +25,7 @@ from .nodes import LENGTH, MOST
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
-_TASKS = (  # that one click does, each with its defaults
+TASKS = (  # that one click does, each with its defaults
     ("smooth", "Clean"),
     ("segment", "Segment"),
     ("principal_curvatures", "Curvature"),
@@ -98,7 +98,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             if is_stale(obj, glance=True):
                 layout.label(text="Results are stale: analyze again", icon="ERROR")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        for name, text in _TASKS:
+        for name, text in TASKS:
             grid.operator(f"meshfree.{name}", text=text).at_once = True
 
 

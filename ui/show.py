@@ -5,9 +5,9 @@ import math
 import bpy
 import gpu
 import numpy as np
+from bpy.app.handlers import persistent
 
 from .. import core
-from ..operators.deform.binding import positions_now
 from ..operators.deform.nodes import find_deform, is_baked, show_live, turns_discs
 from ..operators.objects.attributes import (
     ALONG_SURFACE,
@@ -15,9 +15,10 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
+    positions_now,
     read_attribute,
 )
-from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
+from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, has_group, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, spacing
@@ -54,7 +55,9 @@ from .nodes import (
 from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
+_MOST_GROUPS = 13  # attributes that a material reads for them: Blender's shaders take 15
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
+_noted = {}  # Group Colors of objects in Edit Mode while something is undone, by session_uid
 _NO_SPACING = 0.01  # stands in where points are too few to have one
 
 
@@ -147,6 +150,22 @@ def show_groups(obj):
     recolor(obj)
     if obj.meshfree.show_groups:
         use_material_preview(bpy.context)
+
+
+@persistent
+def _note_groups(*_):
+    """Remember which objects in Edit Mode have their groups colored, before undo or redo."""
+    _noted.update({obj.session_uid: obj.meshfree.show_groups for obj in bpy.data.objects if obj.mode == "EDIT"})
+
+
+@persistent
+def _keep_groups(*_):
+    """Leave Group Colors as they were in Edit Mode: what is undone there are changes of the points."""
+    for obj in bpy.data.objects:
+        shown = _noted.get(obj.session_uid, obj.meshfree.show_groups)
+        if obj.meshfree.show_groups != shown:
+            obj.meshfree.show_groups = shown
+    _noted.clear()
 
 
 def show_result(obj, name):
@@ -295,9 +314,10 @@ def _own_material(obj):
 
 
 def _group_colors(obj) -> dict:
-    """Return the colours of groups by their names: none if they are not shown.
+    """Return the colours of groups by their names: none if they are not shown, and not all of very many.
 
-    Blender's shaders take 15 attributes at most, so not all of very many handles.
+    Groups that are still to come are among them, so that they are seen as soon as points are assigned, while there is
+    room.
     """
     settings = obj.meshfree
     if not settings.show_groups:
@@ -308,7 +328,9 @@ def _group_colors(obj) -> dict:
     names[settings.deform.anchors or ANCHOR] = ANCHOR
     for name in handle_names(obj)[:_MOST_HANDLES]:
         names[name] = HANDLE
-    return {name: colormaps.group_color(role) for name, role in names.items()}
+    if len(names) > _MOST_GROUPS:
+        names = {name: role for name, role in names.items() if has_group(obj, name)}
+    return {name: colormaps.group_color(names[name]) for name in [*names][:_MOST_GROUPS]}
 
 
 def redraw_views():
@@ -340,6 +362,10 @@ _HANDLERS = {
     "sequence_written": show_sequence,
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,
+    "undo_pre": _note_groups,
+    "undo_post": _keep_groups,
+    "redo_pre": _note_groups,
+    "redo_post": _keep_groups,
 }
 
 

@@ -22,7 +22,7 @@ from ...core.files import (
     read_points,
 )
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
+from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
 from ..objects.handlers import tell
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
@@ -201,6 +201,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         _convert(context, every if self.kind == "POINTCLOUD" else clouds)
         for obj in every:
             obj.select_set(True)
+            deselect(obj.data)  # else the first group would hold all points
         for obj in clouds:
             mark(obj.data)
             if self.surface and not self.sequence and point_count(obj.data) <= _DRAWN and not is_drawn(obj.data):

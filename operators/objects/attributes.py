@@ -120,10 +120,34 @@ def own_positions(data):
     return positions
 
 
+def in_edit_mesh(obj) -> bool:
+    """Whether a mesh is in Edit Mode, by this object or another one, so that its data are out of reach as arrays."""
+    return obj.type == "MESH" and obj.data.is_editmode
+
+
+def positions_now(obj):
+    """Read the positions of the points in local space, with changes of Edit Mode that are not yet in the mesh."""
+    if not in_edit_mesh(obj):
+        return own_positions(obj.data)
+    obj.update_from_editmode()
+    positions = np.empty((len(obj.data.vertices), 3), np.float32)
+    obj.data.vertices.foreach_get("co", positions.reshape(-1))
+    return positions
+
+
 def write_own_positions(data, positions):
     """Move the points of a mesh or a point cloud to these positions, (n, 3)."""
     data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
     tag_changed(data)
+
+
+def deselect(data):
+    """Let no point of a mesh or a point cloud be selected; new ones are, or count as such."""
+    nothing = np.zeros(point_count(data), dtype=bool)
+    if isinstance(data, bpy.types.Mesh):
+        data.vertices.foreach_set("select", nothing)
+    else:
+        write_attribute(data, SELECTION, nothing, "BOOLEAN")
 
 
 def tag_changed(data):

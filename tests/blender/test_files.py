@@ -279,6 +279,24 @@ def test_up_axis(tmp_path):
     assert_allclose(attribute(obj, "normal")[0], [0.0, 0.0, 1.0])
 
 
+def selected_points(obj):
+    """Which points an object has selected, as the tools of the extension and Edit Mode take them."""
+    return importlib.import_module(f"{MODULE}.operators.tools.select").selection(obj)
+
+
+@pytest.mark.parametrize("kind", ["MESH", "POINTCLOUD"] if bpy.app.version >= (4, 5, 0) else ["MESH"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_an_import_selects_the_objects_and_none_of_their_points(tmp_path, name, kind):
+    WRITERS[name](tmp_path / name, SURVEY)
+    obj = run_import(tmp_path / name, kind=kind)
+    assert bpy.context.selected_objects == [obj]
+    assert not selected_points(obj).any()
+    if kind == "MESH":
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert obj.data.total_vert_sel == 0
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
 @pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="Blender makes point clouds of meshes from 4.5 on")
 def test_point_cloud_objects(tmp_path):
     np.save(tmp_path / "a.npy", SURVEY)

@@ -26,8 +26,7 @@ def read(path):
 
 
 def operators():
-    names = [name for name in dir(bpy.ops.meshfree) if name != "escape"]  # which nobody presses
-    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in names}
+    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in dir(bpy.ops.meshfree)}
 
 
 def sections(text):

@@ -27,7 +27,6 @@ OPERATORS = (
     "deform_to_shape_key",
     "deform_unbind",
     "deform_update",
-    "escape",
     "export_eigenvalues",
     "export_operator",
     "export_points",
@@ -54,6 +53,7 @@ OPERATORS = (
     "select_group",
     "select_grow",
     "select_boundary",
+    "select_point",
     "separate_by_segment",
     "show_splats",
     "show_surface",
@@ -192,6 +192,32 @@ def test_panel_tells_calmly_of_groups_without_points():
     assert "No points assigned yet" not in draw()
 
 
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [(0, "Select a point in Edit Mode first"), (1, "Uses the selected point"), (12, "Uses the 12 selected points")],
+)
+@pytest.mark.parametrize("name", ["geodesic_distance", "nearest_source", "unwrap", "extend_direction"])
+def test_dialogs_say_that_the_selection_is_used(name, count, text):
+    obj = add_object(sphere_points())
+    obj.data.vertices.foreach_set("select", np.arange(1000) < count)
+    assert texts_of(name)[:2] == ["group", text]
+    obj.vertex_groups.new(name="Source")
+    assert texts_of(name)[:1] == ["group"]
+    assert text not in texts_of(name)
+
+
+def texts_of(name):
+    """Return what the dialog of an operator holds as it opens."""
+    texts, operator = [], getattr(bpy.types, f"MESHFREE_OT_{name}")
+    properties = getattr(bpy.ops.meshfree, name).get_rna_type().properties
+    values = {item.identifier: item.default for item in properties if hasattr(item, "default")}
+    settings = Settings(layout=Layout(texts), **values)
+    settings.asks = value_of(operator.asks, settings)
+    settings.is_repeated = lambda context: False
+    operator.draw(settings, bpy.context)
+    return texts
+
+
 def test_panel_offers_what_tools_wrote_and_updates_only_what_is_on_show(modifiers):
     obj = add_object(sphere_points())
     bpy.ops.meshfree.show_surface()
@@ -242,7 +268,7 @@ def test_panel_follows_the_order_of_work():
 
 def test_panel_counts_the_points_of_each_group():
     obj = add_object(sphere_points())
-    assert draw().count("0") == 6
+    assert draw().count("0") == 8
     obj.data.vertices.foreach_set("select", np.arange(1000) < 12)
     bpy.ops.meshfree.group_from_selection(role="ANCHOR")
     texts = draw()
@@ -339,7 +365,7 @@ def test_dialogs_show_every_setting(name):
         settings.asks = value_of(operator.asks, settings)
         settings.is_repeated = lambda context: False
         operator.draw(settings, bpy.context)
-    assert set(texts) - {"No points assigned yet"} == set(values)
+    assert {text for text in texts if " " not in text} == set(values)
 
 
 @pytest.mark.parametrize("name", OPERATORS)
