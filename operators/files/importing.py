@@ -14,6 +14,7 @@ from ...core.files import READABLE, numbered_files, order_frames, read_points
 from ...core.splats import holds_splats
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
+from ..objects.colors import own_colors
 from ..objects.handlers import tell
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
@@ -172,6 +173,9 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
                 tell("splats_found", obj)
         for obj in surfaces:  # Convert would have taken discs for points
             tell("surface_found", obj)
+        colored = [obj for obj in every if obj not in surfaces and own_colors(obj.data)]
+        for objects in [colored] if self.sequence and colored else [[obj] for obj in colored]:
+            tell("colors_found", objects)
         if self.sequence:
             self._join(context)
 
