@@ -31,6 +31,7 @@ from .display import (
     draws_faces,
     find_display,
     find_material,
+    is_colored,
     is_texture,
     numbers,
     own_material,
@@ -158,8 +159,8 @@ def show_groups(obj):
 
 
 def show_result(obj, name):
-    """Show an attribute that was written just now; see `show_attribute`."""
-    show_attribute(obj, name)
+    """Show an attribute that was written just now; without a name what is on show, or the mean curvature."""
+    show_attribute(obj, MEAN_CURVATURE if not name and is_colored(obj) else name)
     use_material_preview(bpy.context)
 
 

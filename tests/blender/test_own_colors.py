@@ -261,13 +261,13 @@ class TestSolid:
     @POINT_CLOUDS
     def test_point_clouds_have_whole_discs_all_the_same(self, imported):
         obj = imported(kind="POINTCLOUD")
-        mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
-        found = mesh or next(
-            item.object.data
-            for item in bpy.context.evaluated_depsgraph_get().object_instances
-            if item.object.type == "MESH"
-        )
-        assert (len(found.vertices), len(found.polygons)) == (9 * 800, 8 * 800)
+        graph = bpy.context.evaluated_depsgraph_get()
+        counts = [
+            (len(item.object.data.vertices), len(item.object.data.polygons))
+            for item in graph.object_instances
+            if item.object.type == "MESH" and item.parent == obj.evaluated_get(graph)
+        ]
+        assert counts == [(9 * 800, 8 * 800)]
 
 
 class TestMesh:
