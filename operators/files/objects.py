@@ -17,7 +17,7 @@ from ..objects.attributes import (
     type_of,
     write_attribute,
 )
-from ..objects.colors import own_colors
+from ..objects.colors import COLOR, own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions
@@ -66,7 +66,7 @@ def add_object(name, table, collection, known=None, with_attributes=True):
                 is_place = column == SCANNER and values.ndim == 2
                 add_column(mesh, column, values - origin if is_place else values)
         if table.colors is not None:
-            layer = mesh.color_attributes.new("Color", "BYTE_COLOR", "POINT")
+            layer = mesh.color_attributes.new(COLOR, "BYTE_COLOR", "POINT")
             layer.data.foreach_set("color_srgb", table.colors.reshape(-1))
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)

@@ -1,10 +1,14 @@
 """Colors that points have of their own, such as those of a photograph, beside what results are shown in."""
 
 import bpy
+import numpy as np
 
-from .splats import has_splats
+from .attributes import read_attribute
+from .splats import BASE, has_splats
 
+COLOR = "Color"  # the name that imported ones get
 COLORS = "BYTE_COLOR", "FLOAT_COLOR"  # types of attributes
+_GAMMA = 2.2  # splats are trained in sRGB
 
 
 def is_color(data, name: str) -> bool:
@@ -21,3 +25,13 @@ def own_colors(data) -> str:
     names = [] if has_splats(data) else [item.name for item in data.attributes if is_color(data, item.name)]
     active = data.color_attributes.active_color_name if isinstance(data, bpy.types.Mesh) else ""
     return active if active in names else next(iter(names), "")
+
+
+def splat_colors(data):
+    """Return the colors that splats have from all sides alike, linear and opaque, (n, 4)."""
+    from ...core.splats.harmonics import CONSTANT  # not before it is needed
+
+    base = read_attribute(data, BASE)
+    base[:, :3] = np.maximum(CONSTANT * base[:, :3] + 0.5, 0.0) ** _GAMMA
+    base[:, 3] = 1.0
+    return base

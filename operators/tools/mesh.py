@@ -8,10 +8,11 @@ from bpy.props import BoolProperty, FloatProperty
 from ...core import mesh_surface, values_on_mesh
 from ..objects.attributes import DIRECTION_1, DISC, NORMAL, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
-from ..objects.colors import COLORS, own_colors
+from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
 from ..objects.handlers import tell
 from ..objects.place import OFFSET
+from ..objects.splats import has_splats
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 
@@ -103,18 +104,21 @@ class _Kept:
 
     def __init__(self, obj):
         self._types, self._values, self._active = {}, {}, own_colors(obj.data)
+        splats = has_splats(obj.data)  # whose colors are harmonics
         for attribute in obj.data.attributes:
             name = attribute.name
             if attribute.domain != "POINT" or name in _LEFT or name.startswith("."):
                 continue
             if attribute.data_type in STORABLE:
                 self._values[name] = read_attribute(obj.data, name)
-            elif attribute.data_type in COLORS:
+            elif attribute.data_type in COLORS and not splats:
                 self._values[name] = np.empty((point_count(obj.data), 4), np.float32)
                 attribute.data.foreach_get("color", self._values[name].reshape(-1))
             else:
                 continue
             self._types[name] = attribute.data_type
+        if splats:
+            self._types[COLOR], self._values[COLOR], self._active = "FLOAT_COLOR", splat_colors(obj.data), COLOR
         self._groups = _weights(obj)
 
     def carried(self, carrying, count):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.splats import add_splats, bar_splats
 from tests.blender.test_panel import draw
 
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -85,7 +86,9 @@ def seen(folder):
         scene.world = bpy.data.worlds.new("World")
         if scene.world.node_tree is None:
             scene.world.use_nodes = True
-        next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND").inputs[0].default_value = (1,) * 4
+        next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND").inputs[0].default_value = (
+            1,
+        ) * 4
     scene.render.filepath = str(folder / "seen.png")
     bpy.ops.render.render(write_still=True)
     picture = bpy.data.images.load(scene.render.filepath)
@@ -296,6 +299,16 @@ class TestMesh:
         assert shown(made) == "lb_mean_curvature"
         bpy.ops.meshfree.colormap(attribute="Color")
         assert looks(RED, tmp_path)
+
+    def test_of_splats(self, core, shown):
+        splats = bar_splats(core, degree=0)
+        splats.colors[:] = (np.array(GREEN) - 0.5) * 2.0 * np.sqrt(np.pi)
+        add_splats(splats)
+        made = self.run(bpy.context.object)
+        assert shown(made) == "Color"
+        assert [layer.name for layer in made.data.color_attributes] == ["Color"]
+        colors = np.array([value.color[:3] for value in made.data.color_attributes["Color"].data])
+        assert colors == pytest.approx(np.tile(GREEN, (len(colors), 1)), abs=1e-3)
 
     def test_the_own_material(self, imported, tmp_path, shown):
         obj = imported()
