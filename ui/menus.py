@@ -7,7 +7,7 @@ from ..operators.objects.reading import TYPES
 from .panel import TASKS
 
 _TOOLS = (
-    ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "legend"),
+    ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "own_material", "legend"),
     ("mesh_surface", "compare"),
     ("principal_curvatures", "roughness", "orient_normals"),
     ("smooth", "mode_shape"),

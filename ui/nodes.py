@@ -1,6 +1,7 @@
 """The node trees that make values visible: round points or discs for vertices, strokes, and colours for values."""
 
 import math
+from functools import partial
 
 import bpy
 
@@ -35,6 +36,7 @@ _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
 _DIM = 0.85  # how dark the back side becomes where it is dimmed
 _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but groups
+_COLORED = "COLOR"  # where points have colors of their own
 _CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
 CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
 _DEVIATIONS = 2.0  # standard deviations at which the ellipsoid of a splat ends
@@ -73,6 +75,7 @@ def display_group():
     loose = add_node(group, "FunctionNodeCompare", 1, -200, data_type="INT", operation="EQUAL")
     parts = add_node(group, "GeometryNodeSeparateComponents", 1, 0)
     drawn, larger, many = _thinned(group, given, parts)
+    disc_of = partial(_with_active_color, group, parts.outputs["Mesh"], loose.outputs["Result"])
     chosen = add_node(group, "FunctionNodeBooleanMath", 2, -400, operation="AND")
     size = add_node(group, "ShaderNodeMath", 2, -600, operation="MULTIPLY")
     points = add_node(group, "GeometryNodeMeshToPoints", 3, -100)
@@ -101,7 +104,7 @@ def display_group():
         (given_drawn.outputs["Selection"], every.inputs["Geometry"]),
         (size.outputs[0], points.inputs["Radius"]),
         (points.outputs["Points"], every.inputs["Geometry"]),
-        (_shaped(group, given, every.outputs["Geometry"], size.outputs[0], many), joined.inputs["Geometry"]),
+        (_shaped(group, given, disc_of, every.outputs["Geometry"], size.outputs[0], many), joined.inputs["Geometry"]),
         (loose.outputs["Result"], faces.inputs["Selection"]),
         (parts.outputs["Mesh"], faces.inputs["Geometry"]),
         (faces.outputs["Geometry"], joined.inputs["Geometry"]),
@@ -144,7 +147,7 @@ def _thinned(group, given, parts):
     return drawn, _math(group, 6, -600, "POWER", share, -0.5), _math(group, 6, -1400, "MULTIPLY", costly, limited)
 
 
-def _shaped(group, given, points, size, many):
+def _shaped(group, given, disc_of, points, size, many):
     """Add the nodes that make points into discs where that is asked for and they are not many; return what is drawn.
 
     Flat discs stick out of each other where the surface bends outwards, like scales; cones as flat as these do not.
@@ -175,7 +178,7 @@ def _shaped(group, given, points, size, many):
         (disc.outputs["Attribute"], length.inputs[0]),
         (points, placed.inputs["Points"]),
         (cone.outputs["Mesh"], lowered.inputs["Geometry"]),
-        (lowered.outputs["Geometry"], placed.inputs["Instance"]),
+        (disc_of(lowered.outputs["Geometry"]), placed.inputs["Instance"]),
         (turned.outputs["Rotation"], placed.inputs["Rotation"]),
         (scale, placed.inputs["Scale"]),
         (given.outputs[DISCS], discs.inputs[0]),
@@ -195,6 +198,40 @@ def _shaped(group, given, points, size, many):
     return splats.outputs["Output"]
 
 
+def _with_active_color(group, mesh, loose, disc):
+    """Add the nodes that tell a disc which color attribute of a mesh is active, the one that Solid shows; return it.
+
+    The name comes along with the first of the meshes that are joined: here one vertex without any values, which goes.
+    """
+    place = add_node(group, "GeometryNodeInputIndex", 2, 400)
+    first = _math(group, 3, 400, "LESS_THAN", place.outputs[0], 0.5)
+    alone = add_node(group, "GeometryNodeSeparateGeometry", 4, 400)
+    joined = add_node(group, "GeometryNodeJoinGeometry", 6, 400)
+    left = add_node(group, "GeometryNodeDeleteGeometry", 7, 400)
+    for source, target in (
+        (mesh, alone.inputs["Geometry"]),
+        (first, alone.inputs["Selection"]),
+        (disc, joined.inputs[0]),
+        (_without(group, 5, 400, alone.outputs["Selection"], "*"), joined.inputs[0]),  # the later link is the first
+        (joined.outputs[0], left.inputs["Geometry"]),
+        (loose, left.inputs["Selection"]),
+    ):
+        group.links.new(source, target)
+    return left.outputs["Geometry"]
+
+
+def _without(group, column, y, geometry, names):
+    """Add a node that removes the attributes whose names fit; return what is left."""
+    removed = add_node(group, "GeometryNodeRemoveAttribute", column, y)
+    if "Pattern Mode" in removed.inputs:  # since Blender 5
+        removed.inputs["Pattern Mode"].default_value = "Wildcard"
+    else:
+        removed.pattern_mode = "WILDCARD"
+    removed.inputs["Name"].default_value = names
+    group.links.new(geometry, removed.inputs["Geometry"])
+    return removed.outputs["Geometry"]
+
+
 def _ellipsoids(group, points):
     """Add the nodes that make splats into ellipsoids of two standard deviations; return what is drawn."""
     ball = add_node(group, "GeometryNodeMeshIcoSphere", 5, -1700)
@@ -206,14 +243,7 @@ def _ellipsoids(group, points):
     rotation.inputs["Name"].default_value = ROTATION
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -1700)
     for row, names in enumerate(_UNSEEN):  # or each corner would get a copy
-        removed = add_node(group, "GeometryNodeRemoveAttribute", 4, -1500 - 200 * row)
-        if "Pattern Mode" in removed.inputs:  # since Blender 5
-            removed.inputs["Pattern Mode"].default_value = "Wildcard"
-        else:
-            removed.pattern_mode = "WILDCARD"
-        removed.inputs["Name"].default_value = names
-        group.links.new(points, removed.inputs["Geometry"])
-        points = removed.outputs["Geometry"]
+        points = _without(group, 4, -1500 - 200 * row, points, names)
     for source, target in (
         (ball.outputs["Mesh"], smooth.inputs[0]),
         (points, placed.inputs["Points"]),
@@ -419,6 +449,17 @@ def color_by_checker(material, name, groups):
         tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], level.inputs[0])
         tree.links.new(level.outputs[0], checker.inputs["Vector"])
         _shine(tree, checker.outputs["Color"], groups)
+
+
+def color_by_own(material, name, groups):
+    """Let a material show the colors that an attribute holds, and groups as in `color_by_number`."""
+    if _begin(material, name, f"{_COLORED} {groups}"):
+        _shine(material.node_tree, material.node_tree.nodes[ATTRIBUTE].outputs["Color"], groups)
+
+
+def shows_own(material) -> bool:
+    """Whether a material shows colors that points have of their own."""
+    return material.get(_KIND, "").startswith(_COLORED)
 
 
 def is_checkered(material) -> bool:

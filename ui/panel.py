@@ -12,13 +12,14 @@ from ..operators.objects.attributes import (
     mode_number,
     point_count,
 )
-from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
+from ..operators.objects.colors import own_colors
+from ..operators.objects.modifiers import get_input, has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
 from ..operators.objects.splats import has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
-from .display import draws_discs, find_display, label, range_node, shown_attribute, step_colors
+from .display import draws_discs, find_display, label, own_material, range_node, shown_attribute, step_colors
 from .legend import find_legend
 from .nodes import LENGTH, MOST
 
@@ -242,6 +243,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         shown = shown_attribute(obj)
         attributes = obj.data.attributes
         column = layout.column(align=True)
+        _draw_own_looks(column, obj, shown)
         for name in (*RESULTS, *(name for name in APPLICATIONS if name in attributes)):
             row = column.row(align=True)
             row.enabled = name in attributes
@@ -275,6 +277,16 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         if context.scene.view_settings.view_transform not in _TRUE_COLORS:
             layout.label(text="Colors differ from the legend:", icon="INFO")
             layout.prop(context.scene.view_settings, "view_transform")
+
+
+def _draw_own_looks(column, obj, shown):
+    """Draw buttons to what an object looks like without results: the colors of its points, and its material."""
+    colors, material = own_colors(obj.data), own_material(obj)
+    if colors:
+        column.operator("meshfree.colormap", text="Color", depress=colors == shown).attribute = colors
+    if material is not None and find_display(obj) is not None:
+        seen = get_input(find_display(obj), "Material") == material
+        column.operator("meshfree.own_material", depress=seen)
 
 
 def _draw_colors(layout, obj):

@@ -18,6 +18,7 @@ from ..operators.objects.attributes import (
     positions_now,
     read_attribute,
 )
+from ..operators.objects.colors import is_color, own_colors
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, has_group, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
@@ -28,10 +29,13 @@ from .display import (
     NAME,
     component,
     draws_discs,
+    draws_faces,
     find_display,
     find_material,
+    is_colored,
     is_texture,
     numbers,
+    own_material,
     shown_attribute,
     without_unreached,
 )
@@ -45,6 +49,7 @@ from .nodes import (
     color_by_checker,
     color_by_direction,
     color_by_number,
+    color_by_own,
     color_plain,
     color_splats,
     dim_back,
@@ -76,13 +81,13 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
     Raises
     ------
     PointCloudError
-        There is no such attribute, or it holds neither numbers nor vectors on points.
+        There is no such attribute, or it holds neither numbers nor vectors nor colors on points.
     """
     if not name:
         name = shown_attribute(obj)
         if name not in obj.data.attributes:
             name = MEAN_CURVATURE
-    values = read_attribute(obj.data, name)
+    values = _read(obj.data, name)
     modifier, new = _add_display(obj)
     if radius:
         set_input(modifier, "Radius", radius)
@@ -90,6 +95,11 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
         resize(obj)
     _color(obj, name, values)
     reshape(obj)
+
+
+def _read(data, name):
+    """Read the values of an attribute that is to be shown; None for colors, which the material takes as they are."""
+    return None if is_color(data, name) else read_attribute(data, name)
 
 
 def _add_display(obj):
@@ -122,7 +132,7 @@ def recolor(obj):
     name = shown_attribute(obj)
     if not name or name not in obj.data.attributes:
         return
-    _color(obj, name, read_attribute(obj.data, name))
+    _color(obj, name, _read(obj.data, name))
     reshape(obj)
 
 
@@ -136,16 +146,15 @@ def show_groups(obj):
         set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
         if DISC not in obj.data.attributes:  # else it shows the surface
             obj.modifiers.remove(modifier)
-        if not material.users - material.use_fake_user:
-            bpy.data.materials.remove(material)
+        _remove_unused(material)
         reshape(obj)
     elif obj.meshfree.show_groups and (modifier is None or get_input(modifier, "Material") is None):
         _add_display(obj)
         resize(obj)
         plain = True
     if plain and obj.meshfree.show_groups:
-        color_plain(_own_material(obj), _group_colors(obj))
-        dim_back(_own_material(obj), obj.meshfree.dim_back)
+        color_plain(_display_material(obj), _group_colors(obj))
+        dim_back(_display_material(obj), obj.meshfree.dim_back)
         obj.update_tag()
     recolor(obj)
     if obj.meshfree.show_groups:
@@ -169,8 +178,8 @@ def _keep_groups(*_):
 
 
 def show_result(obj, name):
-    """Show an attribute that was written just now; see `show_attribute`."""
-    show_attribute(obj, name)
+    """Show an attribute that was written just now; without a name what is on show, or the mean curvature."""
+    show_attribute(obj, MEAN_CURVATURE if not name and is_colored(obj) else name)
     use_material_preview(bpy.context)
 
 
@@ -189,25 +198,85 @@ def show_sequence(objects, name):
 
 
 def show_surface(obj):
-    """Show the points of an object as discs, in the colors that they have."""
-    _add_display(obj)
+    """Show the points of an object as discs: in what they show, in their own material, or in their own colors."""
+    modifier, _ = _add_display(obj)
     resize(obj)
+    name = own_colors(obj.data)
+    if name and get_input(modifier, "Material") is None and own_material(obj) is None:
+        show_colors([obj])
+    follow_own_material(obj)
+
+
+def show_colors(objects):
+    """Show objects, such as the frames of a sequence, in the colors that their points have, by one material."""
+    first, *others = objects
+    show_attribute(first, own_colors(first.data))
+    for obj in others:
+        modifier, _ = _add_display(obj)
+        set_input(modifier, "Material", find_material(first))
+        resize(obj)
+    show_in_solid(first)
+
+
+def show_own_material(obj):
+    """Show an object in the material of its first slot, and go on so should that become another one."""
+    modifier, material, own = find_display(obj), find_material(obj), own_material(obj)
+    set_input(modifier, "Material", own)
+    obj.meshfree.own_material = own
+    if material is not None:
+        _remove_unused(material)
+    reshape(obj)
+    redraw_views()
+
+
+def follow_own_material(obj):
+    """Let a display that shows the material of the object's first slot take the one that is there now."""
+    modifier = find_display(obj)
+    if modifier is None or not obj.is_editable or get_input(modifier, "Material") != obj.meshfree.own_material:
+        return  # it shows something else, or what somebody has chosen for it
+    own = own_material(obj)
+    if own != obj.meshfree.own_material:
+        obj.meshfree.own_material = own
+        set_input(modifier, "Material", own)
+        obj.update_tag()
+
+
+@persistent
+def _slots_changed(_scene, depsgraph):
+    for update in depsgraph.updates:
+        if isinstance(update.id, bpy.types.Object) and update.id.type in TYPES:
+            follow_own_material(update.id.original)
 
 
 def show_splats(obj):
     """Show splats as ellipsoids in their own colors."""
     _add_display(obj)
-    color_splats(_own_material(obj))
+    color_splats(_display_material(obj))
     obj.meshfree.point_shape = "DISCS"
     resize(obj)
     use_material_preview(bpy.context)
 
 
 def show_alike(obj, made):
-    """Show on a mesh made of an object what that shows."""
-    name = shown_attribute(obj)
-    if name and name in made.data.attributes:
+    """Show on a mesh made of an object what that shows, or its own colors."""
+    name, own = shown_attribute(obj), own_material(obj)
+    if own is not None:
+        made.data.materials.append(own)
+    if name and name in made.data.attributes and not is_color(made.data, name):
         show_result(made, name)
+    elif own_colors(made.data) and (own is None or name):
+        show_colors([made])
+
+
+def show_in_solid(obj):
+    """Let viewports in Solid show the colors of an object's points: of dots they cannot, so that they change."""
+    for area in _views():
+        shading = area.spaces.active.shading
+        if shading.type == "SOLID":
+            if draws_faces(obj):
+                shading.color_type = "VERTEX"
+            else:
+                shading.type = "MATERIAL"
 
 
 def use_material_preview(context):
@@ -278,10 +347,12 @@ def _sized_by_hand(obj):
 
 
 def _color(obj, name, values):
-    settings, material, groups = obj.meshfree, _own_material(obj), _group_colors(obj)
+    settings, material, groups = obj.meshfree, _display_material(obj), _group_colors(obj)
     part = component(name, settings)
-    shown = numbers(values, part)
-    if is_texture(values):
+    shown = None if values is None else numbers(values, part)
+    if values is None:
+        color_by_own(material, name, groups)
+    elif is_texture(values):
         color_by_checker(material, name, groups)
     elif shown is None:
         color_by_direction(material, name, groups)
@@ -303,7 +374,12 @@ def _color(obj, name, values):
     redraw_views()
 
 
-def _own_material(obj):
+def _remove_unused(material):
+    if not material.users - material.use_fake_user:
+        bpy.data.materials.remove(material)
+
+
+def _display_material(obj):
     """Return the material of an object's points; a new one if there is none, or if a duplicate shares it."""
     material = find_material(obj)
     if material is None or material.users - material.use_fake_user > 1:
@@ -356,6 +432,7 @@ _HANDLERS = {
     "shape_changed": reshape,
     "groups_changed": show_groups,
     "surface_found": show_surface,
+    "colors_found": show_colors,
     "splats_found": show_splats,
     "result_written": show_result,
     "mesh_made": show_alike,
@@ -366,6 +443,7 @@ _HANDLERS = {
     "undo_post": _keep_groups,
     "redo_pre": _note_groups,
     "redo_post": _keep_groups,
+    "depsgraph_update_post": _slots_changed,
 }
 
 

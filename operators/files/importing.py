@@ -23,6 +23,7 @@ from ...core.files import (
 )
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
+from ..objects.colors import own_colors
 from ..objects.handlers import tell
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
@@ -208,6 +209,9 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
                 tell("splats_found", obj)
         for obj in surfaces:  # Convert would have taken discs for points
             tell("surface_found", obj)
+        colored = [obj for obj in every if obj not in surfaces and own_colors(obj.data)]
+        for objects in [colored] if self.sequence and colored else [[obj] for obj in colored]:
+            tell("colors_found", objects)
         if self.sequence:
             self._join(context)
 

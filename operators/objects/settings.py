@@ -305,6 +305,11 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         min=0.0,
         subtype="DISTANCE",
     )
+    own_material: PointerProperty(
+        type=bpy.types.Material,
+        name="Own Material",
+        description="Material of the first slot that the display shows, and will follow",
+    )
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
 
     deform: PointerProperty(
