@@ -14,14 +14,15 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
+    point_count,
     read_attribute,
 )
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
-from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
+from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing, typical_distance
 from ..operators.objects.splats import has_splats
-from . import colormaps, legend
+from . import colormaps, legend, smooth
 from .display import (
     NAME,
     component,
@@ -31,13 +32,16 @@ from .display import (
     is_texture,
     numbers,
     shown_attribute,
+    sloping,
     without_unreached,
 )
 from .nodes import (
     DISCS,
     FILLED,
     INK,
+    LENGTH,
     MOST,
+    SMOOTH,
     SPLATS,
     STROKES,
     color_by_checker,
@@ -48,12 +52,14 @@ from .nodes import (
     dim_back,
     display_group,
     is_plain,
+    shade,
     stroke_material,
 )
-from .value_range import fit_range
+from .value_range import STEPPED, fit_range
 
-_MOST_HANDLES = 6  # that have colors
+_MOST_HANDLES = 5  # that have colors
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
+_LINE_WIDTH = 1.0 / 250.0  # of iso lines, in the root of the area
 _NO_SPACING = 0.01  # stands in where points are too few to have one
 
 
@@ -96,8 +102,8 @@ def _add_display(obj):
         modifier = obj.modifiers.new(NAME, "NODES")
         modifier.node_group = display_group()
         set_input(modifier, MOST, viewport_points())
-    elif not has_input(modifier.node_group, SPLATS):  # of an earlier version
-        names = [name for name in ("Radius", "Material", MOST) if has_input(modifier.node_group, name)]
+    elif not has_input(modifier.node_group, SMOOTH):  # of an earlier version
+        names = [name for name in ("Radius", "Material", MOST, LENGTH, INK) if has_input(modifier.node_group, name)]
         kept = {name: get_input(modifier, name) for name in names}
         modifier.node_group = display_group()
         for name, value in kept.items():
@@ -142,6 +148,7 @@ def show_groups(obj):
     if plain and obj.meshfree.show_groups:
         color_plain(_own_material(obj), _group_colors(obj))
         dim_back(_own_material(obj), obj.meshfree.dim_back)
+        shade(_own_material(obj), obj.meshfree.shaded)
         obj.update_tag()
     recolor(obj)
     if obj.meshfree.show_groups:
@@ -202,6 +209,13 @@ def resize(obj):
     modifier = find_display(obj)
     if modifier is None:
         return
+    _measure(obj)
+    set_input(modifier, "Radius", _radius(obj.meshfree))
+    reshape(obj)
+
+
+def _measure(obj):
+    """Measure the spacing of the points, if they have changed."""
     kept = obj.meshfree
     if obj.mode != "EDIT":
         points = fingerprint(obj, glance=True)
@@ -209,8 +223,6 @@ def resize(obj):
             kept.spacing_of, kept.spacing = points, spacing(obj.data)
     elif not kept.spacing:
         kept.spacing = typical_distance(positions_now(obj))
-    set_input(modifier, "Radius", _radius(kept))
-    reshape(obj)
 
 
 def reshape(obj):
@@ -230,6 +242,8 @@ def reshape(obj):
             set_input(modifier, DISCS, turned)
         if has_input(group, FILLED):
             set_input(modifier, FILLED, known and formed)
+        if has_input(group, SMOOTH):  # slopes do not turn
+            set_input(modifier, SMOOTH, turned and deform is None and obj.meshfree.slopes_of != "")
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
         dots, bound = not (turned and draws_discs(obj)), deform is not None
@@ -258,9 +272,10 @@ def _sized_by_hand(obj):
 
 
 def _color(obj, name, values):
+    _measure(obj)
     settings, material, groups = obj.meshfree, _own_material(obj), _group_colors(obj)
     part = component(name, settings)
-    shown = numbers(values, part)
+    shown, stepped = numbers(values, part), False
     if is_texture(values):
         color_by_checker(material, name, groups)
     elif shown is None:
@@ -275,9 +290,15 @@ def _color(obj, name, values):
         color_map, low, high = fit_range(without_unreached(name, shown), *chosen, settings.coverage, locked)
         if settings.range_mode != "LOCKED":
             settings.range_low, settings.range_high = low, high
-        component_shown = part if values.ndim > 1 else ""
-        color_by_number(material, name, component_shown, color_map, low, high, settings, groups)
+        component_shown, stepped = part if values.ndim > 1 else "", color_map in STEPPED
+        width = _LINE_WIDTH * settings.spacing * math.sqrt(point_count(obj.data))
+        color_by_number(material, name, component_shown, color_map, low, high, settings, groups, width)
     dim_back(material, settings.dim_back)
+    shade(material, settings.shaded)
+    columns = [] if stepped or not settings.smooth else sloping(name, values, part)
+    smooth.follow(obj, f"{name} {part}", columns, settings.spacing)
+    for other in sharing_objects(obj):  # which may show something else
+        reshape(other)
     obj.update_tag()
     legend.renew(obj)
     redraw_views()

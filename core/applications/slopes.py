@@ -92,7 +92,9 @@ class Slopes:
         rise = np.where(counts, rise, 0.0)
         flat = across**2 + along**2
         thin = np.divide(height, radii, out=np.ones_like(height), where=counts)
-        weight = np.divide((1.0 - thin**2) ** 2 * flat, (flat + height**2) ** 2, out=np.zeros_like(flat), where=flat > 0)
+        weight = np.divide(
+            (1.0 - thin**2) ** 2 * flat, (flat + height**2) ** 2, out=np.zeros_like(flat), where=flat > 0
+        )
         first, second = weight * across, weight * along
         product = np.einsum("nk,nk->n", first, along)
         inner = [[np.einsum("nk,nk->n", first, across), product], [product, np.einsum("nk,nk->n", second, along)]]
