@@ -160,11 +160,11 @@ def _step_products(stiffness, rest):
     return sparse.vstack(parts, format="csr")
 
 
-def lifted_inverse(matrices):
+def lifted_inverse(matrices, least=_ROUND):
     """Return the inverses of symmetric matrices, (2, 2, m), lifted where steps lie in a row and tell nothing across."""
     (a, b), (_, d) = matrices
     trace = a + d
     smaller = 0.5 * (trace - np.hypot(a - d, 2.0 * b))
-    lifted = np.where(trace > 0.0, np.maximum(_ROUND * trace - smaller, 0.0), 1.0)
+    lifted = np.where(trace > 0.0, np.maximum(least * trace - smaller, 0.0), 1.0)
     a, d = a + lifted, d + lifted
     return np.array([[d, -b], [-b, a]]) / (a * d - b * b)

@@ -10,7 +10,10 @@ from ..geometry import Discs, frames
 from .gradients import lifted_inverse
 
 _COUNT = 12  # neighbours: two rings of an even sample
-_UNFIT = 8.0  # one by the share of the squared rises that a slope has to explain, to be free of limits
+_ROUND = 0.01  # of `lifted_inverse`
+_RIDGE = 0.01  # holds curvatures back where neighbours hardly tell them, in their own terms
+_TOLD = 0.1  # of what neighbours tell about slopes, what is left beside curvatures at least, or these count as zero
+_UNFIT = 14.0  # one by the share of the squared rises that a fit with as many coefficients may miss, to be of use
 _BLOCK = 1 << 13  # points at one time
 
 
@@ -35,10 +38,11 @@ class Slopes:
 
     Notes
     -----
-    A linear function of the tangent plane through the value at the point is fitted to the nearest neighbours, which
+    A quadratic function of the tangent plane through the value at the point is fitted to the nearest neighbours, which
     count the less the farther they are, and the less the higher they lie above that plane: those a radius above it do
-    not count, such as the other side of a thin wall. As far as it fits badly it is made less steep where it would leave
-    the range of their values within the disc, like a limiter of finite volumes: noise, peaks and jumps do not swing.
+    not count, such as the other side of a thin wall. As far as it fits badly its slope is made less steep where that
+    would leave the range of their values within the disc, like a limiter of finite volumes: noise, peaks and jumps do
+    not swing. Halfway to a neighbour, slopes of both then give values that differ by terms of third order.
 
     Examples
     --------
@@ -85,25 +89,54 @@ class Slopes:
         """Return the slopes at some points."""
         near, radii = self._near[rows], self._discs.radii[rows, None]
         axes = frames(self._discs.normals[rows])
-        step = self._points[near] - self._points[rows, None]
-        height, across, along = np.moveaxis(step @ axes, 2, 0)
+        step = (self._points[near] - self._points[rows, None]) @ axes
+        height, *flat = np.moveaxis(np.divide(step, radii[:, :, None], out=step, where=radii[:, :, None] > 0.0), 2, 0)
         rise = values[near] - values[rows, None]
-        counts = np.isfinite(rise) & (np.abs(height) < radii)
+        counts = np.isfinite(rise) & (np.abs(height) < 1.0) & (radii > 0.0)
         rise = np.where(counts, rise, 0.0)
-        flat = across**2 + along**2
-        thin = np.divide(height, radii, out=np.ones_like(height), where=counts)
-        weight = np.divide(
-            (1.0 - thin**2) ** 2 * flat, (flat + height**2) ** 2, out=np.zeros_like(flat), where=flat > 0
-        )
-        first, second = weight * across, weight * along
-        product = np.einsum("nk,nk->n", first, along)
-        inner = [[np.einsum("nk,nk->n", first, across), product], [product, np.einsum("nk,nk->n", second, along)]]
-        sums = np.array([np.einsum("nk,nk->n", first, rise), np.einsum("nk,nk->n", second, rise)])
-        slope = np.einsum("cdn,dn->cn", lifted_inverse(np.array(inner)), sums)
-        explained, total = np.einsum("cn,cn->n", slope, sums), np.einsum("nk,nk->n", weight, rise**2)
-        left = np.divide(total - explained, total, out=np.zeros_like(total), where=total > 0.0)
-        most = np.hypot(*slope) * radii[:, 0]
-        room = np.maximum(np.minimum(rise.max(axis=1), -rise.min(axis=1)), 0.0)
-        share = np.divide(room, most, out=np.ones_like(most), where=most > room)
-        slope *= np.maximum(share, 1.0 - _UNFIT * left)
-        return np.einsum("nac,cn->na", axes[:, :, 1:], slope)
+        slope = _fit(flat, np.where(counts, height, 1.0), rise)
+        return np.einsum("nac,nc->na", axes[:, :, 1:], np.divide(slope, radii, out=slope, where=radii > 0.0))
+
+
+def _fit(flat, height, rise):
+    """Fit quadratic functions to rises from points to their neighbours, (n, k); return their slopes, limited, (n, 2).
+
+    Neighbours are given by their two steps in the tangent plane and their height above it, (n, k) each in radii.
+    """
+    across, along = flat
+    squared = across**2 + along**2
+    weight = np.divide((1.0 - height**2) ** 2, squared + height**2, out=np.zeros_like(height), where=squared > 0.0)
+    weight *= np.divide(squared, squared + height**2, out=np.zeros_like(height), where=squared > 0.0)
+    terms = np.stack([across, along, 0.5 * across**2, across * along, 0.5 * along**2], axis=1)
+    weighted = weight[:, None] * terms
+    inner, sums = weighted @ terms.transpose(0, 2, 1), weighted @ rise[:, :, None]
+    bent = inner[:, 2:, 2:]
+    bent = bent + (_RIDGE * np.trace(bent, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None] * np.eye(3)
+    known = np.linalg.solve(bent, np.concatenate([inner[:, 2:, :2], sums[:, 2:]], axis=2))
+    alone = np.concatenate([inner[:, :2, :2], sums[:, :2]], axis=2)
+    left = alone - inner[:, :2, 2:] @ known
+    known *= (_determinant(left) > _TOLD * _determinant(alone))[:, None, None]
+    left = alone - inner[:, :2, 2:] @ known
+    slope = lifted_inverse(left[:, :, :2].transpose(1, 2, 0), _ROUND).transpose(2, 0, 1) @ left[:, :, 2:]
+    found = np.concatenate([slope, known[:, :, 2:] - known[:, :, :2] @ slope], axis=1)
+    missed = rise - (found.transpose(0, 2, 1) @ terms)[:, 0]
+    slope = slope[:, :, 0]
+    return slope * np.maximum(_limit(slope, rise), _freedom(weight, rise, missed))[:, None]
+
+
+def _determinant(sums):
+    """Return the determinants of the first two columns of matrices, (n, 2, 3)."""
+    return sums[:, 0, 0] * sums[:, 1, 1] - sums[:, 0, 1] * sums[:, 1, 0]
+
+
+def _limit(slope, rise):
+    """Return which share of slopes stays within the range of the rises to neighbours, (n,)."""
+    steep = np.hypot(*slope.T)
+    room = np.maximum(np.minimum(rise.max(axis=1), -rise.min(axis=1)), 0.0)
+    return np.divide(room, steep, out=np.ones_like(steep), where=steep > room)
+
+
+def _freedom(weight, rise, missed):
+    """Return how far a fit is to be trusted, (n,): 1 where it misses nothing, 0 and less where it misses much."""
+    total, lost = (np.einsum("nk,nk->n", weight, part**2) for part in (rise, missed))
+    return 1.0 - _UNFIT * np.divide(lost, total, out=np.zeros_like(total), where=total > 0.0)

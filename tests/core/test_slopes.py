@@ -34,7 +34,7 @@ def test_on_a_curved_surface_they_are_close_and_lie_in_the_tangent_planes(sphere
     assert np.percentile(wrong, 95) < 0.06
 
 
-def test_jumps_between_discs_become_a_tenth(sphere):
+def test_jumps_between_discs_become_a_fortieth(sphere):
     points, discs = sphere
     values = points[:, 0] * points[:, 1]
     slopes = core.Slopes(points, discs).of(values)
@@ -43,7 +43,7 @@ def test_jumps_between_discs_become_a_tenth(sphere):
     flat = np.abs(values[first] - values[second])
     at_first = values[first] + np.einsum("ij,ij->i", slopes[first], middle - points[first])
     at_second = values[second] + np.einsum("ij,ij->i", slopes[second], middle - points[second])
-    assert np.mean(np.abs(at_first - at_second)) < 0.1 * flat.mean()
+    assert np.mean(np.abs(at_first - at_second)) < 0.025 * flat.mean()
 
 
 @pytest.mark.parametrize("kind", ["noise", "a jump", "a spike"])
@@ -69,7 +69,7 @@ def test_the_other_side_of_a_thin_wall_does_not_count():
     points = np.vstack([np.column_stack([side, np.full(2000, height)]) for height in (0.0, 0.022)])
     values = np.where(points[:, 2] > 0.0, 100.0, 0.0) + points[:, 0]
     found = core.Slopes(points, flat_discs(4000, 0.02)).of(values)
-    assert_allclose(found, np.tile([1.0, 0.0, 0.0], (4000, 1)), atol=0.01)
+    assert np.mean(np.abs(found - [1.0, 0.0, 0.0]).max(axis=1) < 1e-6) > 0.99
 
 
 def test_unknown_values_and_unknown_discs_have_none_and_spoil_no_others(sphere):
