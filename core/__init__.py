@@ -27,6 +27,7 @@ _NAMES = {  # the public ones, by the module or package that is imported when on
         "MatchedModes",
         "MinimalSurface",
         "PointBlend",
+        "Slopes",
         "SurfaceMesh",
         "Transport",
         "band",

@@ -132,6 +132,19 @@ def without_unreached(name: str, values):
     return values[values >= 0.0] if name == DISTANCE else values
 
 
+def sloping(name: str, values, part: str) -> list:
+    """Return the numbers to show that change from point to point, (n,) each: two for texture coordinates.
+
+    Labels do not, nor truth values, and directions have colours of their own. Those that no source reaches are NaN.
+    """
+    shown = numbers(values, part)
+    if values.dtype.kind != "f" or (shown is None and not is_texture(values)):
+        return []
+    if shown is None:
+        return list(values.T)
+    return [np.where(shown >= 0.0, shown, np.nan) if name == DISTANCE else shown]
+
+
 def _find_node(obj, name):
     material = find_material(obj)
     return material and material.node_tree.nodes.get(name)

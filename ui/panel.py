@@ -265,7 +265,9 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             _draw_colors(layout, obj)
         if DISC in attributes:
             layout.prop(obj.meshfree, "point_shape")
+            layout.prop(obj.meshfree, "smooth")
             layout.prop(obj.meshfree, "dim_back")
+        layout.prop(obj.meshfree, "shaded", slider=True)
         layout.prop(obj.meshfree, "point_size")
         if not draws_discs(obj):
             layout.prop(*input_property(find_display(obj), MOST), text=MOST)

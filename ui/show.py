@@ -15,6 +15,7 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
+    point_count,
     positions_now,
     read_attribute,
 )
@@ -22,9 +23,9 @@ from ..operators.objects.colors import is_color, own_colors
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, has_group, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
-from ..operators.objects.reading import TYPES, fingerprint, spacing
+from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
-from . import colormaps, legend
+from . import colormaps, legend, smooth
 from .display import (
     NAME,
     component,
@@ -37,13 +38,16 @@ from .display import (
     numbers,
     own_material,
     shown_attribute,
+    sloping,
     without_unreached,
 )
 from .nodes import (
     DISCS,
     FILLED,
     INK,
+    LENGTH,
     MOST,
+    SMOOTH,
     SPLATS,
     STROKES,
     color_by_checker,
@@ -55,13 +59,15 @@ from .nodes import (
     dim_back,
     display_group,
     is_plain,
+    shade,
     stroke_material,
 )
-from .value_range import fit_range
+from .value_range import STEPPED, fit_range
 
 _MOST_HANDLES = 6  # that have colors
-_MOST_GROUPS = 13  # attributes that a material reads for them: Blender's shaders take 15
+_MOST_GROUPS = 12  # attributes that a material reads for them: Blender's shaders take 15
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
+_LINE_WIDTH = 1.0 / 250.0  # of iso lines, in the root of the area
 _noted = {}  # Group Colors of objects in Edit Mode while something is undone, by session_uid
 _NO_SPACING = 0.01  # stands in where points are too few to have one
 
@@ -110,8 +116,8 @@ def _add_display(obj):
         modifier = obj.modifiers.new(NAME, "NODES")
         modifier.node_group = display_group()
         set_input(modifier, MOST, viewport_points())
-    elif not has_input(modifier.node_group, SPLATS):  # of an earlier version
-        names = [name for name in ("Radius", "Material", MOST) if has_input(modifier.node_group, name)]
+    elif not has_input(modifier.node_group, SMOOTH):  # of an earlier version
+        names = [name for name in ("Radius", "Material", MOST, LENGTH, INK) if has_input(modifier.node_group, name)]
         kept = {name: get_input(modifier, name) for name in names}
         modifier.node_group = display_group()
         for name, value in kept.items():
@@ -155,6 +161,7 @@ def show_groups(obj):
     if plain and obj.meshfree.show_groups:
         color_plain(_display_material(obj), _group_colors(obj))
         dim_back(_display_material(obj), obj.meshfree.dim_back)
+        shade(_display_material(obj), obj.meshfree.shaded)
         obj.update_tag()
     recolor(obj)
     if obj.meshfree.show_groups:
@@ -291,6 +298,13 @@ def resize(obj):
     modifier = find_display(obj)
     if modifier is None:
         return
+    _measure(obj)
+    set_input(modifier, "Radius", _radius(obj.meshfree))
+    reshape(obj)
+
+
+def _measure(obj):
+    """Measure the spacing of the points, if they have changed."""
     kept = obj.meshfree
     if obj.mode != "EDIT":
         points = fingerprint(obj, glance=True)
@@ -298,8 +312,6 @@ def resize(obj):
             kept.spacing_of, kept.spacing = points, spacing(obj.data)
     elif not kept.spacing:
         kept.spacing = core.geometry.typical_distance(positions_now(obj))
-    set_input(modifier, "Radius", _radius(kept))
-    reshape(obj)
 
 
 def reshape(obj):
@@ -319,6 +331,8 @@ def reshape(obj):
             set_input(modifier, DISCS, turned)
         if has_input(group, FILLED):
             set_input(modifier, FILLED, known and formed)
+        if has_input(group, SMOOTH):  # slopes do not turn
+            set_input(modifier, SMOOTH, turned and deform is None and obj.meshfree.slopes_of != "")
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
         dots, bound = not (turned and draws_discs(obj)), deform is not None
@@ -347,9 +361,10 @@ def _sized_by_hand(obj):
 
 
 def _color(obj, name, values):
+    _measure(obj)
     settings, material, groups = obj.meshfree, _display_material(obj), _group_colors(obj)
     part = component(name, settings)
-    shown = None if values is None else numbers(values, part)
+    shown, stepped = None if values is None else numbers(values, part), False
     if values is None:
         color_by_own(material, name, groups)
     elif is_texture(values):
@@ -366,9 +381,15 @@ def _color(obj, name, values):
         color_map, low, high = fit_range(without_unreached(name, shown), *chosen, settings.coverage, locked)
         if settings.range_mode != "LOCKED":
             settings.range_low, settings.range_high = low, high
-        component_shown = part if values.ndim > 1 else ""
-        color_by_number(material, name, component_shown, color_map, low, high, settings, groups)
+        component_shown, stepped = part if values.ndim > 1 else "", color_map in STEPPED
+        width = _LINE_WIDTH * settings.spacing * math.sqrt(point_count(obj.data))
+        color_by_number(material, name, component_shown, color_map, low, high, settings, groups, width)
     dim_back(material, settings.dim_back)
+    shade(material, settings.shaded)
+    columns = [] if values is None or stepped or not settings.smooth else sloping(name, values, part)
+    smooth.follow(obj, f"{name} {part}", columns, settings.spacing)
+    for other in sharing_objects(obj):  # which may show something else
+        reshape(other)
     obj.update_tag()
     legend.renew(obj)
     redraw_views()

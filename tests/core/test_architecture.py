@@ -124,6 +124,7 @@ SIDEWAYS = {  # applications that build on others
     ("minimal_surface", "boundary_curve"),
     ("segmentation", "graph"),
     ("selection", "graph"),
+    ("slopes", "gradients"),
     ("smoothing", "filters"),
     ("smoothing", "sizes"),
 }
