@@ -4,6 +4,8 @@ import sys
 
 import bpy
 
+from .wrapping import draw_text
+
 
 def _lines():
     """Say what is wrong, and what to do."""
@@ -33,7 +35,7 @@ class MESHFREE_PT_missing(bpy.types.Panel):
     def draw(self, context):
         column = self.layout.column(align=True)
         for line, icon in zip(_lines(), ("ERROR", "BLANK1", "BLANK1"), strict=True):
-            column.label(text=line, icon=icon)
+            draw_text(column, context, line, icon)
 
 
 CLASSES = (MESHFREE_PT_missing,)

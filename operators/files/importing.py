@@ -15,6 +15,7 @@ from ...core.splats import holds_splats
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
 from ..objects.handlers import tell
+from ..objects.notices import keep
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
 from ..running import cache
@@ -154,7 +155,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             context.view_layer.objects.active = obj
             self._tell(obj, table, shared)
             if isinstance(found, str):
-                self.report({"INFO"}, f"{obj.name} is shown as dots. {found}")
+                self.note(f"{obj.name} is shown as dots. {found}", obj)
             elif found is not None:
                 surfaces.append(obj)
                 if DISC not in obj.data.attributes:  # those of the file, if there are any, may have been turned
@@ -182,7 +183,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         obj.select_set(True)
         context.view_layer.objects.active = obj
         for notice in splats.notices:
-            self.report({"WARNING"}, notice)
+            self.warn(notice, obj)
         degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
         self.report({"INFO"}, f"{obj.name}: {len(splats):,} Gaussian splats with harmonics of degree {degree}")
         return obj
@@ -193,17 +194,22 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         sequence = add_sequence(context, self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence", frames, first)
         sequence.select_set(True)
         context.view_layer.objects.active = sequence
+        for frame in frames:  # which nobody selects
+            for told in frame.meshfree.notices:
+                text = told.text if frame.name in told.text else f"{frame.name}: {told.text}"
+                keep(sequence, told.tool, text, told.level)
         self.report({"INFO"}, f"{sequence.name}: frames {first} to {first + len(frames) - 1}")
 
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""
         for notice in table.notices:
-            self.report({"WARNING"}, notice)
+            self.warn(notice, obj)
         offset = offset_of(obj)
-        shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
-        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
+        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points")
+        if offset.any():
+            self.note(f"{obj.name} is shifted by ({', '.join(f'{0.0 - value:.10g}' for value in offset)})", obj)
         if shared is not None and (offset != shared).any():
-            self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
+            self.warn(f"{obj.name} is too far from the points imported before to share their shift", obj)
 
 
 def _convert(context, objects):

@@ -12,7 +12,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import deform_settings
+from . import deform_settings, notices
 from .color_choices import color_choice
 from .earlier import FormerSettings
 from .handlers import tell
@@ -307,6 +307,9 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     )
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
 
+    notices: CollectionProperty(
+        type=notices.MESHFREE_PG_notice, name="Notices", description="What tools told of the object, until dismissed"
+    )
     deform: PointerProperty(
         type=deform_settings.MESHFREE_PG_deform, name="Deform", description="How the object follows handles"
     )
@@ -334,7 +337,7 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     settings_used: StringProperty(name="Settings Used", description="Settings of the last analysis")
 
 
-CLASSES = (MESHFREE_PG_stage, *deform_settings.CLASSES, MESHFREE_PG_settings)
+CLASSES = (MESHFREE_PG_stage, *notices.PROPERTY_GROUPS, *deform_settings.CLASSES, MESHFREE_PG_settings)
 
 
 def attach():

@@ -27,6 +27,7 @@ OPERATORS = (
     "deform_to_shape_key",
     "deform_unbind",
     "deform_update",
+    "dismiss",
     "escape",
     "export_eigenvalues",
     "export_operator",
@@ -267,7 +268,7 @@ def test_panel_names_scale_faces_modifiers_and_sharing():
     bpy.context.view_layer.update()
     texts = draw()
     for text in (
-        "Object scale (1, 2, 1) is applied",
+        "Object scale (1, 2, 1) is applied to lengths and areas",
         "Faces not used: 1",
         "Modifiers left out: 1",
         "Other objects share this mesh",
