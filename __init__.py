@@ -36,7 +36,7 @@ def _modules():
         surface,
     )
     from .operators.tools import select as selecting
-    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
+    from .ui import applications, colormap, drag, legend, menus, overlay, panel, points, presets, range_selection, show
     from .ui import deform as deform_panel
 
     return (
@@ -79,6 +79,7 @@ def _modules():
         deform_panel,
         menus,
         overlay,
+        drag,
     )
 
 

@@ -21,6 +21,7 @@ from .dialogs import draw_setting
 from .display import draws_discs, find_display, label, range_node, shown_attribute, step_colors
 from .legend import find_legend
 from .nodes import LENGTH, MOST
+from .scale import shown_scale
 from .wrapping import draw_text
 
 _LISTED = 20  # eigenvalues in the panel
@@ -288,14 +289,20 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         layout.prop(obj.meshfree, "point_size")
         if not draws_discs(obj):
             layout.prop(*input_property(find_display(obj), MOST), text=MOST)
-        column = layout.column(align=True, heading="Show")
-        column.prop(obj.meshfree, "legend")
-        column.prop(obj.meshfree, "histogram")
-        shows_legend = find_legend(context.scene, obj) is not None
-        layout.operator("meshfree.legend", depress=shows_legend).show = not shows_legend
-        if context.scene.view_settings.view_transform not in _TRUE_COLORS:
-            draw_text(layout, context, "Colors differ from the legend:", "INFO")
-            layout.prop(context.scene.view_settings, "view_transform")
+        if shown_scale(obj, context.scene) is not None:
+            _draw_legend(layout, context, obj)
+
+
+def _draw_legend(layout, context, obj):
+    """Draw what tells the values of the colors on show, and what makes them differ from it."""
+    column = layout.column(align=True, heading="Show")
+    column.prop(obj.meshfree, "legend")
+    column.prop(obj.meshfree, "histogram")
+    shows_legend = find_legend(context.scene, obj) is not None
+    layout.operator("meshfree.legend", depress=shows_legend).show = not shows_legend
+    if context.scene.view_settings.view_transform not in _TRUE_COLORS:
+        draw_text(layout, context, "Colors differ from the legend:", "INFO")
+        layout.prop(context.scene.view_settings, "view_transform")
 
 
 def _draw_colors(layout, obj):

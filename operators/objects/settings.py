@@ -284,6 +284,16 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     legend: BoolProperty(
         name="Legend", description="Draw the colors with their values over the 3D view", default=True, update=_redraw
     )
+    legend_place: FloatVectorProperty(
+        name="Legend Place",
+        description="Where the legend lies in the 3D view, which the mouse moves: shares of the way from left to right"
+        " and from bottom to top",
+        default=(1.0, 0.0),
+        min=0.0,
+        max=1.0,
+        size=2,
+        update=_redraw,
+    )
     histogram: BoolProperty(
         name="Histogram",
         description="Draw over the 3D view how often each value occurs, with the range of the colors",
