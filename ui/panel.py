@@ -6,6 +6,7 @@ from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import (
     ALONG_SURFACE,
     APPLICATIONS,
+    DEVIATION,
     DISC,
     RESULTS,
     eigenvector_name,
@@ -103,6 +104,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             _draw_result(layout, obj.meshfree)
             if is_stale(obj, glance=True):
                 draw_text(layout, context, "Results are stale: analyze again", "ERROR")
+        _draw_compared(layout, context, obj)
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for name, text in _TASKS:
             grid.operator(f"meshfree.{name}", text=text).at_once = True
@@ -115,6 +117,17 @@ def _draw_job(layout, context, job):
     row = column.row(align=True)
     row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
     row.operator("meshfree.stop", text="", icon="X")
+
+
+def _draw_compared(layout, context, obj):
+    """Draw what an object was compared with, and what turns that round."""
+    kept = obj.meshfree
+    if kept.compared_with is None or DEVIATION not in obj.data.attributes:
+        return
+    hidden = ", which is hidden" if kept.compared_with.hide_get() else ""
+    column = layout.column(align=True)
+    draw_text(column, context, f"{obj.name} compared with {kept.compared_with.name}{hidden}", "INFO")
+    column.operator("meshfree.compare_swap", text="Swap").greatest = kept.compared_within
 
 
 def _draw_notices(layout, context, obj):

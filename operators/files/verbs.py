@@ -19,7 +19,15 @@ from .arguments import add_setting
 
 ONE_LINE = "Writes one JSON line per input, with notices, or the error. The exit code is 1 if any input failed."
 _SETTINGS = (*options.ALL_NAMES, "make_single_user")  # of the object
-LEFT_OUT = {"rna_type", "show", "display", "target", "animate", "period"}  # of an operator: points are moved in place
+LEFT_OUT = {
+    "rna_type",
+    "show",
+    "hide_reference",
+    "display",
+    "target",
+    "animate",
+    "period",
+}  # of an operator: points are moved in place
 
 
 class Verb:

@@ -342,6 +342,15 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     stages: CollectionProperty(
         type=MESHFREE_PG_stage, name="Stages", description="How long each stage of the last analysis took"
     )
+    compared_with: PointerProperty(
+        type=bpy.types.Object, name="Compared With", description="Object that the last comparison measured from"
+    )
+    compared_within: FloatProperty(
+        name="Compared Within",
+        description="Greatest distance of the last comparison; 0 for any distance",
+        min=0.0,
+        subtype="DISTANCE",
+    )
     fingerprint: StringProperty(name="Fingerprint", description="Checksum of the points that were analyzed")
     metric: FloatVectorProperty(name="Metric", description="Scale and shear that were analyzed", size=9)
     settings_used: StringProperty(name="Settings Used", description="Settings of the last analysis")

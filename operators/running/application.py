@@ -65,6 +65,7 @@ class ApplicationOperator(Tool, JobOperator):
     """
 
     only_active = False  # for what has one object by nature
+    keeps_line = False  # whether what it says in the end are figures that one looks at again
 
     at_once: BoolProperty(
         name="At Once",
@@ -107,7 +108,10 @@ class ApplicationOperator(Tool, JobOperator):
         """Report what one should know of an object, and what was done with it."""
         for notice in notices:
             self.warn(notice, obj)
-        self.report({"INFO"}, line)
+        if self.keeps_line:
+            self.note(line, obj)
+        else:
+            self.report({"INFO"}, line)
 
     def is_repeated(self, context):
         return any(last.as_pointer() == self.as_pointer() for last in context.window_manager.operators)

@@ -10,7 +10,7 @@ from ..objects.attributes import DIRECTION_1, DISC, NORMAL, STORABLE, point_coun
 from ..objects.color_choices import COLOR_CHOICES
 from ..objects.groups import add_group
 from ..objects.handlers import tell
-from ..objects.place import OFFSET
+from ..objects.place import OFFSET, hide
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 
@@ -24,7 +24,7 @@ class MeshSurface(Tool):
     """The settings and the work of `meshfree.mesh_surface`."""
 
     asks = ("detail", "keep_open")
-    adjustable = ("keep_open",)
+    adjustable = ("detail", "keep_open")
     made = ()  # names of objects, of those that hold their meshes, and how many edges of these are open
 
     detail: FloatProperty(
@@ -88,7 +88,7 @@ class MeshSurface(Tool):
             made[obj.name].select_set(True)
         context.view_layer.objects.active = made[objects[0].name]
         for obj in objects:
-            obj.hide_set(True)
+            hide(obj)
 
 
 class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Operator):

@@ -141,7 +141,7 @@ class TestView:
             return colors(gui.pixels(corner(gui)))
 
         gui.wait_for(lambda: drawn() > 1000, "the legend is drawn")
-        x, y, width, height = corner(gui)
+        x, y, _, height = corner(gui)
         gui.shot("legend_in_its_corner")
         gui.drag((x + 80, y + height - 60), (x - 320, y - 200))
         gui.wait_until(f"{place}[0] < 0.7")
