@@ -335,7 +335,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         if keyed and not self.keep_keyframes:
             for empty in keyed:
                 stop_moving(empty)
-            self.report({"WARNING"}, _lost_keyframes(context.scene, keyed))
+            self.warn(_lost_keyframes(context.scene, keyed), obj)
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"
 
 

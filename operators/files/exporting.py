@@ -55,7 +55,7 @@ class ExportOperator(JobOperator, ExportHelper):
         """Tell what was written."""
         *notices, line = [results] if isinstance(results, str) else results
         for notice in notices:
-            self.report({"WARNING"}, notice)
+            self.warn(notice, context.object)
         self.report({"INFO"}, line)
         return {"FINISHED"}
 

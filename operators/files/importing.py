@@ -25,6 +25,7 @@ from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
 from ..objects.colors import own_colors
 from ..objects.handlers import tell
+from ..objects.notices import keep
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
 from ..running import cache
@@ -190,7 +191,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             context.view_layer.objects.active = obj
             self._tell(obj, table, shared)
             if isinstance(found, str):
-                self.report({"INFO"}, f"{obj.name} is shown as dots. {found}")
+                self.note(f"{obj.name} is shown as dots. {found}", obj)
             elif found is not None:
                 surfaces.append(obj)
                 if DISC not in obj.data.attributes:  # those of the file, if there are any, may have been turned
@@ -222,7 +223,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         obj.select_set(True)
         context.view_layer.objects.active = obj
         for notice in splats.notices:
-            self.report({"WARNING"}, notice)
+            self.warn(notice, obj)
         degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
         self.report({"INFO"}, f"{obj.name}: {len(splats):,} Gaussian splats with harmonics of degree {degree}")
         return obj
@@ -235,6 +236,10 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         sequence = add_sequence(context, name, frames, numbers)
         sequence.select_set(True)
         context.view_layer.objects.active = sequence
+        for frame in frames:  # which nobody selects
+            for told in frame.meshfree.notices:
+                text = told.text if frame.name in told.text else f"{frame.name}: {told.text}"
+                keep(sequence, told.tool, text, told.level)
         missing = numbers[-1] - numbers[0] + 1 - len(numbers)
         rest = f"; {missing} of them have no file and show the one before" if missing else ""
         self.report({"INFO"}, f"{sequence.name}: frames {numbers[0]} to {numbers[-1]}{rest}")
@@ -242,12 +247,13 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""
         for notice in (*table.notices, *tell_columns(obj)):
-            self.report({"WARNING"}, notice)
+            self.warn(notice, obj)
         offset = offset_of(obj)
-        shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
-        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
+        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points")
+        if offset.any():
+            self.note(f"{obj.name} is shifted by ({', '.join(f'{0.0 - value:.10g}' for value in offset)})", obj)
         if shared is not None and (offset != shared).any():
-            self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
+            self.warn(f"{obj.name} is too far from the points imported before to share their shift", obj)
 
 
 def _convert(context, objects):

@@ -11,7 +11,7 @@ from ..objects.color_choices import COLOR_CHOICES
 from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
 from ..objects.handlers import tell
-from ..objects.place import copy_place
+from ..objects.place import copy_place, hide
 from ..objects.splats import has_splats
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
@@ -25,7 +25,7 @@ class MeshSurface(Tool):
     """The settings and the work of `meshfree.mesh_surface`."""
 
     asks = ("detail", "keep_open")
-    adjustable = ("keep_open",)
+    adjustable = ("detail", "keep_open")
     made = ()  # names of objects, of those that hold their meshes, and how many edges of these are open
 
     detail: FloatProperty(
@@ -88,7 +88,7 @@ class MeshSurface(Tool):
             made[obj.name].select_set(True)
         context.view_layer.objects.active = made[objects[0].name]
         for obj in objects:
-            obj.hide_set(True)
+            hide(obj)
 
 
 class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Operator):

@@ -18,6 +18,7 @@ OPERATORS = (
     "apply_to_splats",
     "colormap",
     "compare",
+    "compare_swap",
     "convert",
     "deform_apply",
     "deform_bake",
@@ -27,6 +28,7 @@ OPERATORS = (
     "deform_to_shape_key",
     "deform_unbind",
     "deform_update",
+    "dismiss",
     "export_eigenvalues",
     "export_operator",
     "export_points",
@@ -293,7 +295,7 @@ def test_panel_names_scale_faces_modifiers_and_sharing():
     bpy.context.view_layer.update()
     texts = draw()
     for text in (
-        "Object scale (1, 2, 1) is applied",
+        "Object scale (1, 2, 1) is applied to lengths and areas",
         "Faces not used: 1",
         "Modifiers left out: 1",
         "Other objects share this mesh",
@@ -377,6 +379,7 @@ def test_adjust_last_operation_offers_what_is_quick(name):
     values = {item.identifier: item.default for item in properties if item.type != "POINTER"}
     for variant in ({}, {"keep": "AREA"}, {"source": "x"}):
         settings = Settings(**values | {key: value for key, value in variant.items() if key in values})
+        settings.wanted = 10  # modes of an analysis
         quick = value_of(operator.adjustable, settings)
         texts = []
         settings.layout, settings.adjustable, settings.is_repeated = Layout(texts), quick, lambda context: True
@@ -410,3 +413,15 @@ def test_every_option_of_core_is_a_setting_with_its_default(extension, core):
 def test_tab():
     for name in PANELS:
         assert getattr(bpy.types, f"MESHFREE_PT_{name}").bl_category == "Mesh-Free"
+
+
+@pytest.mark.parametrize(("name", "count"), [("analyze", {"modes": 10}), ("spectrum", {"count": 10})])
+def test_how_many_modes_to_write_is_asked_only_where_not_all_are(name, count):
+    (setting,) = count
+    kind = getattr(bpy.types, f"MESHFREE_OT_{name}")
+    for wanted, offered in ((10, ("show",)), (50, ("show",)), (51, ("write_limit", "show"))):
+        assert kind.adjustable.fget(SimpleNamespace(wanted=wanted, **{setting: wanted})) == offered
+
+
+def test_the_detail_of_a_mesh_can_be_adjusted():
+    assert "detail" in bpy.types.MESHFREE_OT_mesh_surface.adjustable
