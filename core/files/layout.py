@@ -27,6 +27,8 @@ class Layout(NamedTuple):
     notices : list of str
     announced : int or None
         How many points the line before them says there are.
+    degrees : bool
+        Whether x and y are angles.
     """
 
     names: list
@@ -34,6 +36,7 @@ class Layout(NamedTuple):
     others: list
     notices: list
     announced: int | None = None
+    degrees: bool = False
 
     def label(self, index):
         """Return the name of a column, or one by its number in the file."""
@@ -106,7 +109,7 @@ def find_layout(rows, usual) -> Layout:
     shortest = min(map(len, rows.sample))
     read = [index for index in numeric if index < len(names) and (names[index] or index < shortest)]
     others = [index for index in read if index not in places]
-    layout = Layout(names, places, others, notices, _announced(rows))
+    layout = Layout(names, places, others, notices, _announced(rows), bool(found and found.degrees))
     texts = [layout.label(index) for index in textual if index < len(names)]
     there = (*numeric, *textual)
     empty = [name for index, name in enumerate(names) if index not in there and name not in (None, unnamed(index))]
@@ -128,10 +131,6 @@ def _tell_places(found, names, path):
         notices.append(f"{path.name}: no names tell which columns are x y z. Took {brief(told)} for them. {_GIVE}.")
     elif not found.plain:
         notices.append(f"{path.name}: took {brief(told)} for x y z.")
-    if found.degrees:
-        notices.append(
-            f"{path.name}: its places are degrees, which have no shape beside heights. Convert them to a national grid."
-        )
     return notices
 
 

@@ -68,6 +68,7 @@ def _read_text(blocks, path, columns, usual=None):
         notices.append(_tell_guess(path, layout.places, nameless, guessed))
     extra = _renamed(extra, standard_names(extra))
     table = from_columns({**dict(zip("xyz", values.T, strict=False)), **extra}, path)
+    table.degrees = layout.degrees
     table.notices += [*layout.notices, *notices]
     if layout.announced not in (None, len(values)):
         table.notices.append(f"{path.name}: announces {layout.announced} points, but {len(values)} lines follow.")
@@ -184,7 +185,7 @@ def write_columns(path, table, delimiter=" ", double=True):
         Whether coordinates are written with the digits of double precision.
     """
     columns = to_columns(table)
-    formats = ["%d" if values.dtype.kind in "biu" else "%.9g" for values in columns.values()]
+    formats = [_text_format(values) for values in columns.values()]
     if double:
         formats[:3] = 3 * ["%.15g"]
     with open(path, "w", encoding="utf-8", newline="\n") as file:
@@ -192,5 +193,17 @@ def write_columns(path, table, delimiter=" ", double=True):
         file.write(("# " if delimiter.isspace() else "") + delimiter.join(names) + "\n")
         line = delimiter.join(formats) + "\n"
         for start in range(0, len(table.points), _BLOCK):  # some rows at a time take a third of the time of savetxt
-            rows = np.stack([values[start : start + _BLOCK] for values in columns.values()], axis=1, dtype=np.float64)
+            parts = [values[start : start + _BLOCK] for values in columns.values()]
+            rows = np.empty((len(parts[0]), len(parts)), object)  # doubles would round whole numbers of 64 bits
+            for index, part in enumerate(parts):
+                rows[:, index] = part
             file.write((line * len(rows)) % tuple(rows.reshape(-1).tolist()))
+
+
+def _text_format(values):
+    """Return how numbers are written so that they are the same when they are read again, in as few digits."""
+    if values.dtype.kind in "biu":
+        return "%d"
+    if values.dtype.itemsize < 8:
+        return "%.9g"
+    return "%.15g" if (values == np.rint(values)).all() and np.abs(values).max(initial=0.0) < 1e15 else "%s"

@@ -2,4 +2,5 @@
 
 from .file import NEEDED, SplatFile, holds_splats, read_splats, write_splats
 from .floaters import floaters, floating_rows
+from .harmonics import COUNTS
 from .splats import Splats

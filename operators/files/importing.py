@@ -9,17 +9,30 @@ import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...core import PointCloudError, Splats, read_splats, surface_discs
-from ...core.files import READABLE, TEXTS, numbered_files, order_frames, read_points
-from ...core.splats import holds_splats
+from ... import core
+from ...core import PointCloudError
+from ...core.files import (
+    READABLE,
+    SCANS,
+    TEXTS,
+    LasChoices,
+    frame_number,
+    numbered_files,
+    order_frames,
+    parse_classes,
+    read_points,
+)
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
+from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
+from ..objects.colors import own_colors
 from ..objects.handlers import tell
+from ..objects.notices import keep
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
+from .columns import tell_columns
 from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
@@ -43,7 +56,6 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-
     filepath: StringProperty(
         name="File Path",
         description="File to import",
@@ -98,6 +110,22 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         default=False,
         options={"SKIP_SAVE"},
     )
+    numbers: BoolProperty(
+        name="Follow Numbers",
+        description="Show each file of a sequence at the frame of its number; where numbers are missing, the file"
+        " before stays",
+        default=False,
+    )
+    classes: StringProperty(
+        name="Classes",
+        description="Import only points of these classes of LAS files, such as 2 5 or 3-5 (2 is the ground); empty for"
+        " all",
+    )
+    withheld: BoolProperty(
+        name="Withheld Points",
+        description="Import points of LAS files, too, that are flagged as withheld, which stands for deleted",
+        default=False,
+    )
     frame: BoolProperty(
         name="Frame in View",
         description="Let the 3D views look at the imported points, unless a script imports them",
@@ -106,10 +134,12 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
 
     @property
     def asks(self):
-        """Name the settings of the dialog; columns are asked for where text is chosen, or nothing yet."""
-        names = [item.name for item in self.files if item.name] or [self.filepath]
-        text = any(Path(name).suffix.lower() in ("", *TEXTS) for name in names)
-        return ("up", "kind", "attributes", *(["columns"] if text else []), "surface", "sequence", "frame")
+        """Names of the settings: some are those of sequences, and of a kind of file; of text until one is chosen."""
+        sequence = ("sequence", "numbers") if self.sequence else ("sequence",)
+        suffixes = {path.suffix.lower() for path in self._chosen()}
+        scans = ("classes", "withheld") if suffixes & {*SCANS} else ()
+        text = ("columns",) if suffixes & {"", *TEXTS} else ()
+        return "up", "kind", "attributes", *text, *scans, "surface", *sequence, "frame"
 
     @classmethod
     def obstacle(cls, context):
@@ -124,14 +154,18 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     @reporting
     def execute(self, context):
         self._framed = self._attended and self.frame
-        names = [item.name for item in self.files if item.name]
-        folder = Path(bpy.path.abspath(self.directory))
-        paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
+        paths, choices = self._chosen(), LasChoices(parse_classes(self.classes), self.withheld)
         if self.sequence:
             paths = order_frames(paths) if len(paths) > 1 else numbered_files(paths[0].parent)
         self._paths = paths
         surface, columns = self.surface and not self.sequence, self.columns
-        return self.work(context, [], lambda progress: _read_all(paths, columns, surface, progress))
+        return self.work(context, [], lambda progress: _read_all(paths, columns, choices, surface, progress))
+
+    def _chosen(self):
+        """Return the files that are named."""
+        names = [item.name for item in self.files if item.name]
+        folder = Path(bpy.path.abspath(self.directory))
+        return [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
 
     def finish(self, context, objects, results):
         """Add an object for each table."""
@@ -157,7 +191,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         shared = known_offset(context.scene)
         surfaces, clouds = [], []
         for path, (table, found) in zip(self._paths, read, strict=True):
-            if isinstance(table, Splats):
+            if isinstance(table, core.Splats):
                 clouds.append(self._add_splats(context, path.stem, table))
                 continue
             turned = _turned_up(table, self.up) if self.up != "Z" else table
@@ -166,7 +200,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             context.view_layer.objects.active = obj
             self._tell(obj, table, shared)
             if isinstance(found, str):
-                self.report({"INFO"}, f"{obj.name} is shown as dots. {found}")
+                self.note(f"{obj.name} is shown as dots. {found}", obj)
             elif found is not None:
                 surfaces.append(obj)
                 if DISC not in obj.data.attributes:  # those of the file, if there are any, may have been turned
@@ -178,12 +212,16 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         _convert(context, every if self.kind == "POINTCLOUD" else clouds)
         for obj in every:
             obj.select_set(True)
+            deselect(obj.data)  # else the first group would hold all points
         for obj in clouds:
             mark(obj.data)
             if self.surface and not self.sequence and point_count(obj.data) <= _DRAWN and not is_drawn(obj.data):
                 tell("splats_found", obj)
         for obj in surfaces:  # Convert would have taken discs for points
             tell("surface_found", obj)
+        colored = [obj for obj in every if obj not in surfaces and own_colors(obj.data)]
+        for objects in [colored] if self.sequence and colored else [[obj] for obj in colored]:
+            tell("colors_found", objects)
         if self.sequence:
             self._join(context)
 
@@ -194,28 +232,37 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         obj.select_set(True)
         context.view_layer.objects.active = obj
         for notice in splats.notices:
-            self.report({"WARNING"}, notice)
+            self.warn(notice, obj)
         degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
         self.report({"INFO"}, f"{obj.name}: {len(splats):,} Gaussian splats with harmonics of degree {degree}")
         return obj
 
     def _join(self, context):
-        """Let one object show those just imported, one at each frame from the scene's first one on."""
+        """Let one object show those just imported: one at each frame from the scene's first one on, or by numbers."""
         frames, first = context.selected_objects, context.scene.frame_start
-        sequence = add_sequence(context, self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence", frames, first)
+        name = self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence"
+        numbers = [frame_number(path) for path in self._paths] if self.numbers else range(first, first + len(frames))
+        sequence = add_sequence(context, name, frames, numbers)
         sequence.select_set(True)
         context.view_layer.objects.active = sequence
-        self.report({"INFO"}, f"{sequence.name}: frames {first} to {first + len(frames) - 1}")
+        for frame in frames:  # which nobody selects
+            for told in frame.meshfree.notices:
+                text = told.text if frame.name in told.text else f"{frame.name}: {told.text}"
+                keep(sequence, told.tool, text, told.level)
+        missing = numbers[-1] - numbers[0] + 1 - len(numbers)
+        rest = f"; {missing} of them have no file and show the one before" if missing else ""
+        self.report({"INFO"}, f"{sequence.name}: frames {numbers[0]} to {numbers[-1]}{rest}")
 
     def _tell(self, obj, table, shared):
         """Report what was imported, and what became of its coordinates."""
-        for notice in table.notices:
-            self.report({"WARNING"}, notice)
+        for notice in (*table.notices, *tell_columns(obj)):
+            self.warn(notice, obj)
         offset = offset_of(obj)
-        shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
-        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
+        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points")
+        if offset.any():
+            self.note(f"{obj.name} is shifted by ({', '.join(f'{0.0 - value:.10g}' for value in offset)})", obj)
         if shared is not None and (offset != shared).any():
-            self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
+            self.warn(f"{obj.name} is too far from the points imported before to share their shift", obj)
 
 
 def _convert(context, objects):
@@ -242,7 +289,7 @@ def _frame_selected(context):
                 bpy.ops.view3d.view_selected()
 
 
-def _read_all(paths, columns, surface, progress):
+def _read_all(paths, columns, choices, surface, progress):
     """Read some files, those that were just read from memory: Adjust Last Operation imports them again.
 
     Returns
@@ -254,25 +301,29 @@ def _read_all(paths, columns, surface, progress):
     for number, path in enumerate(paths):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
-        key = ("file", str(path), columns, state and (state.st_mtime_ns, state.st_size))
-        tables.append(cache.fetch(key, lambda path=path: _read(path, columns)))
+        key = ("file", str(path), state and (state.st_mtime_ns, state.st_size), columns, choices)
+        tables.append(cache.fetch(key, lambda path=path: _read(path, columns, choices)))
     if not surface:
         return [(table, None) for table in tables]
-    total = sum(len(table.points) for table in tables if not isinstance(table, Splats))
+    total = sum(len(table.points) for table in tables if not isinstance(table, core.Splats))
     if total > _QUICK:
         return [(table, f"Discs of {total:,} points take a while: press Show as Surface") for table in tables]
-    return [(table, None if isinstance(table, Splats) else _find_discs(table.points, progress)) for table in tables]
+    return [
+        (table, None if isinstance(table, core.Splats) else _find_discs(table.points, progress)) for table in tables
+    ]
 
 
-def _read(path, columns):
-    return read_points(path, columns) if columns or not holds_splats(path) else read_splats(path)
+def _read(path, columns, choices):
+    """Read one file, as splats where it holds such."""
+    splats = not columns and core.splats.holds_splats(path)
+    return core.read_splats(path) if splats else read_points(path, columns, las=choices)
 
 
 def _find_discs(points, progress):
     """Find how the display is to draw points as a surface, (n, 3); a text where they are none."""
     points = points - points.mean(axis=0)  # far from the origin their squares would have no digits left
     try:
-        found = cache.fetch(cache.content("discs", points), lambda: surface_discs(points, progress=progress))
+        found = cache.fetch(cache.content("discs", points), lambda: core.surface_discs(points, progress=progress))
         shown = discs(found.normals, found.radii, points)
         check_size(DISC, shown)
     except PointCloudError as error:

@@ -2,13 +2,14 @@
 
 import bpy
 
-from ...core import PointCloudError, read_splats, write_splats
+from ... import core
+from ...core import PointCloudError
 from ...core.files import WRITABLE, read_points, write_points
-from ...core.splats import holds_splats
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
+from .columns import tell_columns
 from .objects import add_object, point_table, save_arrays
 from .splats import add_splats, splats_to_write, with_results
 
@@ -41,12 +42,12 @@ def load(path, name: str = "", option: str = "--object", columns: str = ""):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        splats = not columns and holds_splats(path)
+        splats = not columns and core.splats.holds_splats(path)
         add = add_splats if splats else add_object
-        given = read_splats(path) if splats else read_points(path, columns)
-        notices = given.notices
+        given = core.read_splats(path) if splats else read_points(path, columns)
         bpy.ops.wm.read_homefile(use_empty=True)
-        add(path.stem, given, bpy.context.scene.collection)
+        obj = add(path.stem, given, bpy.context.scene.collection)
+        notices = [*given.notices, *tell_columns(obj)]
     elif path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
     else:
@@ -74,19 +75,20 @@ def _choose_object(path, name, option):
     return chosen[0]
 
 
-def save(path, obj, arrays, shown=""):
+def save(path, obj, arrays, shown="") -> list:
     """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, points or splats, or the arrays by name.
 
-    The scene shows the attribute `shown`, or else another result that the points have.
+    The scene shows the attribute `shown`, or else another result that the points have. Returns what is written
+    otherwise than it is.
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
         save_arrays(path, arrays)
     elif suffix == ".ply" and has_splats(obj.data):
-        write_splats(path, with_results(splats_to_write(obj), obj.data))
+        core.write_splats(path, with_results(splats_to_write(obj), obj.data))
     elif suffix in WRITABLE:
         table = point_table(bpy.context, obj)
-        write_points(path, table, double=not table.single)
+        return write_points(path, table, double=not table.single)
     else:
         for other in bpy.context.view_layer.objects:
             other.select_set(other == obj)
@@ -94,6 +96,7 @@ def save(path, obj, arrays, shown=""):
         if names:
             tell("result_written", obj, names[0])
         save_scene(path)
+    return []
 
 
 def save_scene(path):

@@ -6,9 +6,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ...core import Splats
+from ... import core
 from ...core.files.table import split_columns
-from ...core.splats import NEEDED, SplatFile
 from ..objects.attributes import PREFIX, STORABLE, read_attribute, write_attribute
 from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, shown_splats
 from .objects import add_column
@@ -66,7 +65,8 @@ def _known_columns(splats):
     """Return the names of the columns that splats are made of."""
     rest = splats.harmonics.shape[1]
     per_channel = sum(name.startswith("f_rest_") for name in splats.file.columns) // 3
-    return {*NEEDED, *(f"f_rest_{per_channel * channel + number}" for channel in range(3) for number in range(rest))}
+    numbers = (per_channel * channel + number for channel in range(3) for number in range(rest))
+    return {*core.splats.NEEDED, *(f"f_rest_{number}" for number in numbers)}
 
 
 def mark(data):
@@ -81,7 +81,7 @@ def is_drawn(data) -> bool:
     return getattr(data, "type", "") == _TYPE
 
 
-def splats_to_write(obj) -> Splats:
+def splats_to_write(obj) -> "core.Splats":
     """Return the splats of an object as a deformation shows them, in local space, with what their file held."""
     splats, data = shown_splats(obj), obj.data
     written = obj.get(FORMAT)
@@ -101,9 +101,9 @@ def splats_to_write(obj) -> Splats:
         else:  # written from the splats, or deleted since
             values = np.zeros(len(splats))
         columns[name] = values.astype(code)
-    file = SplatFile(columns, written["order"], tuple(written["comments"]))
+    file = core.splats.SplatFile(columns, written["order"], tuple(written["comments"]))
     rest = (splats.positions, splats.scales, splats.rotations, splats.opacities, splats.colors, splats.harmonics)
-    return Splats(*rest, file=file)
+    return core.Splats(*rest, file=file)
 
 
 def with_results(splats, data):
@@ -112,4 +112,4 @@ def with_results(splats, data):
     for layer in data.attributes:
         if layer.name.startswith(PREFIX) and layer.data_type in STORABLE:
             columns.update(split_columns(layer.name, read_attribute(data, layer.name)))
-    return replace(splats, file=(splats.file or SplatFile({}))._replace(columns=columns))
+    return replace(splats, file=(splats.file or core.splats.SplatFile({}))._replace(columns=columns))

@@ -2,6 +2,7 @@
 
 import importlib
 import types
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -194,6 +195,38 @@ class TestSeveralFiles:
         assert everywhere() == before
 
 
+class TestClassesAndWithheldPoints:
+    @pytest.fixture
+    def path(self, tmp_path):
+        """A scan of ground, trees and noise, of which every tenth point is withheld."""
+        import laspy
+
+        las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+        las.x, las.y, las.z = sphere_points().T
+        las.classification, las.withheld = np.arange(1000) % 3 + 5, np.arange(1000) % 10 == 0
+        las.write(str(tmp_path / "a.las"))
+        return tmp_path / "a.las"
+
+    def test_withheld_ones_are_left_out(self, path):
+        assert len(run_import(path).data.vertices) == 900
+
+    def test_or_kept_by_choice(self, path):
+        obj = run_import(path, withheld=True)
+        assert_array_equal(attribute(obj, "withheld"), np.arange(1000) % 10 == 0)
+
+    def test_classes_by_choice(self, path):
+        obj = run_import(path, classes="5, 7")
+        assert len(obj.data.vertices) < 900
+        assert set(attribute(obj, "classification")) == {5, 7}
+
+    def test_what_is_no_class_is_told(self, path):
+        with pytest.raises(RuntimeError, match="'ground' is no class of LAS"):
+            run_import(path, classes="ground")
+        with pytest.raises(RuntimeError, match="no points of the classes 2. Choose some of 5"):
+            run_import(path, classes="2")
+        assert not bpy.data.objects
+
+
 class TestColumns:
     def test_become_attributes(self, tmp_path):
         rows = np.column_stack([sphere_points(), np.arange(1000), np.tile([255, 0, 51], (1000, 1)), sphere_points()])
@@ -252,11 +285,17 @@ class TestColumns:
     def test_are_asked_for_where_text_is_chosen(self, extension):
         importing = importlib.import_module(f"{MODULE}.operators.files.importing")
         asks = importing.MESHFREE_OT_import_points.asks.fget
-        for name, text in (("a.xyz", True), ("b.CSV", True), ("", True), ("a.ply", False), ("a.ptx", False)):
-            chosen = types.SimpleNamespace(files=[], filepath=name)
+        chosen = types.SimpleNamespace(sequence=False)
+        for names, text in (
+            (["a.xyz"], 1),
+            (["b.CSV"], 1),
+            ([""], 1),
+            (["a.ply", "b.txt"], 1),
+            (["a.ply"], 0),
+            (["a.ptx"], 0),
+        ):
+            chosen._chosen = lambda names=names: [Path(name) for name in names]
             assert ("columns" in asks(chosen)) == text
-        several = [types.SimpleNamespace(name=name) for name in ("a.ply", "b.txt")]
-        assert "columns" in asks(types.SimpleNamespace(files=several, filepath=""))
 
     def test_results_come_back_as_results(self, tmp_path):
         obj = add_object(sphere_points())
@@ -294,6 +333,24 @@ def test_up_axis(tmp_path):
     obj = run_import(tmp_path / "a.csv", up="Y")
     assert_allclose(local_points(obj)[0], [1.0, -3.0, 2.0])
     assert_allclose(attribute(obj, "normal")[0], [0.0, 0.0, 1.0])
+
+
+def selected_points(obj):
+    """Which points an object has selected, as the tools of the extension and Edit Mode take them."""
+    return importlib.import_module(f"{MODULE}.operators.tools.select").selection(obj)
+
+
+@pytest.mark.parametrize("kind", ["MESH", "POINTCLOUD"] if bpy.app.version >= (4, 5, 0) else ["MESH"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_an_import_selects_the_objects_and_none_of_their_points(tmp_path, name, kind):
+    WRITERS[name](tmp_path / name, SURVEY)
+    obj = run_import(tmp_path / name, kind=kind)
+    assert bpy.context.selected_objects == [obj]
+    assert not selected_points(obj).any()
+    if kind == "MESH":
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert obj.data.total_vert_sel == 0
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 @pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="Blender makes point clouds of meshes from 4.5 on")

@@ -60,7 +60,8 @@ def test_attributes_named_like_coordinates_and_normals(tmp_path, name):
     read = read_points(tmp_path / name)
     assert_allclose(read.points, POINTS, rtol=0.0, atol=1e-9)
     assert_allclose(read.colors, 1.0)
-    assert read.attributes.keys() == {"flow", "x_2", "flow_z_2", "red_2", "normal", "Höhe"}
+    height = "Hoehe" if name == "a.ply" else "Höhe"  # headers of PLY are ASCII
+    assert read.attributes.keys() == {"flow", "x_2", "flow_z_2", "red_2", "normal", height}
     assert_allclose(read.attributes["flow"], 1.0)
     assert_allclose(read.attributes["x_2"], values)
 
