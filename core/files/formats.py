@@ -38,6 +38,7 @@ _READERS = {
 }
 READABLE = tuple(_READERS)
 WRITABLE = (".ply", ".xyz", ".csv")
+SPLATS = (".splat", ".spz")  # of Gaussian splats alone, which core.splats reads
 
 
 def read_points(path) -> PointTable:
@@ -58,7 +59,8 @@ def read_points(path) -> PointTable:
     """
     suffix = path.suffix.lower()
     if suffix not in _READERS:
-        raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
+        known = ", ".join((*READABLE, *SPLATS))
+        raise PointCloudError(f"{path} is not a file with points. Give one of {known}.")
     with reading(path):
         table = _READERS[suffix](path)
     step = float(np.spacing(np.float32(check_places(table.points, path))))

@@ -96,6 +96,7 @@ class Splats:
         -------
         Splats
             With the covariances F R S^2 R^T F^T. Harmonics turn by the rotation next to F, mirrored where F mirrors.
+            Further lengths of their file grow as the root of the volume.
 
         Raises
         ------
@@ -117,6 +118,7 @@ class Splats:
             scales=scales,
             rotations=rotations,
             harmonics=turned(self.harmonics, orthogonal_parts(maps)) if self.harmonics.shape[1] else self.harmonics,
+            file=self.file and self.file.scaled(np.cbrt(np.abs(np.linalg.det(maps)))),
         )
 
 
