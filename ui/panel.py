@@ -15,7 +15,7 @@ from ..operators.objects.attributes import (
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
-from ..operators.objects.splats import has_splats
+from ..operators.objects.splats import are_left_behind, has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
 from .display import draws_discs, find_display, label, range_node, shown_attribute, step_colors
@@ -25,6 +25,13 @@ from .nodes import LENGTH, MOST
 _LISTED = 20  # eigenvalues in the panel
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
+_LEFT_BEHIND = (
+    ("Splats were turned or scaled", "ERROR"),
+    ("without their ellipsoids, as by", "BLANK1"),
+    ("Blender's own Join and Apply.", "BLANK1"),
+    ("Undo, and use Join Splats or", "BLANK1"),
+    ("Apply Transform to Splats", "BLANK1"),
+)
 _TASKS = (  # that one click does, each with its defaults
     ("smooth", "Clean"),
     ("segment", "Segment"),
@@ -87,7 +94,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             return
         _draw_summary(layout, obj)
         if has_splats(obj.data):
-            _draw_splats(layout, obj.meshfree)
+            _draw_splats(layout, obj)
         elif DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
         row = layout.row(align=True)
@@ -150,14 +157,19 @@ def _draw_summary(layout, obj):
         column.prop(obj.meshfree, "make_single_user")
 
 
-def _draw_splats(layout, settings):
+def _draw_splats(layout, obj):
     """Draw what is there for Gaussian splats alone."""
+    if are_left_behind(obj.data, glance=True):
+        column = layout.column(align=True)
+        for text, icon in _LEFT_BEHIND:
+            column.label(text=text, icon=icon)
     column = layout.column(align=True)
     column.operator("meshfree.show_splats")
     column.operator("meshfree.select_floaters")
     column.operator("meshfree.apply_to_splats")
+    column.operator("meshfree.join_splats")
     column.operator("meshfree.export_splats", text="Export Splats...")
-    layout.prop(settings, "leave_out_floaters")
+    layout.prop(obj.meshfree, "leave_out_floaters")
 
 
 class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):

@@ -43,6 +43,8 @@ from .layouts import completed, hold_enough, near_miss
 from .splats import Splats
 from .spz import is_spz, read_spz
 
+_LOST = 1e-6  # of the extent: rounding of places that matters
+
 
 class SplatFile(NamedTuple):
     """What a file of splats held, from which what was not changed is written again.
@@ -78,12 +80,14 @@ def holds_splats(path) -> bool:
         return False
 
 
-def read_file(path):
+def read_file(path, read=read_points):
     """Read the splats of a file; of one that holds none its points.
 
     Parameters
     ----------
     path : pathlib.Path
+    read : callable
+        What reads points, of a path.
 
     Returns
     -------
@@ -97,7 +101,7 @@ def read_file(path):
     """
     if holds_splats(path):
         return read_splats(path)
-    table = read_points(path)
+    table = read(path)
     missing = near_miss((*PLACES, *table.attributes))
     if missing:
         table.notices.append(f"{path.name} looks like Gaussian splats, but has {missing}: read as plain points.")
@@ -231,12 +235,18 @@ def write_splats(path, splats):
     if file is None or len(file.columns[OPACITY]) != len(splats):
         file = SplatFile({})
     columns = dict(file.columns)
-    place = np.float64 if is_coarse(splats.positions) else np.float32
-    for name, values in _encoded(splats, columns).items():
-        kind = columns[name].dtype if name in columns else place if name in PLACES else np.float32
-        columns[name] = values.astype(kind)
+    double = _needs_double(splats.positions)
+    for name, values in encoded(splats, columns).items():
+        kind = columns[name].dtype if name in columns else np.float32
+        columns[name] = values.astype(np.float64 if double and name in PLACES else kind)
     with replacing(path) as part:
         write_vertex_columns(part, columns, file.order, file.comments)
+
+
+def _needs_double(positions) -> bool:
+    """Whether single precision would hurt places, other than such as came from there."""
+    lost = np.abs(positions.astype(np.float32) - positions).max()
+    return is_coarse(positions) and lost > _LOST * np.ptp(positions, axis=0).max()
 
 
 def _path(given):
@@ -246,7 +256,7 @@ def _path(given):
         raise PointCloudError(f"{given!r} is no name of a file. Give a text or a path.") from error
 
 
-def _encoded(splats, columns):
+def encoded(splats, columns):
     """Return the columns of a file with these splats; numbers that did not change are those of the columns before."""
     result = dict(zip(PLACES, splats.positions.T, strict=True)) | dict(zip(COLORS, splats.colors.T, strict=True))
     rest = splats.harmonics.swapaxes(1, 2).reshape(len(splats), -1)

@@ -9,9 +9,9 @@ import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...core import PointCloudError, Splats, read_splats, surface_discs
-from ...core.files import READABLE, numbered_files, order_frames, read_points
-from ...core.splats import holds_splats
+from ... import core
+from ...core import PointCloudError, Splats, surface_discs
+from ...core.files import READABLE, SPLATS, numbered_files, order_frames, read_points
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
 from ..objects.handlers import tell
@@ -24,7 +24,9 @@ from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
 
-OWN = tuple(suffix for suffix in READABLE if suffix not in (".ply", ".obj"))  # Blender reads those by itself, too
+OWN = tuple(
+    suffix for suffix in (*READABLE, *SPLATS) if suffix not in (".ply", ".obj")
+)  # Blender reads those by itself, too
 
 _QUICK = 80_000  # points whose discs are found in less than two seconds
 _DRAWN = 200_000  # splats whose ellipsoids are drawn by themselves
@@ -38,7 +40,7 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
-    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as vertices"""
+    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, CSV and text files, numpy arrays, or splats"""
 
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
@@ -52,7 +54,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         subtype="FILE_PATH",
         options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
     )
-    filter_glob: file_filter(*READABLE)
+    filter_glob: file_filter(*READABLE, *SPLATS)
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Files",
@@ -70,7 +72,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Axis of the file that points upwards",
         items=[
             ("Z", "Z", "Coordinates as they are in the file, as in Blender and in surveys"),
-            ("Y", "Y", "Turn the points upright that other programs store with Y upwards"),
+            ("Y", "Y", "Turn the points upright that other programs store with Y upwards, as in .spz"),
             ("-Y", "-Y", "Turn the points upright that are stored with Y downwards, as many Gaussian splats are"),
         ],
         default="Z",
@@ -146,13 +148,15 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         surfaces, clouds = [], []
         for path, (table, found) in zip(self._paths, read, strict=True):
             if isinstance(table, Splats):
-                clouds.append(self._add_splats(context, path.stem, table))
+                obj = self._add_splats(context, path.stem, table, shared)
+                clouds.append(obj)
+                shared = shared if shared is not None or OFFSET not in obj else offset_of(obj)
                 continue
             turned = _turned_up(table, self.up) if self.up != "Z" else table
             obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
             obj.select_set(True)
             context.view_layer.objects.active = obj
-            self._tell(obj, table, shared)
+            self._tell(obj, table, shared, f"{len(table.points):,} points")
             if isinstance(found, str):
                 self.report({"INFO"}, f"{obj.name} is shown as dots. {found}")
             elif found is not None:
@@ -175,16 +179,13 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         if self.sequence:
             self._join(context)
 
-    def _add_splats(self, context, name, splats):
+    def _add_splats(self, context, name, splats, shared):
         """Add an object of splats, which keep the numbers of their file: it is the object that is turned upright."""
-        obj = add_splats(name, splats, context.collection)
-        obj.rotation_euler.x = {"Z": 0.0, "Y": 0.5, "-Y": -0.5}[self.up] * np.pi
+        obj = add_splats(name, splats, context.collection, shared, self.up)
         obj.select_set(True)
         context.view_layer.objects.active = obj
-        for notice in splats.notices:
-            self.report({"WARNING"}, notice)
         degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
-        self.report({"INFO"}, f"{obj.name}: {len(splats):,} Gaussian splats with harmonics of degree {degree}")
+        self._tell(obj, splats, shared, f"{len(splats):,} Gaussian splats with harmonics of degree {degree}")
         return obj
 
     def _join(self, context):
@@ -195,13 +196,13 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         context.view_layer.objects.active = sequence
         self.report({"INFO"}, f"{sequence.name}: frames {first} to {first + len(frames) - 1}")
 
-    def _tell(self, obj, table, shared):
+    def _tell(self, obj, table, shared, what):
         """Report what was imported, and what became of its coordinates."""
         for notice in table.notices:
             self.report({"WARNING"}, notice)
         offset = offset_of(obj)
         shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
-        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
+        self.report({"INFO"}, f"{obj.name}: {what}{shift}")
         if shared is not None and (offset != shared).any():
             self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
 
@@ -243,7 +244,7 @@ def _read_all(paths, surface, progress):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
         key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
-        tables.append(cache.fetch(key, lambda path=path: (read_splats if holds_splats(path) else read_points)(path)))
+        tables.append(cache.fetch(key, lambda path=path: core.splats.read_file(path, read_points)))
     if not surface:
         return [(table, None) for table in tables]
     total = sum(len(table.points) for table in tables if not isinstance(table, Splats))

@@ -5,7 +5,7 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ...core import PointCloudError
-from ...core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, replacing
+from ...core.files import READABLE, SPLATS, WRITABLE, PointTable, choose_origin, is_coarse, replacing
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
 from ..objects.attributes import (
@@ -21,7 +21,7 @@ from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions
 
-INPUTS = (*READABLE, ".blend")
+INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
 _COLORS = ("BYTE_COLOR", "FLOAT_COLOR")
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above

@@ -2,9 +2,9 @@
 
 import bpy
 
-from ...core import PointCloudError, read_splats, write_splats
-from ...core.files import WRITABLE, read_points, write_points
-from ...core.splats import holds_splats
+from ... import core
+from ...core import PointCloudError, write_splats
+from ...core.files import WRITABLE, PointTable, write_points
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
@@ -39,10 +39,10 @@ def load(path, name: str = "", option: str = "--object"):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        add, read = (add_splats, read_splats) if holds_splats(path) else (add_object, read_points)
-        given = read(path)
+        given = core.splats.read_file(path)
         notices = given.notices
         bpy.ops.wm.read_homefile(use_empty=True)
+        add = add_object if isinstance(given, PointTable) else add_splats
         add(path.stem, given, bpy.context.scene.collection)
     elif path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
