@@ -20,7 +20,7 @@ _ORDER, _COMMENTS, _COLUMNS = "order", "comments", "columns"
 
 
 def keep_format(obj, file):
-    """Keep the layout of a file on an object."""
+    """Keep on an object how a file is laid out."""
     types = [[name, values.dtype.str[1:]] for name, values in file.columns.items()]
     obj[FORMAT] = json.dumps({_ORDER: file.order, _COMMENTS: file.comments, _COLUMNS: types})
 
