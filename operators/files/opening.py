@@ -4,7 +4,7 @@ import bpy
 
 from ... import core
 from ...core import PointCloudError
-from ...core.files import WRITABLE, read_points, write_points
+from ...core.files import WRITABLE, PointTable, write_points
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
@@ -40,9 +40,9 @@ def load(path, name: str = "", option: str = "--object"):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        add, read = (add_splats, core.read_splats) if core.splats.holds_splats(path) else (add_object, read_points)
-        given = read(path)
+        given = core.splats.read_file(path)
         bpy.ops.wm.read_homefile(use_empty=True)
+        add = add_object if isinstance(given, PointTable) else add_splats
         obj = add(path.stem, given, bpy.context.scene.collection)
         notices = [*given.notices, *tell_columns(obj)]
     elif path.is_file():
