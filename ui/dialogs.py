@@ -4,7 +4,7 @@ import bpy
 
 from ..operators.deform.bake import MESHFREE_OT_deform_bake
 from ..operators.deform.tools import MESHFREE_OT_deform_apply, keyed_empties
-from ..operators.files.exporting import MESHFREE_OT_export_points
+from ..operators.files.exporting import MESHFREE_OT_export_points, MESHFREE_OT_export_splats
 from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, has_group
 from ..operators.running.application import ApplicationOperator
@@ -73,6 +73,7 @@ def _draw(operator, context, names):
 
 # Here, and not when they are registered: it is then that Blender looks whether a class has a layout of its own.
 ApplicationOperator.draw = _draw_tool
-for kind in (MESHFREE_OT_export_points, MESHFREE_OT_import_points, MESHFREE_OT_deform_bake):
+_ASKING = MESHFREE_OT_export_points, MESHFREE_OT_export_splats, MESHFREE_OT_import_points, MESHFREE_OT_deform_bake
+for kind in _ASKING:
     kind.draw = _draw_asked
 MESHFREE_OT_deform_apply.draw = _draw_apply

@@ -16,7 +16,7 @@ _TOOLS = (
     ("signed_distance", "nearest_source", "unwrap", "extend_direction"),
     ("deform_bind", "deform_update", "deform_reset", "deform_apply", "deform_to_shape_key", "deform_unbind"),
     ("deform_bake", "deform_free"),
-    ("apply_to_splats",),
+    ("apply_to_splats", "join_splats"),
     ("minimal_surface",),
     ("stop",),
 )
@@ -100,7 +100,7 @@ def _draw_points_quick(menu, context):
 
 def _draw_import(self, _context):
     self.layout.operator(
-        "meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.ptx/.csv/.npy)"
+        "meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.ptx/.csv/.npy/.splat/.spz)"
     )
 
 

@@ -17,7 +17,7 @@ from ..operators.objects.colors import own_colors
 from ..operators.objects.modifiers import get_input, has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
-from ..operators.objects.splats import has_splats
+from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
 from .display import draws_discs, find_display, label, own_material, range_node, shown_attribute, step_colors
@@ -95,7 +95,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         _draw_summary(layout, context, obj)
         _draw_notices(layout, context, obj)
         if has_splats(obj.data):
-            _draw_splats(layout, obj.meshfree)
+            _draw_splats(layout, context, obj)
         elif DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
         row = layout.row(align=True)
@@ -186,14 +186,17 @@ def _draw_summary(layout, context, obj):
         column.prop(obj.meshfree, "make_single_user")
 
 
-def _draw_splats(layout, settings):
+def _draw_splats(layout, context, obj):
     """Draw what is there for Gaussian splats alone."""
+    if are_left_behind(obj.data, glance=True):
+        draw_text(layout, context, LEFT_BEHIND[0].upper() + LEFT_BEHIND[1:], "ERROR")
     column = layout.column(align=True)
     column.operator("meshfree.show_splats")
     column.operator("meshfree.select_floaters")
     column.operator("meshfree.apply_to_splats")
+    column.operator("meshfree.join_splats")
     column.operator("meshfree.export_splats", text="Export Splats...")
-    layout.prop(settings, "leave_out_floaters")
+    layout.prop(obj.meshfree, "leave_out_floaters")
 
 
 class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):

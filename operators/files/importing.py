@@ -14,6 +14,7 @@ from ...core import PointCloudError
 from ...core.files import (
     READABLE,
     SCANS,
+    SPLATS,
     TEXTS,
     LasChoices,
     frame_number,
@@ -37,7 +38,9 @@ from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
 
-OWN = tuple(suffix for suffix in READABLE if suffix not in (".ply", ".obj"))  # Blender reads those by itself, too
+OWN = tuple(
+    suffix for suffix in (*READABLE, *SPLATS) if suffix not in (".ply", ".obj")
+)  # Blender reads those by itself, too
 
 _QUICK = 80_000  # points whose discs are found in less than two seconds
 _DRAWN = 200_000  # splats whose ellipsoids are drawn by themselves
@@ -51,7 +54,7 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
-    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, PTX, CSV, text and numpy files as vertices"""
+    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, PTX, CSV, text and numpy files, or splats"""
 
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
@@ -63,7 +66,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         subtype="FILE_PATH",
         options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
     )
-    filter_glob: file_filter(*READABLE)
+    filter_glob: file_filter(*READABLE, *SPLATS)
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Files",
@@ -81,7 +84,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Axis of the file that points upwards",
         items=[
             ("Z", "Z", "Coordinates as they are in the file, as in Blender and in surveys"),
-            ("Y", "Y", "Turn the points upright that other programs store with Y upwards"),
+            ("Y", "Y", "Turn the points upright that other programs store with Y upwards, as in .spz"),
             ("-Y", "-Y", "Turn the points upright that are stored with Y downwards, as many Gaussian splats are"),
         ],
         default="Z",
@@ -192,13 +195,15 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         surfaces, clouds = [], []
         for path, (table, found) in zip(self._paths, read, strict=True):
             if isinstance(table, core.Splats):
-                clouds.append(self._add_splats(context, path.stem, table))
+                obj = self._add_splats(context, path.stem, table, shared)
+                clouds.append(obj)
+                shared = shared if shared is not None or OFFSET not in obj else offset_of(obj)
                 continue
             turned = _turned_up(table, self.up) if self.up != "Z" else table
             obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
             obj.select_set(True)
             context.view_layer.objects.active = obj
-            self._tell(obj, table, shared)
+            self._tell(obj, table, shared, f"{len(table.points):,} points")
             if isinstance(found, str):
                 self.note(f"{obj.name} is shown as dots. {found}", obj)
             elif found is not None:
@@ -225,16 +230,13 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         if self.sequence:
             self._join(context)
 
-    def _add_splats(self, context, name, splats):
+    def _add_splats(self, context, name, splats, shared):
         """Add an object of splats, which keep the numbers of their file: it is the object that is turned upright."""
-        obj = add_splats(name, splats, context.collection)
-        obj.rotation_euler.x = {"Z": 0.0, "Y": 0.5, "-Y": -0.5}[self.up] * np.pi
+        obj = add_splats(name, splats, context.collection, shared, self.up)
         obj.select_set(True)
         context.view_layer.objects.active = obj
-        for notice in splats.notices:
-            self.warn(notice, obj)
         degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
-        self.report({"INFO"}, f"{obj.name}: {len(splats):,} Gaussian splats with harmonics of degree {degree}")
+        self._tell(obj, splats, shared, f"{len(splats):,} Gaussian splats with harmonics of degree {degree}")
         return obj
 
     def _join(self, context):
@@ -253,12 +255,12 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         rest = f"; {missing} of them have no file and show the one before" if missing else ""
         self.report({"INFO"}, f"{sequence.name}: frames {numbers[0]} to {numbers[-1]}{rest}")
 
-    def _tell(self, obj, table, shared):
+    def _tell(self, obj, table, shared, what):
         """Report what was imported, and what became of its coordinates."""
         for notice in (*table.notices, *tell_columns(obj)):
             self.warn(notice, obj)
         offset = offset_of(obj)
-        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points")
+        self.report({"INFO"}, f"{obj.name}: {what}")
         if offset.any():
             self.note(f"{obj.name} is shifted by ({', '.join(f'{0.0 - value:.10g}' for value in offset)})", obj)
         if shared is not None and (offset != shared).any():
@@ -315,8 +317,9 @@ def _read_all(paths, columns, choices, surface, progress):
 
 def _read(path, columns, choices):
     """Read one file, as splats where it holds such."""
-    splats = not columns and core.splats.holds_splats(path)
-    return core.read_splats(path) if splats else read_points(path, columns, las=choices)
+    if columns.strip():
+        return read_points(path, columns)
+    return core.splats.read_file(path, lambda path: read_points(path, las=choices))
 
 
 def _find_discs(points, progress):

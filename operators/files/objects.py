@@ -5,7 +5,16 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ...core import PointCloudError
-from ...core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, replacing, split_digits
+from ...core.files import (
+    READABLE,
+    SPLATS,
+    WRITABLE,
+    PointTable,
+    choose_origin,
+    is_coarse,
+    replacing,
+    split_digits,
+)
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
 from ..objects.attributes import (
@@ -26,7 +35,7 @@ from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions
 from .columns import Column, known_digits, read_columns, remember_columns
 
-INPUTS = (*READABLE, ".blend")
+INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
 _PART = 5  # of them that tell the second part of a column

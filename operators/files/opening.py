@@ -4,7 +4,7 @@ import bpy
 
 from ... import core
 from ...core import PointCloudError
-from ...core.files import WRITABLE, read_points, write_points
+from ...core.files import WRITABLE, PointTable, read_points, write_points
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
@@ -42,10 +42,9 @@ def load(path, name: str = "", option: str = "--object", columns: str = ""):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        splats = not columns and core.splats.holds_splats(path)
-        add = add_splats if splats else add_object
-        given = core.read_splats(path) if splats else read_points(path, columns)
+        given = read_points(path, columns) if columns.strip() else core.splats.read_file(path)
         bpy.ops.wm.read_homefile(use_empty=True)
+        add = add_object if isinstance(given, PointTable) else add_splats
         obj = add(path.stem, given, bpy.context.scene.collection)
         notices = [*given.notices, *tell_columns(obj)]
     elif path.is_file():

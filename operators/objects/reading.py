@@ -13,7 +13,7 @@ from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_at
 from .counting import members
 from .groups import chosen_members
 from .modifiers import is_own, is_sequence, modifier_settings
-from .splats import has_splats, read_splats
+from .splats import LEFT_BEHIND, are_left_behind, has_splats, read_splats
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 _CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
@@ -137,6 +137,8 @@ def read_points(context, obj) -> Reading:
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
         notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
+    if are_left_behind(obj.data):
+        notices.append(f"{obj.name}: {LEFT_BEHIND}.")
     judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)
     splats = read_splats(obj.data, with_harmonics=False) if judged else None
     reading = Reading(core.check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)

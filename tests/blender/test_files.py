@@ -543,7 +543,21 @@ class TestMenus:
         ours = handlers.pop("MESHFREE_FH_points")
         assert ours.bl_import_operator == "meshfree.import_points"
         extensions = set(ours.bl_file_extensions.split(";"))
-        assert extensions == {".xyz", ".pts", ".ptx", ".csv", ".txt", ".npy", ".npz", ".pcd", ".las", ".laz", ".e57"}
+        assert extensions == {
+            ".xyz",
+            ".pts",
+            ".ptx",
+            ".csv",
+            ".txt",
+            ".npy",
+            ".npz",
+            ".pcd",
+            ".las",
+            ".laz",
+            ".e57",
+            ".splat",
+            ".spz",
+        }
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
 

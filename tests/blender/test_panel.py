@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests import splat_files
 from tests.blender.clouds import add_object, grid_points, sphere_points
 from tests.blender.splats import add_splats, bar_splats
 
@@ -40,6 +41,7 @@ OPERATORS = (
     "handle_add",
     "harmonic_field",
     "import_points",
+    "join_splats",
     "legend",
     "mesh_surface",
     "minimal_surface",
@@ -70,6 +72,7 @@ OPERATORS = (
 DIALOGS = (  # operators that ask before they work, in a layout of ours
     "compare",
     "export_points",
+    "export_splats",
     "extend_direction",
     "geodesic_distance",
     "harmonic_field",
@@ -250,8 +253,27 @@ def test_panel_of_splats_has_what_is_for_them(core):
     add_object(sphere_points())
     assert "Show Splats" not in draw()
     add_splats(bar_splats(core))
-    names = {"Show Splats", "Select Floaters", "Apply Transform to Splats", "Export Splats...", "leave_out_floaters"}
+    names = {
+        "Show Splats",
+        "Select Floaters",
+        "Apply Transform to Splats",
+        "Join Splats",
+        "Export Splats...",
+        "leave_out_floaters",
+    }
     assert names <= set(draw())
+
+
+def test_panel_tells_of_splats_that_blender_joined(tmp_path):
+    for number in range(2):
+        splat_files.write_ply(tmp_path / "a.ply", splat_files.some_columns(100, seed=number))
+        bpy.ops.meshfree.import_points(filepath=str(tmp_path / "a.ply"))
+    assert "Splats were turned or scaled" not in draw()
+    bpy.context.object.rotation_euler.x = 0.5
+    for obj in bpy.data.objects:
+        obj.select_set(True)
+    bpy.ops.object.join()
+    assert "Splats were turned or scaled" in draw()
 
 
 def test_panel_follows_the_order_of_work():
