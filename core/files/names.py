@@ -21,17 +21,19 @@ _DEGREES = 2  # which of the pairs holds angles
 _PLAIN = ({"z"}, {"2"}, {"3"})
 _HEIGHTS = (
     {"elevation", "elev", "ele", "el"},
-    {"height", "hgt", "ht", "hoehe", "h", "gelaendehoehe", "zed"},
+    {"height", "hgt", "ht", "hoehe", "h", "gelaendehoehe", "zed", "hae"},
     {"altitude", "alt", "altitud", "altura", "hauteur", "altezza", "cota", "quota", "level", "rl", "up", "u"},
     {"depth", "tiefe"},
 )
 _ANY = set().union(*(words for pair in _AXES for words in pair), *_PLAIN, *_HEIGHTS)
 _FILLERS = re.compile(  # words that say nothing of what is measured: where, in which system, in which unit
     r"(points?|pts?|pos|positions?|locations?|loc|vertex|vertices|vert|utm\d*s?|epsg|grid|map|local|world|global"
-    r"|ecef|geo|gps|gnss|wgs\d*|msl|asl|tvd(ss)?|nn|nhn|navd\d*|gk|mga\d*|ellipsoidal|ellipsoid|ell|orthometric|ortho|cent(er|re)"
+    r"|ecef|geo|gps|gnss|wgs\d*|msl|asl|tvd(ss)?|nn|nhn|ue|ueber|wert|navd\d*|gk|mga\d*|ellipsoidal|ellipsoid|ell|ellps|orthometric|ortho|cent(er|re)"
     r"|centroid|mean|m|mm|cm|km|ft|usft|feet|met(er|re)s?|deg|degrees?|dd|p)"
 )
-_JOINED = re.compile(r"(coord(inate)?s?|koord(inaten?)?|koordinaten?|points?|positions?)")  # without a space as well
+_JOINED = re.compile(
+    r"(coord(inate|onnee|enada|inata)?s?|koord(inaten?)?|points?|positions?|(?<![a-z])pos|pos(?![a-z]))"
+)  # without a space as well
 _OTHERS = re.compile(  # of columns that are no places
     r"(.*(id|number|nummer|index|name|time|zeit|date|datum|stamp|code|class|colou?r|norm(al)?|intensity|ance|ivity)"
     r"|no|nos|nr|num|nbr|label|idx|key|station|sta|pkt|punkt|track|line|ring|channel|beam|row|col|column"
@@ -62,8 +64,8 @@ class Places(NamedTuple):
 
 def _words(text):
     """Return the words of a name that say something, in lower case and without accents."""
-    text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text.translate(_SPELLED)).lower())
-    text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    text = unicodedata.normalize("NFKD", text.translate(_SPELLED)).encode("ascii", "ignore").decode()
+    text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text).lower())
     return [word for word in re.findall(r"[a-z0-9]+", text) if not _FILLERS.fullmatch(word)]
 
 
