@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 
@@ -161,7 +162,7 @@ def load(rows, places, others, name):
     list of str
         Notices.
     """
-    notices, others = [], list(others)
+    notices = []
     for _ in range(_ROUNDS):
         try:
             values = _load(rows, places + others)
@@ -169,20 +170,28 @@ def load(rows, places, others, name):
             faults = _find_faults(rows, places, others)
             if not faults:
                 raise
-            fatal = next((text for index, text in faults.items() if index in places and text), "")
-            if fatal:
-                raise InvalidPointsError(
-                    f"{rows.path} does not hold columns of numbers x y z: {fatal}. Correct the file."
-                ) from None
+            _refuse_places(faults, places, rows.path)
             rows.filled = rows.filled or "" in faults.values()
-            for text in filter(None, dict.fromkeys(faults.values())):
-                wrong = [index for index, fault in faults.items() if fault == text]
-                others = [index for index in others if index not in wrong]
-                notices.append(f"{rows.path.name}: left out {brief(', '.join(map(name, wrong)))}, for {text}.")
+            others = [index for index in others if not faults.get(index)]
+            notices += _tell_faults(faults, name, rows.path)
         else:
             return _without_empty(rows, values, places, others, name, notices)
     notices = [f"{rows.path.name}: left out all columns but x y z, for many of them hold text in some rows."]
     return [], _load(rows, places), notices
+
+
+def _refuse_places(faults, places, path):
+    """Refuse a file in which a place is text, or missing."""
+    fatal = next((text for index, text in faults.items() if index in places and text), "")
+    if fatal:
+        raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {fatal}. Correct the file.") from None
+
+
+def _tell_faults(faults, name, path):
+    """Tell which columns are left out, and for what."""
+    wrong = [name(index) for index, text in faults.items() if text]
+    why = next(filter(None, faults.values()), "")
+    return [f"{path.name}: left out {brief(', '.join(wrong))}, for {why}."] if wrong else []
 
 
 def load_whole(rows, index):
@@ -205,8 +214,8 @@ def load_whole(rows, index):
 
 
 def _load(rows, columns, dtype=float):
-    plain = _filled if rows.filled else _plain
-    lines = chain.from_iterable(plain(block, rows.delimiter, columns) for block in _blocks(rows))
+    clean = partial(_filled, columns=columns) if rows.filled else _plain
+    lines = chain.from_iterable(clean(block, rows.delimiter) for block in _blocks(rows))
     return np.loadtxt(lines, dtype=dtype, delimiter=rows.delimiter, usecols=columns, ndmin=2)
 
 
@@ -219,7 +228,7 @@ def _blocks(rows):
         left = max(left - len(lines), 0)
 
 
-def _plain(lines, delimiter, _):
+def _plain(lines, delimiter):
     """Return lines as numpy reads them: it knows comments with # alone, decimal points, and no quotes."""
     if delimiter is not None and any(map(str.isspace, lines)):
         lines = ["" if line.isspace() else line for line in lines]
@@ -235,7 +244,7 @@ def _plain(lines, delimiter, _):
 
 def _filled(lines, delimiter, columns):
     """Return lines as numpy reads them, with NaN for cells without a number."""
-    text = "\n".join(_plain([line.replace("#N/A", "") for line in lines], delimiter, columns))
+    text = "\n".join(_plain([line.replace("#N/A", "") for line in lines], delimiter))
     text = re.sub("#.*", "", text)
     if delimiter is None:
         return re.sub(rf"(?i)(?<!\S){_MISSING}(?!\S)", "nan", text).split("\n")
