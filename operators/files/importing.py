@@ -12,7 +12,6 @@ from bpy_extras.io_utils import ImportHelper
 from ...core import PointCloudError, Splats, read_splats, surface_discs
 from ...core.files import (
     READABLE,
-    SCANS,
     LasChoices,
     frame_number,
     numbered_files,
@@ -125,10 +124,9 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
 
     @property
     def asks(self):
-        """Names of the settings: some are those of sequences, and of a kind of file."""
+        """Names of the settings: numbers are those of a sequence."""
         sequence = ("sequence", "numbers") if self.sequence else ("sequence",)
-        scans = ("classes", "withheld") if any(path.suffix.lower() in SCANS for path in self._chosen()) else ()
-        return "up", "kind", "attributes", *scans, "surface", *sequence, "frame"
+        return "up", "kind", "attributes", "classes", "withheld", "surface", *sequence, "frame"
 
     @classmethod
     def obstacle(cls, context):
