@@ -6,26 +6,32 @@ from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import (
     ALONG_SURFACE,
     APPLICATIONS,
+    DEVIATION,
     DISC,
     RESULTS,
     eigenvector_name,
     mode_number,
     point_count,
 )
-from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
+from ..operators.objects.colors import own_colors
+from ..operators.objects.modifiers import get_input, has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
-from ..operators.objects.splats import has_splats
+from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
-from .display import draws_discs, find_display, label, range_node, shown_attribute, step_colors
+from .display import draws_discs, find_display, label, own_material, range_node, shown_attribute, step_colors
 from .legend import find_legend
 from .nodes import LENGTH, MOST
+from .scale import shown_scale
+from .wrapping import draw_text
 
 _LISTED = 20  # eigenvalues in the panel
+_NOTICES = 6  # there at a time
+_CROSS = 32.0  # width of the cross beside a notice, and of the box around it
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
-_TASKS = (  # that one click does, each with its defaults
+TASKS = (  # that one click does, each with its defaults
     ("smooth", "Clean"),
     ("segment", "Segment"),
     ("principal_curvatures", "Curvature"),
@@ -68,26 +74,28 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         obj = context.object
         job = running()
         if job is not None:
-            _draw_job(layout, job)
+            _draw_job(layout, context, job)
         reason = obstacle(obj)
         handled = handled_object(obj, context.scene)
         if reason and handled != obj:
             column = layout.column(align=True)
-            column.label(text=f'Handle of "{handled.name}"', icon="OUTLINER_OB_EMPTY")
-            column.label(text="G moves it, R turns it", icon="BLANK1")
+            draw_text(column, context, f'Handle of "{handled.name}"', "OUTLINER_OB_EMPTY")
+            draw_text(column, context, "G moves it, R turns it", "BLANK1")
             return  # the panel of the deformation tells more
         if reason:
             column = layout.column(align=True)
             for sentence in (reason if obstacle(obj, ("EDIT",)) else _EDITING).split(". "):
-                column.label(text=sentence)
+                draw_text(column, context, sentence)
+            _draw_notices(layout, context, obj)
             if obj is not None and any(map(is_sequence, obj.modifiers)):
                 layout.operator("meshfree.analyze_sequence", text="Analyze Sequence...", icon="SEQUENCE")
             elif context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
-        _draw_summary(layout, obj)
+        _draw_summary(layout, context, obj)
+        _draw_notices(layout, context, obj)
         if has_splats(obj.data):
-            _draw_splats(layout, obj.meshfree)
+            _draw_splats(layout, context, obj)
         elif DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
         row = layout.row(align=True)
@@ -96,19 +104,48 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         if is_analyzed(obj):
             _draw_result(layout, obj.meshfree)
             if is_stale(obj, glance=True):
-                layout.label(text="Results are stale: analyze again", icon="ERROR")
+                draw_text(layout, context, "Results are stale: analyze again", "ERROR")
+        _draw_compared(layout, context, obj)
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        for name, text in _TASKS:
+        for name, text in TASKS:
             grid.operator(f"meshfree.{name}", text=text).at_once = True
 
 
-def _draw_job(layout, job):
+def _draw_job(layout, context, job):
     """Draw what is computed, how far it is, and how to stop it."""
     column = layout.column(align=True)
-    column.label(text=f"{job.label} (Esc to Stop)")
+    draw_text(column, context, f"{job.label} (Esc to Stop)")
     row = column.row(align=True)
     row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
     row.operator("meshfree.stop", text="", icon="X")
+
+
+def _draw_compared(layout, context, obj):
+    """Draw what an object was compared with, and what turns that round."""
+    kept = obj.meshfree
+    if kept.compared_with is None or DEVIATION not in obj.data.attributes:
+        return
+    hidden = ", which is hidden" if kept.compared_with.hide_get() else ""
+    column = layout.column(align=True)
+    draw_text(column, context, f"{obj.name} compared with {kept.compared_with.name}{hidden}", "INFO")
+    column.operator("meshfree.compare_swap", text="Swap").greatest = kept.compared_within
+
+
+def _draw_notices(layout, context, obj):
+    """Draw what tools told of an object, each with a cross that dismisses it: the last lines of the status bar."""
+    notices = obj.meshfree.notices if obj is not None else ()
+    if not len(notices):
+        return
+    box = layout.box().column()
+    for index, told in list(enumerate(notices))[:_NOTICES]:
+        row = box.row(align=True)
+        icon = "ERROR" if told.level == "WARNING" else "INFO"
+        draw_text(row, context, f"{told.tool}: {told.text}", icon, taken=_CROSS)
+        row.operator("meshfree.dismiss", text="", icon="X").index = index
+    if len(notices) > _NOTICES:
+        draw_text(box, context, f"and {len(notices) - _NOTICES} more, seen when these are dismissed")
+    if len(notices) > 1:
+        box.operator("meshfree.dismiss", text="Dismiss All").index = -1
 
 
 def _draw_result(layout, result):
@@ -129,35 +166,37 @@ def _draw_result(layout, result):
         row.label(text=value)
 
 
-def _draw_summary(layout, obj):
+def _draw_summary(layout, context, obj):
     mesh = obj.data
     column = layout.column(align=True)
-    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon=f"OUTLINER_OB_{obj.type}")
+    draw_text(column, context, f"{obj.name}: {point_count(mesh):,} points", f"OUTLINER_OB_{obj.type}")
     if obj.type == "MESH" and mesh.polygons:
-        column.label(text=f"Faces not used: {len(mesh.polygons):,}", icon="INFO")
+        draw_text(column, context, f"Faces not used: {len(mesh.polygons):,}", "INFO")
     scale = obj.matrix_world.to_scale()
     if max(abs(factor - 1.0) for factor in scale) > 1e-5:
         shown = ", ".join(f"{factor:.4g}" for factor in scale)
-        column.label(text=f"Object scale ({shown}) is applied", icon="INFO")
-        column.label(text="to lengths and areas", icon="BLANK1")
+        draw_text(column, context, f"Object scale ({shown}) is applied to lengths and areas", "INFO")
     modifiers = [modifier for modifier in obj.modifiers if not is_own(modifier)]
     if modifiers:
         what = "used" if obj.meshfree.use_modifiers else "left out"
         column.label(text=f"Modifiers {what}: {len(modifiers)}", icon="MODIFIER")
         column.prop(obj.meshfree, "use_modifiers")
     if sharing_objects(obj):
-        column.label(text="Other objects share this mesh", icon="INFO")
+        draw_text(column, context, "Other objects share this mesh", "INFO")
         column.prop(obj.meshfree, "make_single_user")
 
 
-def _draw_splats(layout, settings):
+def _draw_splats(layout, context, obj):
     """Draw what is there for Gaussian splats alone."""
+    if are_left_behind(obj.data, glance=True):
+        draw_text(layout, context, LEFT_BEHIND[0].upper() + LEFT_BEHIND[1:], "ERROR")
     column = layout.column(align=True)
     column.operator("meshfree.show_splats")
     column.operator("meshfree.select_floaters")
     column.operator("meshfree.apply_to_splats")
+    column.operator("meshfree.join_splats")
     column.operator("meshfree.export_splats", text="Export Splats...")
-    layout.prop(settings, "leave_out_floaters")
+    layout.prop(obj.meshfree, "leave_out_floaters")
 
 
 class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
@@ -216,14 +255,14 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for mode, eigenvalue in enumerate(eigenvalues[:_LISTED], start=1):
             shown_value = eigenvalue if eigenvalue > 1e-9 * eigenvalues[-1] else 0.0  # 0 up to rounding
-            text, name = f"{mode}:  {shown_value:.5g}", eigenvector_name(mode)
+            text, name = f"{mode}:  {shown_value:.4g}", eigenvector_name(mode)
             if name in obj.data.attributes:
                 grid.operator("meshfree.colormap", text=text, depress=name == shown).attribute = name
             else:
                 grid.label(text=text)
         if len(eigenvalues) > _LISTED:
-            more = f"and {len(eigenvalues) - _LISTED} more, up to {eigenvalues[-1]:.5g}"
-            layout.label(text=more)
+            more = f"and {len(eigenvalues) - _LISTED} more, up to {eigenvalues[-1]:.4g}"
+            draw_text(layout, context, more)
 
 
 class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
@@ -242,6 +281,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         shown = shown_attribute(obj)
         attributes = obj.data.attributes
         column = layout.column(align=True)
+        _draw_own_looks(column, obj, shown)
         for name in (*RESULTS, *(name for name in APPLICATIONS if name in attributes)):
             row = column.row(align=True)
             row.enabled = name in attributes
@@ -263,18 +303,36 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             _draw_colors(layout, obj)
         if DISC in attributes:
             layout.prop(obj.meshfree, "point_shape")
+            layout.prop(obj.meshfree, "smooth")
             layout.prop(obj.meshfree, "dim_back")
+        layout.prop(obj.meshfree, "shaded", slider=True)
         layout.prop(obj.meshfree, "point_size")
         if not draws_discs(obj):
             layout.prop(*input_property(find_display(obj), MOST), text=MOST)
-        column = layout.column(align=True, heading="Show")
-        column.prop(obj.meshfree, "legend")
-        column.prop(obj.meshfree, "histogram")
-        shows_legend = find_legend(context.scene, obj) is not None
-        layout.operator("meshfree.legend", depress=shows_legend).show = not shows_legend
-        if context.scene.view_settings.view_transform not in _TRUE_COLORS:
-            layout.label(text="Colors differ from the legend:", icon="INFO")
-            layout.prop(context.scene.view_settings, "view_transform")
+        if shown_scale(obj, context.scene) is not None:
+            _draw_legend(layout, context, obj)
+
+
+def _draw_legend(layout, context, obj):
+    """Draw what tells the values of the colors on show, and what makes them differ from it."""
+    column = layout.column(align=True, heading="Show")
+    column.prop(obj.meshfree, "legend")
+    column.prop(obj.meshfree, "histogram")
+    shows_legend = find_legend(context.scene, obj) is not None
+    layout.operator("meshfree.legend", depress=shows_legend).show = not shows_legend
+    if context.scene.view_settings.view_transform not in _TRUE_COLORS:
+        draw_text(layout, context, "Colors differ from the legend:", "INFO")
+        layout.prop(context.scene.view_settings, "view_transform")
+
+
+def _draw_own_looks(column, obj, shown):
+    """Draw buttons to what an object looks like without results: the colors of its points, and its material."""
+    colors, material = own_colors(obj.data), own_material(obj)
+    if colors:
+        column.operator("meshfree.colormap", text="Color", depress=colors == shown).attribute = colors
+    if material is not None and find_display(obj) is not None:
+        seen = get_input(find_display(obj), "Material") == material
+        column.operator("meshfree.own_material", depress=seen)
 
 
 def _draw_colors(layout, obj):

@@ -12,6 +12,7 @@ from .matching import MatchedModes, match_modes
 from .meshing import SurfaceMesh, mesh_surface, values_on_mesh
 from .minimal_surface import MinimalSurface, minimal_surface
 from .segmentation import modes_needed, nodal_domains, segment
-from .selection import grow, opposite_ends
+from .selection import front_point, grow, opposite_ends
+from .slopes import Slopes
 from .smoothing import PointBlend, displace_by_mode, fair_points, roughness, smooth_points, smoothing_base
 from .transport import Transport, logarithmic_map, transport

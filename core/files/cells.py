@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InvalidPointsError
 from .lines import brief, is_number
 
-_DELIMITERS = (";", "\t", None, ",")  # in this order; None is white space
+_DELIMITERS = (";", "\t", "|", None, ",")  # in this order; None is white space
 _HEADER = 20  # lines that are no comments before the first point at most
 _SAMPLE = 100  # rows that tell what columns hold
 _ROUNDS = 20  # times that rows are read anew without a column that turned out to hold no numbers
@@ -207,6 +207,8 @@ def _blocks(rows):
 
 def _plain(lines, delimiter, _):
     """Return lines as numpy reads them: it knows comments with # alone, decimal points, and no quotes."""
+    if delimiter is not None and any(map(str.isspace, lines)):
+        lines = ["" if line.isspace() else line for line in lines]
     text = "\n".join(lines)
     slashes, commas, quotes = "//" in text, delimiter != "," and "," in text, '"' in text
     if not (slashes or commas or quotes):

@@ -46,6 +46,7 @@ SCANS = (".las", ".laz")
 READABLE = tuple(_READERS)
 TEXTS = tuple(suffix for suffix, read in _READERS.items() if read in (read_columns, read_scan))  # rows of columns
 WRITABLE = (".ply", ".xyz", ".csv")
+SPLATS = (".splat", ".spz")  # of Gaussian splats alone, which core.splats reads
 
 
 def read_points(path, columns="", las=LasChoices()) -> PointTable:
@@ -72,7 +73,8 @@ def read_points(path, columns="", las=LasChoices()) -> PointTable:
     """
     suffix = path.suffix.lower()
     if suffix not in _READERS:
-        raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
+        known = ", ".join((*READABLE, *SPLATS))
+        raise PointCloudError(f"{path} is not a file with points. Give one of {known}.")
     if columns.strip() and suffix not in TEXTS:
         raise PointCloudError(f"{path} names its columns itself. Give Columns only with {', '.join(TEXTS)}.")
     with reading(path):

@@ -1,10 +1,13 @@
 """The names of the columns of a text, from the lines before its rows."""
 
+import re
+
 from .cells import is_comment
 from .lines import is_number
 from .names import find_places, is_known
 
 _MARKS = "#/%! "
+_MOST_DIGITS = 15  # of a number of a point
 
 
 def find_names(rows, numeric) -> list:
@@ -36,23 +39,18 @@ def find_names(rows, numeric) -> list:
 def _split(line, delimiter):
     """Yield the words of a line that may be names, by all that could separate them."""
     body = line.strip(" \r\n").lstrip(_MARKS) if is_comment(line) else line.strip(" \r\n")
-    bodies = [body, body.partition(":")[2]] if is_comment(line) and ":" in body else [body]
+    bodies = [body.partition(":")[2], body] if is_comment(line) and ":" in body else [body]
     for text in bodies:
-        for separator in dict.fromkeys((delimiter or ",", ",", ";", "\t", None)):
-            parts = text.split(separator) if separator else _without_units(text).split()
+        for separator in dict.fromkeys((delimiter or ",", ",", ";", "\t", "|", None)):
+            parts = text.split(separator) if separator else _closed(text).split()
             names = [name.strip().strip("\"'").strip() for name in parts]
             if len(names) > 2:
                 yield names
 
 
-def _without_units(text):
-    """Return text without what stands in brackets: it may have spaces before and in it."""
-    depth, result = 0, []
-    for character in text:
-        depth += character in "[("
-        result.append("" if depth else character)
-        depth = max(depth - (character in "])"), 0)
-    return "".join(result)
+def _closed(text):
+    """Return text with its brackets closed up to the words before them, so that white space divides names alone."""
+    return re.sub(r"\s*([\[(])([^\])]*)", lambda match: match[1] + "_".join(match[2].split()), text)
 
 
 def _fit(names, marked, rows, numeric):
@@ -77,21 +75,25 @@ def _fit(names, marked, rows, numeric):
     return _distinct(names) if found and found.sure else []
 
 
-def counts(rows):
-    """Tell whether the first column counts the rows."""
-    words = [row[0] for row in rows.sample]
-    return (
-        len(words) > 2
-        and all(word.isdecimal() for word in words)
-        and [int(word) for word in words] == [*range(int(words[0]), int(words[0]) + len(words))]
-    )
+def counts(rows, index=0) -> bool:
+    """Tell whether a column counts the rows."""
+    words = [row[index] for row in rows.sample if index < len(row)]
+    if len(words) < 3 or not all(word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS for word in words):
+        return False
+    first = int(words[0])
+    return [int(word) for word in words] == [*range(first, first + len(words))]
+
+
+def unnamed(index) -> str:
+    """Return what a column without a name is called, by its number in the file."""
+    return f"column_{index + 1}"
 
 
 def _distinct(names):
     """Number names that come again."""
     result = []
     for index, name in enumerate(names):
-        name = f"column_{index + 1}" if name == "" else name
+        name = unnamed(index) if name == "" else name
         again = sum(other == name for other in names[:index]) if name else 0
         result.append(f"{name}_{again + 1}" if again else name)
     return result

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from ..errors import InvalidPointsError
 from .cells import kinds
-from .header import counts, find_names
+from .header import counts, find_names, unnamed
 from .lines import brief
 from .names import find_places, is_known
 
@@ -40,7 +40,7 @@ class Layout(NamedTuple):
 
     def label(self, index):
         """Return the name of a column, or one by its number in the file."""
-        return self.names[index] or f"column_{index + 1}"
+        return self.names[index] or unnamed(index)
 
 
 def given_layout(columns, rows) -> Layout:
@@ -111,13 +111,14 @@ def find_layout(rows, usual) -> Layout:
     others = [index for index in read if index not in places]
     layout = Layout(names, places, others, notices, _announced(rows), bool(found and found.degrees))
     texts = [layout.label(index) for index in textual if index < len(names)]
-    empty = [name for index, name in enumerate(names) if name and index not in (*numeric, *textual)]
+    there = (*numeric, *textual)
+    empty = [name for index, name in enumerate(names) if index not in there and name not in (None, unnamed(index))]
     notices += _tell_texts(texts, rows.path)
     if empty:
         notices.append(f"{rows.path.name}: left out {brief(', '.join(empty))}, which has no numbers.")
     if len(read) < len(numeric):
         notices.append(
-            f"{rows.path.name}: left out {len(numeric) - len(read)} columns or more at the end, a list without names."
+            f"{rows.path.name}: left out {len(numeric) - len(read)} columns or more at the end, which have no names."
         )
     return layout
 
@@ -144,8 +145,9 @@ def _refuse_known(names, path):
 
 
 def _first_places(rows, numeric):
-    """Return the first three columns of numbers; not one before them that counts the points."""
-    return numeric[1:4] if len(numeric) > 3 and numeric[0] == 0 and counts(rows) else numeric[:3]
+    """Return the first three columns of numbers; not one before them that counts the points, as they do not."""
+    counted = len(numeric) > 3 and counts(rows, numeric[0]) and not counts(rows, numeric[1])
+    return numeric[1:4] if counted else numeric[:3]
 
 
 def _tell_texts(texts, path):

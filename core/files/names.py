@@ -27,8 +27,8 @@ _HEIGHTS = (
 )
 _ANY = set().union(*(words for pair in _AXES for words in pair), *_PLAIN, *_HEIGHTS)
 _FILLERS = re.compile(  # words that say nothing of what is measured: where, in which system, in which unit
-    r"(points?|pts?|pos|positions?|locations?|loc|vertex|vertices|vert|utm\d*[ns]?|epsg|grid|map|local|world|global"
-    r"|ecef|geo|gps|gnss|wgs\d*|msl|asl|nn|nhn|navd\d*|gk|mga\d*|ellipsoidal|ellipsoid|ell|orthometric|ortho|cent(er|re)"
+    r"(points?|pts?|pos|positions?|locations?|loc|vertex|vertices|vert|utm\d*s?|epsg|grid|map|local|world|global"
+    r"|ecef|geo|gps|gnss|wgs\d*|msl|asl|tvd(ss)?|nn|nhn|navd\d*|gk|mga\d*|ellipsoidal|ellipsoid|ell|orthometric|ortho|cent(er|re)"
     r"|centroid|mean|m|mm|cm|km|ft|usft|feet|met(er|re)s?|deg|degrees?|dd|p)"
 )
 _JOINED = re.compile(r"(coord(inate)?s?|koord(inaten?)?|koordinaten?|points?|positions?)")  # without a space as well

@@ -102,6 +102,37 @@ def read_vertex_names(path) -> list:
     return next((element.names for element in elements if element.name == "vertex"), [])
 
 
+def read_elements(path):
+    """Read all elements of a PLY file that has no lists, as they stand there; errors as of `read_ply`.
+
+    Returns
+    -------
+    str or None
+        As `PlyVertices.order`.
+    list of str
+        As `PlyVertices.comments`.
+    dict of str to dict of str to ndarray
+        By the names of the elements, their columns by the names of the properties.
+    """
+    found, before = {}, []
+    with open(path, "rb") as file:
+        order, elements, comments = _read_header(file, path)
+        begin = file.tell()
+        for element in elements:
+            if None in element.types:
+                raise InvalidPointsError(
+                    f"{path} has lists in its element {brief(element.name)}. Save it again without."
+                )
+            file.seek(begin)
+            if order is None:
+                columns = read_rows(file, element.types, element.count, path, sum(each.count for each in before))
+            else:
+                columns = _read_binary(file, order, before, element, path)
+            found[element.name] = dict(zip(element.names, columns, strict=True))
+            before.append(element)
+    return order, comments, found
+
+
 def _read_header(file, path):
     """Return the byte order, None for text, the elements and comments; leave the file where the data begin."""
     if file.readline(_LONGEST).strip() != b"ply":

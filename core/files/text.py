@@ -1,5 +1,6 @@
 """Columns of numbers as text: XYZ, CSV, PTS, and the vertices of OBJ files."""
 
+import re
 from functools import partial
 from itertools import chain
 
@@ -9,7 +10,7 @@ from ..errors import InvalidPointsError
 from .cells import Rows, find_rows, load, load_whole
 from .guess import guess_names
 from .layout import find_layout, given_layout
-from .lines import read_text
+from .lines import is_number, read_text
 from .names import standard_names
 from .ptx import holds_ptx, read_ptx
 from .table import PointTable, from_columns, to_columns
@@ -119,7 +120,7 @@ def _without_counts(blocks, path):
                 break
             word = line.strip()
             if word and missing:
-                missing -= 1
+                missing -= missing < count or _holds_numbers(word)
             elif word.isdecimal():
                 count = missing = int(word[:_MOST_DIGITS])
                 counted, lines[index] = True, ""
@@ -136,6 +137,11 @@ def _without_counts(blocks, path):
         raise InvalidPointsError(
             f"{path} announces {count} points, but {count - missing} lines follow. Copy or export the file again."
         )
+
+
+def _holds_numbers(line):
+    """Tell whether a line is a point, and not one of names after a number of points."""
+    return any(map(is_number, re.split(r"[\s,;]+", line)))
 
 
 def read_vertices(path) -> PointTable:

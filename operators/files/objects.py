@@ -5,7 +5,16 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ...core import PointCloudError
-from ...core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, replacing, split_digits
+from ...core.files import (
+    READABLE,
+    SPLATS,
+    WRITABLE,
+    PointTable,
+    choose_origin,
+    is_coarse,
+    replacing,
+    split_digits,
+)
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
 from ..objects.attributes import (
@@ -20,14 +29,14 @@ from ..objects.attributes import (
     type_of,
     write_attribute,
 )
+from ..objects.colors import COLOR, own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions
 from .columns import Column, known_digits, read_columns, remember_columns
 
-INPUTS = (*READABLE, ".blend")
+INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
-_COLORS = ("BYTE_COLOR", "FLOAT_COLOR")
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
 _PART = 5  # of them that tell the second part of a column
 _UNSEEN = DISC, MOVED_DISC, CORNER  # attributes that only draw points
@@ -73,7 +82,7 @@ def add_object(name, table, collection, known=None, with_attributes=True):
                 is_place = column == SCANNER and values.ndim == 2
                 columns |= _add_parts(mesh, column, values - origin if is_place else values)
         if table.colors is not None:
-            layer = mesh.color_attributes.new("Color", "BYTE_COLOR", "POINT")
+            layer = mesh.color_attributes.new(COLOR, "BYTE_COLOR", "POINT")
             layer.data.foreach_set("color_srgb", table.colors.reshape(-1))
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)
@@ -172,11 +181,10 @@ def _world_normals(normals, matrix):
 
 def _read_colors(data):
     """Read the active color attribute of a mesh, or else the first one on points, (n, 4); None without one."""
-    layers = [layer for layer in data.attributes if layer.data_type in _COLORS and layer.domain == "POINT"]
-    if not layers:
+    name = own_colors(data)
+    if not name:
         return None
-    active = data.color_attributes.active_color_name if isinstance(data, bpy.types.Mesh) else ""
-    layer = next((layer for layer in layers if layer.name == active), layers[0])
+    layer = data.attributes[name]
     colors = np.empty(4 * len(layer.data), np.float32)
     layer.data.foreach_get("color_srgb", colors)
     return np.clip(colors.reshape(-1, 4), 0.0, 1.0)

@@ -2,9 +2,9 @@
 
 import bpy
 
-from ...core import PointCloudError, read_splats, write_splats
-from ...core.files import WRITABLE, read_points, write_points
-from ...core.splats import holds_splats
+from ... import core
+from ...core import PointCloudError
+from ...core.files import WRITABLE, PointTable, read_points, write_points
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
@@ -14,7 +14,7 @@ from .objects import add_object, point_table, save_arrays
 from .splats import add_splats, splats_to_write, with_results
 
 
-def load(path, name: str = "", option: str = "--object"):
+def load(path, name: str = "", option: str = "--object", columns: str = ""):
     """Open a file in place of everything that is loaded.
 
     Parameters
@@ -25,6 +25,8 @@ def load(path, name: str = "", option: str = "--object"):
         The object's name; empty for the active one, or else the only mesh.
     option : str
         Of the command line, by which one names it.
+    columns : str
+        Names of the columns of a file of text; empty to find them.
 
     Returns
     -------
@@ -40,9 +42,9 @@ def load(path, name: str = "", option: str = "--object"):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        add, read = (add_splats, read_splats) if holds_splats(path) else (add_object, read_points)
-        given = read(path)
+        given = read_points(path, columns) if columns.strip() else core.splats.read_file(path)
         bpy.ops.wm.read_homefile(use_empty=True)
+        add = add_object if isinstance(given, PointTable) else add_splats
         obj = add(path.stem, given, bpy.context.scene.collection)
         notices = [*given.notices, *tell_columns(obj)]
     elif path.is_file():
@@ -82,7 +84,7 @@ def save(path, obj, arrays, shown="") -> list:
     if suffix == ".npz":
         save_arrays(path, arrays)
     elif suffix == ".ply" and has_splats(obj.data):
-        write_splats(path, with_results(splats_to_write(obj), obj.data))
+        core.write_splats(path, with_results(splats_to_write(obj), obj.data))
     elif suffix in WRITABLE:
         table = point_table(bpy.context, obj)
         return write_points(path, table, double=not table.single)

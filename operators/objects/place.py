@@ -1,4 +1,4 @@
-"""Where an object's points were in the file that they come from: large coordinates are shifted at import."""
+"""Where an object's points were in the file that they come from, and whether the object is seen where it is."""
 
 import numpy as np
 
@@ -27,3 +27,9 @@ def place_of(obj):
 def known_offset(scene):
     """Return the offset of the first object of a scene that has one, which others share if they can; or None."""
     return next((offset_of(obj) for obj in scene.objects if OFFSET in obj), None)
+
+
+def hide(obj, hidden=True):
+    """Hide an object in views and in renders, or show it in both."""
+    obj.hide_set(hidden)
+    obj.hide_render = hidden

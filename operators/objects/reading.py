@@ -6,18 +6,16 @@ from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ...core import PointCloudError, Splats, check_points
-from ...core.geometry.boundary import FEWEST
+from ... import core
+from ...core import PointCloudError
 from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_attribute
 from .counting import members
 from .groups import chosen_members
 from .modifiers import is_own, is_sequence, modifier_settings
-from .splats import has_splats, read_splats
+from .splats import LEFT_BEHIND, are_left_behind, has_splats, read_splats
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
-_MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
 _CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
 
 
@@ -93,7 +91,7 @@ class Reading:
     boundary: np.ndarray | None = None
     notices: list = field(default_factory=list)
     orientation: np.ndarray | None = None
-    splats: Splats | None = None
+    splats: "core.Splats | None" = None
 
     def local(self, vectors):
         """Turn points or shifts as they were read into local ones."""
@@ -139,9 +137,11 @@ def read_points(context, obj) -> Reading:
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
         notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
+    if are_left_behind(obj.data):
+        notices.append(f"{obj.name}: {LEFT_BEHIND}.")
     judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)
     splats = read_splats(obj.data, with_harmonics=False) if judged else None
-    reading = Reading(check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)
+    reading = Reading(core.check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)
     sides = chosen_sides(obj)
     return reading if sides is None else replace(reading, orientation=reading.placed_normals(sides))
 
@@ -166,7 +166,7 @@ def seen_positions(context, obj):
 def boundary_points(obj):
     """Read which points the boundary group of an object holds, (n,) bool; None if the settings name no group."""
     name = obj.meshfree.boundary_group
-    return chosen_members(obj, name, "Boundary Group", FEWEST) if name else None
+    return chosen_members(obj, name, "Boundary Group", core.geometry.FEWEST) if name else None
 
 
 def key_positions(key):
@@ -259,27 +259,10 @@ def find_object(uid):
 
 def spacing(data) -> float:
     """Typical distance between neighbouring points of a mesh or a point cloud in local lengths; 0 if unknown."""
-    return typical_distance(own_positions(data))
+    return core.geometry.typical_distance(own_positions(data))
 
 
 def discs(normals, radii, points):
     """Discs as the display takes them, (n, 3): unit normals times radii in spacings."""
-    spacing = typical_distance(points) or np.median(radii)  # none where many points share a place
+    spacing = core.geometry.typical_distance(points) or np.median(radii)  # none where many points share a place
     return normals * (radii / spacing)[:, None]
-
-
-def typical_distance(positions) -> float:
-    """Typical distance between neighbouring points of a surface, (n, 3); 0 if unknown.
-
-    The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8. Of very many
-    points some are measured, chosen at random, each of which takes as much more as they are fewer.
-    """
-    positions = positions[np.isfinite(positions).all(axis=1)]
-    if len(positions) < 9:
-        return 0.0
-    few = positions
-    if len(positions) > _MEASURED:
-        few = positions[np.random.default_rng(0).choice(len(positions), _MEASURED, replace=False)]
-    sample = few[:: 1 + len(few) // 10_000]
-    distance = np.median(cKDTree(few).query(sample, k=9)[0][:, 8])
-    return float(distance * np.sqrt(np.pi / 8.0 * len(few) / len(positions)))

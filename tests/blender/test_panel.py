@@ -1,12 +1,14 @@
 """The panel draws in every state, and dialogs show every setting."""
 
 import importlib
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 
+from tests import splat_files
 from tests.blender.clouds import add_object, grid_points, sphere_points
 from tests.blender.splats import add_splats, bar_splats
 
@@ -18,6 +20,7 @@ OPERATORS = (
     "apply_to_splats",
     "colormap",
     "compare",
+    "compare_swap",
     "convert",
     "deform_apply",
     "deform_bake",
@@ -27,7 +30,7 @@ OPERATORS = (
     "deform_to_shape_key",
     "deform_unbind",
     "deform_update",
-    "escape",
+    "dismiss",
     "export_eigenvalues",
     "export_operator",
     "export_points",
@@ -38,6 +41,7 @@ OPERATORS = (
     "handle_add",
     "harmonic_field",
     "import_points",
+    "join_splats",
     "legend",
     "mesh_surface",
     "minimal_surface",
@@ -54,6 +58,7 @@ OPERATORS = (
     "select_group",
     "select_grow",
     "select_boundary",
+    "select_point",
     "separate_by_segment",
     "show_splats",
     "show_surface",
@@ -67,6 +72,7 @@ OPERATORS = (
 DIALOGS = (  # operators that ask before they work, in a layout of ours
     "compare",
     "export_points",
+    "export_splats",
     "extend_direction",
     "geodesic_distance",
     "harmonic_field",
@@ -192,6 +198,32 @@ def test_panel_tells_calmly_of_groups_without_points():
     assert "No points assigned yet" not in draw()
 
 
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [(0, "Select a point in Edit Mode first"), (1, "Uses the selected point"), (12, "Uses the 12 selected points")],
+)
+@pytest.mark.parametrize("name", ["geodesic_distance", "nearest_source", "unwrap", "extend_direction"])
+def test_dialogs_say_that_the_selection_is_used(name, count, text):
+    obj = add_object(sphere_points())
+    obj.data.vertices.foreach_set("select", np.arange(1000) < count)
+    assert texts_of(name)[:2] == ["group", text]
+    obj.vertex_groups.new(name="Source")
+    assert texts_of(name)[:1] == ["group"]
+    assert text not in texts_of(name)
+
+
+def texts_of(name):
+    """Return what the dialog of an operator holds as it opens."""
+    texts, operator = [], getattr(bpy.types, f"MESHFREE_OT_{name}")
+    properties = getattr(bpy.ops.meshfree, name).get_rna_type().properties
+    values = {item.identifier: item.default for item in properties if hasattr(item, "default")}
+    settings = Settings(layout=Layout(texts), **values)
+    settings.asks = value_of(operator.asks, settings)
+    settings.is_repeated = lambda context: False
+    operator.draw(settings, bpy.context)
+    return texts
+
+
 def test_panel_offers_what_tools_wrote_and_updates_only_what_is_on_show(modifiers):
     obj = add_object(sphere_points())
     bpy.ops.meshfree.show_surface()
@@ -221,8 +253,27 @@ def test_panel_of_splats_has_what_is_for_them(core):
     add_object(sphere_points())
     assert "Show Splats" not in draw()
     add_splats(bar_splats(core))
-    names = {"Show Splats", "Select Floaters", "Apply Transform to Splats", "Export Splats...", "leave_out_floaters"}
+    names = {
+        "Show Splats",
+        "Select Floaters",
+        "Apply Transform to Splats",
+        "Join Splats",
+        "Export Splats...",
+        "leave_out_floaters",
+    }
     assert names <= set(draw())
+
+
+def test_panel_tells_of_splats_that_blender_joined(tmp_path):
+    for number in range(2):
+        splat_files.write_ply(tmp_path / "a.ply", splat_files.some_columns(100, seed=number))
+        bpy.ops.meshfree.import_points(filepath=str(tmp_path / "a.ply"))
+    assert "Splats were turned or scaled" not in draw()
+    bpy.context.object.rotation_euler.x = 0.5
+    for obj in bpy.data.objects:
+        obj.select_set(True)
+    bpy.ops.object.join()
+    assert "Splats were turned or scaled" in draw()
 
 
 def test_panel_follows_the_order_of_work():
@@ -242,7 +293,7 @@ def test_panel_follows_the_order_of_work():
 
 def test_panel_counts_the_points_of_each_group():
     obj = add_object(sphere_points())
-    assert draw().count("0") == 6
+    assert draw().count("0") == 8
     obj.data.vertices.foreach_set("select", np.arange(1000) < 12)
     bpy.ops.meshfree.group_from_selection(role="ANCHOR")
     texts = draw()
@@ -267,7 +318,7 @@ def test_panel_names_scale_faces_modifiers_and_sharing():
     bpy.context.view_layer.update()
     texts = draw()
     for text in (
-        "Object scale (1, 2, 1) is applied",
+        "Object scale (1, 2, 1) is applied to lengths and areas",
         "Faces not used: 1",
         "Modifiers left out: 1",
         "Other objects share this mesh",
@@ -331,15 +382,16 @@ def test_dialogs_show_every_setting(name):
     properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if not item.is_hidden]
     properties = [item for item in properties if item.type != "POINTER" and item.identifier != "filepath"]
     values = {item.identifier: item.default for item in properties}
+    hidden = {"_chosen": lambda: [Path("a.las"), Path("b.txt")]} if name == "import_points" else {}
     choices = [item for item in properties if item.type == "ENUM"]
     variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]
     texts = []
     for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
-        settings = Settings(layout=Layout(texts), **values | variant)
+        settings = Settings(layout=Layout(texts), **values | variant | hidden)
         settings.asks = value_of(operator.asks, settings)
         settings.is_repeated = lambda context: False
         operator.draw(settings, bpy.context)
-    assert set(texts) - {"No points assigned yet"} == set(values)
+    assert {text for text in texts if " " not in text} == set(values)
 
 
 @pytest.mark.parametrize("name", OPERATORS)
@@ -351,6 +403,7 @@ def test_adjust_last_operation_offers_what_is_quick(name):
     values = {item.identifier: item.default for item in properties if item.type != "POINTER"}
     for variant in ({}, {"keep": "AREA"}, {"source": "x"}):
         settings = Settings(**values | {key: value for key, value in variant.items() if key in values})
+        settings.wanted = 10  # modes of an analysis
         quick = value_of(operator.adjustable, settings)
         texts = []
         settings.layout, settings.adjustable, settings.is_repeated = Layout(texts), quick, lambda context: True
@@ -384,3 +437,15 @@ def test_every_option_of_core_is_a_setting_with_its_default(extension, core):
 def test_tab():
     for name in PANELS:
         assert getattr(bpy.types, f"MESHFREE_PT_{name}").bl_category == "Mesh-Free"
+
+
+@pytest.mark.parametrize(("name", "count"), [("analyze", {"modes": 10}), ("spectrum", {"count": 10})])
+def test_how_many_modes_to_write_is_asked_only_where_not_all_are(name, count):
+    (setting,) = count
+    kind = getattr(bpy.types, f"MESHFREE_OT_{name}")
+    for wanted, offered in ((10, ("show",)), (50, ("show",)), (51, ("write_limit", "show"))):
+        assert kind.adjustable.fget(SimpleNamespace(wanted=wanted, **{setting: wanted})) == offered
+
+
+def test_the_detail_of_a_mesh_can_be_adjusted():
+    assert "detail" in bpy.types.MESHFREE_OT_mesh_surface.adjustable

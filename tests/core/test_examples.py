@@ -18,6 +18,7 @@ SHOWN = [
     "LaplacianOptions",
     "LaplacianOptions.paper",
     "Prolongation",
+    "Slopes",
     "Transport",
     "blue_noise_subset",
     "build_laplacian",
