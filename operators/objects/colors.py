@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 
+from ... import core
 from .attributes import read_attribute
 from .splats import BASE, has_splats
 
@@ -29,9 +30,7 @@ def own_colors(data) -> str:
 
 def splat_colors(data):
     """Return the colors that splats have from all sides alike, linear and opaque, (n, 4)."""
-    from ...core.splats.harmonics import CONSTANT  # not before it is needed
-
     base = read_attribute(data, BASE)
-    base[:, :3] = np.maximum(CONSTANT * base[:, :3] + 0.5, 0.0) ** _GAMMA
+    base[:, :3] = np.maximum(core.splats.CONSTANT * base[:, :3] + 0.5, 0.0) ** _GAMMA
     base[:, 3] = 1.0
     return base

@@ -34,7 +34,7 @@ from ..objects.groups import (
     role_group,
 )
 from ..objects.handlers import tell
-from ..objects.reading import obstacle, sharing_objects, typical_distance
+from ..objects.reading import obstacle, sharing_objects
 from ..objects.splats import read_splats
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
@@ -399,7 +399,7 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
             matrix = np.array(obj.matrix_world)
             points = positions_now(obj) @ matrix[:3, :3].T + matrix[:3, 3]
             points[_hidden(obj)] = np.nan
-            index = core.front_point(points, eye, direction, 2.0 * typical_distance(points))
+            index = core.front_point(points, eye, direction, 2.0 * core.geometry.typical_distance(points))
             if index >= 0:
                 found.append(((points[index] - eye) @ direction, obj.name, obj, index))
         return min(found)[2:] if found else None
