@@ -6,6 +6,7 @@ from ...core import PointCloudError, read_splats, write_splats
 from ...core.files import WRITABLE, read_points, write_points
 from ...core.splats import holds_splats
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
+from ..objects.colors import own_colors
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
@@ -74,7 +75,7 @@ def _choose_object(path, name, option):
 def save(path, obj, arrays, shown=""):
     """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, points or splats, or the arrays by name.
 
-    The scene shows the attribute `shown`, or else another result that the points have.
+    The scene shows the attribute `shown`, or else another result that the points have, or their own colors.
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
@@ -90,6 +91,8 @@ def save(path, obj, arrays, shown=""):
         names = [name for name in (shown, *APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
         if names:
             tell("result_written", obj, names[0])
+        elif own_colors(obj.data):
+            tell("colors_found", [obj])
         save_scene(path)
 
 
