@@ -48,6 +48,7 @@ OPERATORS = (
     "mode_shape",
     "nearest_source",
     "orient_normals",
+    "own_material",
     "principal_curvatures",
     "roughness",
     "segment",
