@@ -79,8 +79,7 @@ def save(path, obj, arrays, shown="") -> list:
     """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, points or splats, or the arrays by name.
 
     The scene shows the attribute `shown`, or else another result that the points have, or their own colors. Returns
-    what is written
-    otherwise than it is.
+    what is written otherwise than it is.
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
