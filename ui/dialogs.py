@@ -7,6 +7,8 @@ from ..operators.files.exporting import MESHFREE_OT_export_points
 from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.objects.groups import ROLES, has_group
 from ..operators.running.application import ApplicationOperator
+from ..operators.tools.select import MESHFREE_OT_select_grow
+from ..operators.tools.sequence import MESHFREE_OT_analyze_sequence
 
 
 def draw_setting(layout, settings, name: str, obj):
@@ -17,6 +19,10 @@ def draw_setting(layout, settings, name: str, obj):
         layout.prop_search(settings, name, bpy.data, "objects")
     elif name == "source":
         layout.prop_search(settings, name, obj.data, "attributes")
+    elif name in getattr(settings, "at_zero", ()) and not getattr(settings, name):
+        row = layout.row(align=True)
+        row.prop(settings, name)
+        row.label(text=settings.at_zero[name])
     else:
         layout.prop(settings, name)
 
@@ -47,5 +53,11 @@ def _draw(operator, context, names):
 
 # Here, and not when they are registered: it is then that Blender looks whether a class has a layout of its own.
 ApplicationOperator.draw = _draw_tool
-for kind in (MESHFREE_OT_export_points, MESHFREE_OT_import_points, MESHFREE_OT_deform_bake):
+for kind in (
+    MESHFREE_OT_export_points,
+    MESHFREE_OT_import_points,
+    MESHFREE_OT_deform_bake,
+    MESHFREE_OT_analyze_sequence,
+    MESHFREE_OT_select_grow,
+):
     kind.draw = _draw_asked

@@ -19,7 +19,7 @@ from ..operators.objects.result import area_text, is_analyzed, is_stale, read_ei
 from ..operators.objects.splats import has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
-from .display import draws_discs, find_display, label, range_node, shown_attribute, step_colors
+from .display import draws_discs, find_display, label, range_node, shown_attribute, shows_zeros, step_colors
 from .legend import find_legend
 from .nodes import LENGTH, MOST
 from .scale import shown_scale
@@ -61,6 +61,15 @@ class ReadyPanel(SidebarPanel):
     @classmethod
     def poll(cls, context):
         return not obstacle(context.object)
+
+
+class PropertiesPanel:
+    """A panel in the tab of the object in the Properties editor, with what one in the sidebar has."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
 
 
 class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
@@ -195,12 +204,12 @@ def _draw_splats(layout, settings):
     layout.prop(settings, "leave_out_floaters")
 
 
-class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
-    """Settings that change results"""
+class Settings:
+    """What the panels with the settings have in common."""
 
-    bl_label = "Settings"
-    bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 3  # the last ones
+    @classmethod
+    def poll(cls, context):
+        return not obstacle(context.object)
 
     def draw(self, context):
         layout = self.layout
@@ -217,6 +226,20 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
                 row = column.row(align=True)
                 row.active = _counts(obj.meshfree, name)
                 draw_setting(row, obj.meshfree, name, obj)
+
+
+class MESHFREE_PT_settings(Settings, ReadyPanel, bpy.types.Panel):
+    """Settings that change results"""
+
+    bl_label = "Settings"
+    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 3  # the last ones
+
+
+class MESHFREE_PT_settings_properties(Settings, PropertiesPanel, bpy.types.Panel):
+    """Settings that change results, beside those of the object"""
+
+    bl_label = "Mesh-Free Settings"
 
 
 def _counts(settings, name):
@@ -261,11 +284,8 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
             draw_text(layout, context, more)
 
 
-class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
-    """What is shown as colors on the points"""
-
-    bl_label = "Display"
-    bl_order = 1  # open and long: below the tools, which are closed
+class Display:
+    """What the panels about colors have in common."""
 
     @classmethod
     def poll(cls, context):
@@ -295,7 +315,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
                 if has_input(find_display(obj).node_group, LENGTH):
                     layout.prop(*input_property(find_display(obj), LENGTH), text=LENGTH)
         if range_node(obj) is not None:
-            _draw_colors(layout, obj)
+            _draw_colors(layout, context, obj)
         if DISC in attributes:
             layout.prop(obj.meshfree, "point_shape")
             layout.prop(obj.meshfree, "dim_back")
@@ -304,6 +324,19 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             layout.prop(*input_property(find_display(obj), MOST), text=MOST)
         if shown_scale(obj, context.scene) is not None:
             _draw_legend(layout, context, obj)
+
+
+class MESHFREE_PT_display(Display, ReadyPanel, bpy.types.Panel):
+    """What is shown as colors on the points"""
+
+    bl_label = "Display"
+    bl_order = 1  # open and long: below the tools, which are closed
+
+
+class MESHFREE_PT_display_properties(Display, PropertiesPanel, bpy.types.Panel):
+    """What is shown as colors on the points, beside the settings of the object"""
+
+    bl_label = "Mesh-Free Display"
 
 
 def _draw_legend(layout, context, obj):
@@ -318,7 +351,7 @@ def _draw_legend(layout, context, obj):
         layout.prop(context.scene.view_settings, "view_transform")
 
 
-def _draw_colors(layout, obj):
+def _draw_colors(layout, context, obj):
     """Draw the settings of colors for numbers."""
     settings = obj.meshfree
     column = layout.column(align=True)
@@ -328,7 +361,9 @@ def _draw_colors(layout, obj):
     column.prop(settings, "range_mode")
     if settings.range_mode in {"AUTO", "PERCENTILE", "SYMMETRIC"}:
         column.prop(settings, "coverage")
-    if settings.range_mode == "LOCKED" or not step_colors(obj):
+    if shows_zeros(obj):
+        draw_text(column, context, "All values are zero", "INFO")
+    elif settings.range_mode == "LOCKED" or not step_colors(obj):
         bounds = column.column(align=True)
         bounds.enabled = settings.range_mode == "LOCKED"  # in other modes they tell what the range came to
         bounds.prop(settings, "range_low")
@@ -351,4 +386,11 @@ def _draw_mode_steps(layout, attributes, shown):
         column.operator("meshfree.colormap", text=text, icon=icon, depress=name == shown).attribute = name
 
 
-CLASSES = (MESHFREE_PT_main, MESHFREE_PT_settings, MESHFREE_PT_spectrum, MESHFREE_PT_display)
+CLASSES = (
+    MESHFREE_PT_main,
+    MESHFREE_PT_settings,
+    MESHFREE_PT_spectrum,
+    MESHFREE_PT_display,
+    MESHFREE_PT_display_properties,
+    MESHFREE_PT_settings_properties,
+)

@@ -28,6 +28,7 @@ from .display import (
     draws_discs,
     find_display,
     find_material,
+    is_distance,
     is_texture,
     numbers,
     shown_attribute,
@@ -50,7 +51,7 @@ from .nodes import (
     is_plain,
     stroke_material,
 )
-from .value_range import fit_range
+from .value_range import all_zero, fit_range
 
 _MOST_HANDLES = 6  # that have colors
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
@@ -272,9 +273,10 @@ def _color(obj, name, values):
             chosen = [
                 way if way != "AUTO" else zero for way, zero in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
             ]
-        color_map, low, high = fit_range(without_unreached(name, shown), *chosen, settings.coverage, locked)
+        counted = without_unreached(name, shown)
+        color_map, low, high = fit_range(counted, *chosen, settings.coverage, locked, is_distance(name, values, part))
         if settings.range_mode != "LOCKED":
-            settings.range_low, settings.range_high = low, high
+            settings.range_low, settings.range_high = (0.0, 0.0) if all_zero(counted) else (low, high)
         component_shown = part if values.ndim > 1 else ""
         color_by_number(material, name, component_shown, color_map, low, high, settings, groups)
     dim_back(material, settings.dim_back)
