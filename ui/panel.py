@@ -23,11 +23,11 @@ from .display import draws_discs, find_display, label, range_node, shown_attribu
 from .legend import find_legend
 from .nodes import LENGTH, MOST
 from .scale import shown_scale
-from .wrapping import draw_text
+from .wrapping import beside_or_below, draw_text, split_properties
 
 _LISTED = 20  # eigenvalues in the panel
 _NOTICES = 6  # there at a time
-_CROSS = 32.0  # width of the cross beside a notice, and of the box around it
+_CROSS = 44.0  # width of the cross beside a notice, and of the box around it
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
 _TASKS = (  # that one click does, each with its defaults
@@ -106,11 +106,11 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             _draw_splats(layout, obj.meshfree)
         elif DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
-        row = layout.row(align=True)
+        row = beside_or_below(layout, context, "Analyze Points", "Modes 100")
         row.operator("meshfree.analyze").modes = obj.meshfree.modes
         row.prop(obj.meshfree, "modes")
         if is_analyzed(obj):
-            _draw_result(layout, obj.meshfree)
+            _draw_result(layout, context, obj.meshfree)
             if is_stale(obj, glance=True):
                 draw_text(layout, context, "Results are stale: analyze again", "ERROR")
         _draw_compared(layout, context, obj)
@@ -156,7 +156,7 @@ def _draw_notices(layout, context, obj):
         box.operator("meshfree.dismiss", text="Dismiss All").index = -1
 
 
-def _draw_result(layout, result):
+def _draw_result(layout, context, result):
     """Draw the total area, and of components, boundaries and points left out what is worth telling."""
     lines = [("Total Area", area_text(result.total_area))]
     if result.subset_count:
@@ -169,7 +169,7 @@ def _draw_result(layout, result):
         lines.append(("Points Left Out", f"{result.left_out_count:,}"))
     column = layout.column(align=True)
     for name, value in lines:
-        row = column.row()
+        row = beside_or_below(column, context, name, value)
         row.label(text=name)
         row.label(text=value)
 
@@ -217,8 +217,7 @@ class Settings:
         row.menu("MESHFREE_MT_presets", text=bpy.types.MESHFREE_MT_presets.bl_label)
         row.operator("meshfree.add_preset", text="", icon="ADD")
         row.operator("meshfree.add_preset", text="", icon="REMOVE").remove_active = True
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        split_properties(layout, context)
         obj = context.object
         for group in _SETTINGS:
             column = layout.column(align=True)
@@ -306,8 +305,7 @@ class Display:
             return
         if shown in attributes:
             layout.operator("meshfree.colormap", text="Update Colors")
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        split_properties(layout, context)
         if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
             layout.prop(obj.meshfree, "component")
             if shown in ALONG_SURFACE:

@@ -43,7 +43,6 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         default=True,
     )
     asks = ("first", "last")
-    at_zero = {"first": "Automatic", "last": "Automatic"}
 
     def invoke(self, context, event):
         self._attended = True

@@ -421,7 +421,7 @@ def open_settings():
     """Numbers of operators that a 0 leaves open, by what their tooltips say: names of operator and setting."""
     for name in OPERATORS:
         for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties:
-            if re.search(r"; 0 (for|shows)(?! none)", item.description):
+            if re.search(r"; 0 (for|shows)(?! none| both)", item.description):
                 yield name, item.identifier
 
 
