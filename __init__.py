@@ -36,7 +36,19 @@ def _modules():
         surface,
     )
     from .operators.tools import select as selecting
-    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
+    from .ui import (
+        applications,
+        colormap,
+        iso_lines,
+        legend,
+        menus,
+        overlay,
+        panel,
+        points,
+        presets,
+        range_selection,
+        show,
+    )
     from .ui import deform as deform_panel
 
     return (
@@ -71,6 +83,7 @@ def _modules():
         colormap,
         legend,
         range_selection,
+        iso_lines,
         presets,
         panel,
         points,

@@ -6,7 +6,7 @@ from ..operators.files.importing import OWN
 
 _TOOLS = (
     ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "legend"),
-    ("mesh_surface", "compare"),
+    ("mesh_surface", "iso_lines_to_curves", "compare"),
     ("principal_curvatures", "roughness", "orient_normals"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),

@@ -38,6 +38,7 @@ OPERATORS = (
     "handle_add",
     "harmonic_field",
     "import_points",
+    "iso_lines_to_curves",
     "legend",
     "mesh_surface",
     "minimal_surface",
