@@ -396,6 +396,7 @@ def _draw_colors(layout, context, obj):
     column.prop(settings, "outside")
     if not step_colors(obj):
         column.prop(settings, "iso_lines")
+        column.operator("meshfree.iso_lines_to_curves")
     layout.operator("meshfree.select_by_range")
 
 

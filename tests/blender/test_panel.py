@@ -42,6 +42,7 @@ OPERATORS = (
     "handle_add",
     "harmonic_field",
     "import_points",
+    "iso_lines_to_curves",
     "join_splats",
     "legend",
     "mesh_surface",
