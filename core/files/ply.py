@@ -7,6 +7,7 @@ import numpy as np
 from ..errors import InvalidPointsError
 from .ascii_words import ascii_words
 from .lines import brief
+from .ply_lists import end_of_records, read_fixed
 from .polygons import triangles
 from .rows import read_records, read_rows
 from .table import PointTable, from_columns, to_columns
@@ -24,7 +25,12 @@ class _Element(NamedTuple):
     name: str
     count: int
     names: list  # of the properties
-    types: list  # numpy's codes; None for a list
+    types: list  # numpy's codes; a pair for a list: of its length and of its items
+
+    @property
+    def lists(self):
+        """Names of the properties that are lists."""
+        return [name for name, code in zip(self.names, self.types, strict=True) if isinstance(code, tuple)]
 
 
 class PlyVertices(NamedTuple):
@@ -73,23 +79,20 @@ def read_vertex_columns(path) -> PlyVertices:
             )
         vertex = elements[names.index("vertex")]
         before = [element for element in elements[: names.index("vertex")] if element.count]
-        for element in (vertex, *before):
-            if None in element.types:
-                raise InvalidPointsError(
-                    f"{path} has lists in its element {brief(element.name)}, before or among its points. Save it again"
-                    " with plain vertices first."
-                )
         if order is None:
-            skipped = sum(element.count for element in before)
-            columns = read_rows(file, vertex.types, vertex.count, path, skipped)
+            types = [None if isinstance(code, tuple) else code for code in vertex.types]
+            columns = read_rows(file, types, vertex.count, path, sum(element.count for element in before))
         else:
             columns = _read_binary(file, order, before, vertex, path)
+    single = [name for name in vertex.names if name not in vertex.lists]
     notices = [
         f"{path.name}: left out {element.count} {brief(element.name)} elements. Only points are read."
         for element in elements
         if element is not vertex and element.count
     ]
-    return PlyVertices(dict(zip(vertex.names, columns, strict=True)), order, comments, notices)
+    if vertex.lists:
+        notices.append(f"{path.name}: left out {brief(', '.join(vertex.lists))}, lists of numbers at each point.")
+    return PlyVertices(dict(zip(single, columns, strict=True)), order, comments, notices)
 
 
 def read_vertex_names(path) -> list:
@@ -150,7 +153,7 @@ def _read_header(file, path):
                 elements.append(_Element(name, int(count), [], []))
             case ["property", "list", length, item, name] if elements and length in _TYPES and item in _TYPES:
                 elements[-1].names.append(name)
-                elements[-1].types.append(None)
+                elements[-1].types.append((_TYPES[length], _TYPES[item]))
             case ["property", kind, name] if elements and kind in _TYPES:
                 elements[-1].names.append(name)
                 elements[-1].types.append(_TYPES[kind])
@@ -163,11 +166,12 @@ def _read_header(file, path):
 
 
 def _read_binary(file, order, before, vertex, path):
-    *skipped, record = (
-        np.dtype([(f"f{index}", order + code) for index, code in enumerate(element.types)])
-        for element in (*before, vertex)
-    )
-    begin = file.tell() + sum(element.count * kind.itemsize for element, kind in zip(before, skipped, strict=True))
+    begin = file.tell()
+    for element in before:
+        begin = end_of_records(file, begin, order, element.types, element.count, path)
+    if vertex.lists:
+        return read_fixed(file, begin, order, vertex.types, vertex.count, path)
+    record = np.dtype([(f"f{index}", order + code) for index, code in enumerate(vertex.types)])
     rows = read_records(file, begin, record, vertex.count, path)
     return [rows[f"f{index}"].astype(code) for index, code in enumerate(vertex.types)]
 

@@ -32,6 +32,7 @@ SHOWN = [
     "grow",
     "harmonic_field",
     "heat_kernel_signature",
+    "iso_lines",
     "logarithmic_map",
     "match_modes",
     "mean_curvature",

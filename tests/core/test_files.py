@@ -140,7 +140,10 @@ class TestPly:
             (header(*XYZ, count=10**20), "line 4: 'element vertex 1000.*' does not belong"),
             (b"ply\nformat binary_little_endian 1.0\nelement vertex 2\nend_header\n12", "has no x y z among"),
             (header(*XYZ) + b"1 2 3\n4 \xff 6\n", "point 2: could not convert"),
-            (header(*XYZ, "list uchar int many"), "lists in its element vertex"),
+            (
+                header(*XYZ, "list uchar int many") + b"1 2 3 1 4\n1 2 3 2 4\n",
+                "point 2: 5 numbers, which are not those",
+            ),
         ],
     )
     def test_broken_files(self, tmp_path, data, text):
