@@ -131,7 +131,7 @@ def find_places(names, numeric):
             plain = [words[index] for index in (x, y, z)] == ["x", "y", "z"]
             return Places([x, y, z], sure=True, plain=plain, degrees=system is _DEGREES)
         if system.z is _HEIGHTS:
-            unknown = [x, y, *(index for index in unknown if index not in (x, y))]
+            unknown = [x, y, *(index for index in unknown if not words[index])]
             break
     return Places(unknown[:3], sure=False, plain=False, degrees=False) if len(unknown) > 2 else None
 
