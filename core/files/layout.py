@@ -6,7 +6,7 @@ from ..errors import InvalidPointsError
 from .cells import is_numeric, kinds, split_row
 from .header import counts, find_names, unnamed
 from .lines import brief
-from .names import find_places, is_known
+from .names import find_places, is_other
 
 _SKIPPED, _REST = "-", "..."  # among names that a user gives
 _GIVE = "If that is wrong, give the names of all columns in Columns at the import"
@@ -103,7 +103,7 @@ def find_layout(rows, usual) -> Layout:
         notices += _tell_places(found, names, rows.path)
     else:
         if names:
-            _refuse_known(names, rows.path)
+            _refuse_others(names, rows.path)
         names = [*usual.get(rows.width, [None] * rows.width)]
         places = _first_places(rows, numeric)
     shortest = min(map(len, rows.sample))
@@ -139,10 +139,10 @@ def _tell_places(found, names, path):
     return notices
 
 
-def _refuse_known(names, path):
-    """Refuse a file most of whose columns are known to be no places."""
+def _refuse_others(names, path):
+    """Refuse a file with names of columns that are no places, if there are too few others; a title has none of them."""
     told = [name for name in names if name]
-    if 2 * sum(map(is_known, told)) > len(told):
+    if any(map(is_other, told)):
         raise InvalidPointsError(
             f"{path} has no x y z among its columns {brief(', '.join(told))}. Give the names of all columns in Columns"
             " at the import, with x y z among them."

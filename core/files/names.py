@@ -49,11 +49,13 @@ _JOINED = re.compile(  # without a space as well
 _OTHERS = re.compile(  # of columns that are no places
     r"(.*(id|number|nummer|index|name|time|zeit|date|datum|stamp|code|class|colou?r|norm(al)?|intensity|ance|ivity)"
     r"|no|nos|nr|num|nbr|label|idx|key|station|sta|pkt|punkt|track|line|ring|channel|beam|row|col|column"
-    r"|[bdfnuvw][xyz]|t|s|sec|secs|seconds?|hour|min|utc|sod|epoch|week|tow"
+    r"|[dfnuvw][xyz]|t|s|sec|secs|seconds?|hour|min|utc|sod|epoch|week|tow"
     r"|classification|desc|description|layer|remarks?|comments?|type|status|flags?|group|cluster|segment|object"
     r"|i|int|intensit(aet|e)|amplitude|returns?|scalar|rgba?|r|g|b|a|red|green|blue|alpha|normals"
-    r"|curvature|error|confidence|quality|roughness|density|range|azimuth|angle|temperature|speed|sigma|std|rms|count|scan)"
+    r"|curvature|error|confidence|quality|roughness|density|range|azimuth|angle|temperature|sigma|std|rms|count|scan"
+    r"|speed|velocity|vel|gyro|rotation|rot|size|scale|width|length)"
 )
+_BRACKETS = re.compile(r"[\[(<{].*?([\])>}]|$)")
 _SPELLED = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue"})
 _ABOUT_COLORS = ("color", "colour", "rgb", "rgba", "diffuse")
 _TRIPLES = {
@@ -77,7 +79,7 @@ class Places(NamedTuple):
 def _words(text):
     """Return the words of a name that say something, in lower case and without accents."""
     text = unicodedata.normalize("NFKD", text.translate(_SPELLED)).encode("ascii", "ignore").decode()
-    text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text).lower())
+    text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text).lower())
     return [word for word in re.findall(r"[a-z0-9]+", text) if not _FILLERS.fullmatch(word)]
 
 
@@ -86,17 +88,20 @@ def _place(name):
 
     What stands in brackets is most often a unit, but may tell it better: Y (Rechtswert).
     """
-    inside = " ".join(re.findall(r"[\[(<{]([^\])>}]*)", name))
-    words = _words(re.sub(r"[\[(<{].*?([\])>}]|$)", " ", name))
-    words += [word for word in _words(inside) if word in _ANY]
-    if not words or not _ANY.issuperset(words):
-        return ""
-    return max(words, key=len)
+    words = _words(_BRACKETS.sub(" ", name))
+    words += [word for word in _words(" ".join(re.findall(r"[\[(<{]([^\])>}]*)", name))) if word in _ANY]
+    return max(words, key=len) if words and _ANY.issuperset(words) else ""
+
+
+def _hint(name):
+    """Return the only word of a name that could tell its axis, beside others that are not known: Shape_X."""
+    words = [word for word in _words(_BRACKETS.sub(" ", name)) if word in _ANY]
+    return words[0] if len(words) == 1 and not is_other(name) else ""
 
 
 def is_other(name) -> bool:
     """Tell whether a name is known as one of what is no place: a number, a time, a color and so on."""
-    words = _words(re.sub(r"[\[(<{].*?([\])>}]|$)", " ", name))
+    words = _words(_BRACKETS.sub(" ", name))
     return not words or (not _place(name) and any(_OTHERS.fullmatch(word) for word in words))
 
 
@@ -121,19 +126,36 @@ def find_places(names, numeric):
     """
     names = [name or "" for name in names]
     words = {index: _place(names[index]) for index in numeric if index < len(names)}
+    found = _find_system(words)
+    if found:
+        return found
+    hints = {index: word or _hint(names[index]) for index, word in words.items()}
+    found = _find_system(hints)
+    if found:
+        return found._replace(sure=False)
     unknown = [index for index in words if not is_other(names[index])]
-    for system in _SYSTEMS:
-        x, y = _first(words, system.x), _first(words, system.y)
-        if x is None or y is None:
-            continue
+    system, *pair = next((found for found in _pairs(hints) if found[0].z is _HEIGHTS), [None])
+    if pair:
+        unknown = [*pair, *(index for index in unknown if not hints[index])]
+    return Places(unknown[:3], False, False, system is _DEGREES) if len(unknown) > 2 else None
+
+
+def _find_system(words):
+    """Find columns of x y z by words that tell their axes, by index."""
+    for system, x, y in _pairs(words):
         z = next((z for z in (_first(words, kind) for kind in system.z) if z is not None), None)
         if z is not None:
             plain = [words[index] for index in (x, y, z)] == ["x", "y", "z"]
             return Places([x, y, z], sure=True, plain=plain, degrees=system is _DEGREES)
-        if system.z is _HEIGHTS:
-            unknown = [x, y, *(index for index in unknown if not words[index])]
-            break
-    return Places(unknown[:3], sure=False, plain=False, degrees=False) if len(unknown) > 2 else None
+    return None
+
+
+def _pairs(words):
+    """Yield systems of which there are x and y, with the indices of both."""
+    for system in _SYSTEMS:
+        x, y = _first(words, system.x), _first(words, system.y)
+        if x is not None and y is not None:
+            yield system, x, y
 
 
 def standard_names(names) -> dict:

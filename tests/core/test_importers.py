@@ -138,6 +138,8 @@ SURVEYS = {  # names, in the order easting, northing, height, and whether a noti
     "Spanish": (["Este", "Norte", "Cota"], True),
     "French": (["Coordonnée X", "Coordonnée Y", "Altitude"], True),
     "German letters": (["X-Wert", "Y-Wert", "Höhe"], True),
+    "joined degrees": (["GPSLongitude", "GPSLatitude", "AltitudeMSL"], True),
+    "Metashape": (["X/Easting", "Y/Northing", "Z/Altitude"], True),
     "systems": (["UTM_Easting", "UTM_Northing", "Ellipsoidal Height"], True),
 }
 STYLES = {
@@ -344,7 +346,10 @@ def test_a_color_without_a_number_leaves_the_others_as_they_are(tmp_path, word):
     [
         ("u,v,w,heat", "u, v, w"),
         ("id,u,v,w", "u, v, w"),
-        ("time,heat,mass,size", "heat, mass, size"),
+        ("time,heat,mass,gain", "heat, mass, gain"),
+        ("time,heat,mass,size", None),
+        ("Point,heat,mass,time", None),
+        ("Y_Local7,X_Local7,Z_Local7,heat", "X_Local7, Y_Local7, Z_Local7"),
         ("x,y,heat,mass", "x, y, heat"),
         ("code,lon,lat,bathymetry", "lon, lat, bathymetry"),
         ("id,time,u,v", None),
