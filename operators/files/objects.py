@@ -4,24 +4,25 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
+from ... import core
 from ...core import PointCloudError
 from ...core.files import (
     READABLE,
     SPLATS,
     WRITABLE,
+    LasChoices,
     PointTable,
     choose_origin,
     is_coarse,
+    read_points,
     replacing,
     split_digits,
 )
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
 from ..objects.attributes import (
-    CORNER,
-    DISC,
-    MOVED_DISC,
     NORMAL,
+    ONLY_DRAWN,
     PREFIX,
     STORABLE,
     own_positions,
@@ -39,7 +40,6 @@ INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
 _PART = 5  # of them that tell the second part of a column
-_UNSEEN = DISC, MOVED_DISC, CORNER  # attributes that only draw points
 
 
 def file_filter(*suffixes):
@@ -50,6 +50,26 @@ def file_filter(*suffixes):
         default=";".join(f"*{suffix}" for suffix in suffixes),
         options={"HIDDEN"},
     )
+
+
+def read_file(path, columns="", las=_ALL):
+    """Read a file, as splats where it holds such.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    columns : str
+        Names of the columns of a file of text; empty to find them.
+    las : LasChoices
+        Which points of LAS files are read.
+
+    Returns
+    -------
+    Splats or PointTable
+    """
+    if columns.strip():
+        return read_points(path, columns)
+    return core.splats.read_file(path, lambda path: read_points(path, las=las))
 
 
 def add_object(name, table, collection, known=None, with_attributes=True):
@@ -167,7 +187,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
 
 
 def _is_column(layer):
-    hidden = layer.name.startswith(".") or layer.name == "position" or layer.name in _UNSEEN
+    hidden = layer.name.startswith(".") or layer.name == "position" or layer.name in ONLY_DRAWN
     return not hidden and layer.domain == "POINT" and layer.data_type in STORABLE
 
 
@@ -282,7 +302,7 @@ def attribute_arrays(obj):
     """Return the points in the world, and what this extension wrote by its names without the lb_."""
     arrays = {"points": file_points(obj)}
     for attribute in obj.data.attributes:
-        if attribute.name.startswith(PREFIX):
+        if attribute.name.startswith(PREFIX) and attribute.name not in ONLY_DRAWN:
             arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)
     for name, values in obj.items():
         if name.startswith(PREFIX):

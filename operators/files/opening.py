@@ -4,17 +4,17 @@ import bpy
 
 from ... import core
 from ...core import PointCloudError
-from ...core.files import WRITABLE, PointTable, read_points, write_points
+from ...core.files import WRITABLE, PointTable, write_points
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
 from .columns import tell_columns
-from .objects import add_object, point_table, save_arrays
+from .objects import add_object, point_table, read_file, save_arrays
 from .splats import add_splats, splats_to_write, with_results
 
 
-def load(path, name: str = "", option: str = "--object", columns: str = ""):
+def load(path, name: str = "", option: str = "--object", read=read_file):
     """Open a file in place of everything that is loaded.
 
     Parameters
@@ -25,8 +25,8 @@ def load(path, name: str = "", option: str = "--object", columns: str = ""):
         The object's name; empty for the active one, or else the only mesh.
     option : str
         Of the command line, by which one names it.
-    columns : str
-        Names of the columns of a file of text; empty to find them.
+    read : callable
+        What reads a file that is no .blend, of a path.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def load(path, name: str = "", option: str = "--object", columns: str = ""):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        given = read_points(path, columns) if columns.strip() else core.splats.read_file(path)
+        given = read(path)
         bpy.ops.wm.read_homefile(use_empty=True)
         add = add_object if isinstance(given, PointTable) else add_splats
         obj = add(path.stem, given, bpy.context.scene.collection)
