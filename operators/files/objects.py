@@ -38,6 +38,7 @@ from .columns import Column, known_digits, read_columns, remember_columns
 
 INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
+_ALL = LasChoices()
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
 _PART = 5  # of them that tell the second part of a column
 

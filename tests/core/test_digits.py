@@ -69,6 +69,17 @@ def test_times_without_decimals_keep_their_differences():
     assert np.abs(found - times).max() < 1e-6
 
 
+def test_gps_times_of_a_flight_keep_a_millisecond_at_least():
+    times = 245_370.0 + np.sort(RANDOM.random(COUNT)) * 4400.0
+    found, parts, _ = kept(times)
+    assert len(parts) == 1
+    assert np.abs(found - times).max() < 5e-4
+
+
+def test_large_numbers_that_no_offset_helps_stay_as_they_are():
+    assert split_digits(1e6 * RANDOM.random(COUNT))[1] is None
+
+
 @pytest.mark.parametrize(
     "values",
     [
