@@ -79,6 +79,22 @@ def join_digits(parts, digits):
     return np.where(np.abs(rounded - values) <= error, rounded, values)
 
 
+def shortest(values):
+    """Return numbers of single precision as doubles of so few decimals that they still are these numbers.
+
+    Single precision keeps 0.123 as 0.123000003.
+    """
+    doubles = values.astype(np.float64)
+    for decimals in range(_MOST_DECIMALS + 1):
+        for rows in slice(_FIRST), slice(None):  # a few tell it mostly
+            rounded = np.round(doubles[rows], decimals)
+            if not _same(rounded.astype(np.float32), values[rows]):
+                break
+        else:
+            return rounded
+    return doubles
+
+
 def _split_whole(values, known):
     low, high = (int(values.min()), int(values.max())) if len(values) else (0, 0)
     if _fit(low, high):
@@ -167,7 +183,7 @@ def _decimals(values):
     for decimals in range(_MOST_DECIMALS + 1):
         if largest * 10.0**decimals >= _EXACT:
             break
-        if all(_same(np.round(part, decimals), part) for part in (values[:_FIRST], values)):
+        if all(_same(np.round(part, decimals), part) for part in (values[:_FIRST], values)):  # a few tell it mostly
             return decimals
     return None
 

@@ -34,7 +34,7 @@ from ..objects.colors import COLOR, own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions
-from .columns import Column, known_digits, read_columns, remember_columns
+from .columns import Column, doubted_columns, known_digits, read_columns, remember_columns
 
 INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
@@ -119,7 +119,10 @@ def _add_parts(mesh, name, values):
     if name.startswith(PREFIX) or (name in (SCANNER, FILE_NORMAL) and values.ndim == 2):
         add_column(mesh, name, values)
         return {}
-    parts, digits = split_digits(values, known_digits(name))
+    parts, digits = split_digits(values)
+    known = None if digits is None else known_digits(name)
+    if known is not None:
+        parts, digits = split_digits(values, known)
     first = add_column(mesh, name, parts[0])
     if digits is None:
         return {}
@@ -165,7 +168,8 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     Returns
     -------
     PointTable
-        With normals and places of scanners of the world. `single` tells that single precision does for the coordinates.
+        With normals and places of scanners of the world. `single` tells that single precision does for the coordinates,
+        and notices tell which columns are in doubt.
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     with np.errstate(invalid="ignore"):  # infinite points have no place when they are turned
@@ -175,7 +179,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     names = [layer.name for layer in data.attributes if _is_column(layer)] if attributes != "NONE" else []
     if attributes == "RESULTS":
         names = [name for name in names if name.startswith(PREFIX)]
-    table.attributes = read_columns(obj, names)
+    table.attributes, table.notices = read_columns(obj, names), doubted_columns(obj) if names else []
     vectors = [name for name in (NORMAL, FILE_NORMAL) if np.ndim(table.attributes.get(name)) == 2]
     normals = [table.attributes.pop(name) for name in vectors]
     if normals:
@@ -306,6 +310,6 @@ def attribute_arrays(obj):
         if attribute.name.startswith(PREFIX) and attribute.name not in ONLY_DRAWN:
             arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)
     for name, values in obj.items():
-        if name.startswith(PREFIX):
+        if name.startswith(PREFIX) and not isinstance(values, str):
             arrays[name.removeprefix(PREFIX)] = np.array(values)
     return arrays

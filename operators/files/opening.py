@@ -87,7 +87,7 @@ def save(path, obj, arrays, shown="") -> list:
         core.write_splats(path, with_results(splats_to_write(obj), obj.data))
     elif suffix in WRITABLE:
         table = point_table(bpy.context, obj)
-        return write_points(path, table, double=not table.single)
+        return [*table.notices, *write_points(path, table, double=not table.single)]
     else:
         for other in bpy.context.view_layer.objects:
             other.select_set(other == obj)

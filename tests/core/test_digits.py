@@ -149,6 +149,17 @@ def test_text_has_all_digits(tmp_path):
     assert [int(value) for value in read.attributes["hash"]] == COLUMNS["hash"].tolist()
 
 
+def test_text_has_no_digits_of_single_precision_alone(tmp_path):
+    values = np.array([0.123, 0.25, -7.5, 0.001], np.float32)
+    table = PointTable(np.column_stack([values, values, values]).astype(np.float64), {"value": values})
+    write_points(tmp_path / "a.csv", table, double=False)
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    assert lines[:2] == ["x,y,z,value", "0.123,0.123,0.123,0.123"]
+    random = RANDOM.random(COUNT).astype(np.float32) * np.float32(1e-5)
+    write_points(tmp_path / "a.csv", PointTable(RANDOM.random((COUNT, 3)), {"value": random}))
+    assert_array_equal(read_points(tmp_path / "a.csv").attributes["value"].astype(np.float32), random)
+
+
 def test_ply_has_all_digits(tmp_path):
     notices = write_points(tmp_path / "a.ply", PointTable(RANDOM.random((COUNT, 3)), COLUMNS))
     head = (tmp_path / "a.ply").read_bytes().split(b"end_header")[0]
