@@ -10,7 +10,7 @@ from ..operators.objects.modifiers import input_property
 from ..operators.objects.reading import obstacle
 from .dialogs import search_group
 from .panel import SidebarPanel
-from .wrapping import draw_text
+from .wrapping import draw_text, split_properties
 
 
 class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
@@ -29,8 +29,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         if obj != context.object:
             draw_text(layout, context, f"Moves handles of {obj.name}", "EMPTY_DATA")
         settings = obj.meshfree.deform
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        split_properties(layout, context)
         column = layout.column(align=True)
         search_group(column, settings, "handles", obj)
         search_group(column, settings, "anchors", obj)

@@ -68,15 +68,28 @@ def shown_range(obj):
     node = range_node(obj)
     if node is None:
         return None
-    if color_node(obj).color_ramp.interpolation == "CONSTANT":
+    if is_stepped(obj) or shows_zeros(obj):
         return obj.meshfree.range_low, obj.meshfree.range_high
     return node.inputs["From Min"].default_value, node.inputs["From Max"].default_value
+
+
+def shows_zeros(obj) -> bool:
+    """Whether all numbers on show are zero, so that colours have no range."""
+    settings = obj.meshfree
+    if settings.range_mode == "LOCKED" or range_node(obj) is None or is_stepped(obj):
+        return False
+    return settings.range_low == settings.range_high == 0.0
+
+
+def is_stepped(obj) -> bool:
+    """Whether each whole number has a colour of its own, where numbers are shown."""
+    return color_node(obj).color_ramp.interpolation == "CONSTANT"
 
 
 def step_colors(obj) -> dict:
     """Return the colour of each whole number by its name, if each has one of its own; else nothing."""
     node = color_node(obj)
-    if node is None or node.color_ramp.interpolation != "CONSTANT":
+    if node is None or not is_stepped(obj):
         return {}
     colors = [tuple(element.color) for element in node.color_ramp.elements]
     if len(colors) == 2:
@@ -120,6 +133,11 @@ def numbers(values, part: str):
     if part == "LENGTH":
         return np.linalg.norm(values, axis=1)
     return None if part == "DIRECTION" else values[:, "XYZ".index(part)]
+
+
+def is_distance(name: str, values, part: str) -> bool:
+    """Whether the numbers shown of an attribute are distances, or lengths of vectors."""
+    return name == DISTANCE or (values.ndim > 1 and part == "LENGTH")
 
 
 def is_texture(values) -> bool:

@@ -20,15 +20,24 @@ from ..operators.objects.result import area_text, is_analyzed, is_stale, read_ei
 from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
-from .display import draws_discs, find_display, label, own_material, range_node, shown_attribute, step_colors
+from .display import (
+    draws_discs,
+    find_display,
+    label,
+    own_material,
+    range_node,
+    shown_attribute,
+    shows_zeros,
+    step_colors,
+)
 from .legend import find_legend
 from .nodes import LENGTH, MOST
 from .scale import shown_scale
-from .wrapping import draw_text
+from .wrapping import beside_or_below, draw_text, split_properties
 
 _LISTED = 20  # eigenvalues in the panel
 _NOTICES = 6  # there at a time
-_CROSS = 32.0  # width of the cross beside a notice, and of the box around it
+_CROSS = 44.0  # width of the cross beside a notice, and of the box around it
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
 TASKS = (  # that one click does, each with its defaults
@@ -62,6 +71,15 @@ class ReadyPanel(SidebarPanel):
     @classmethod
     def poll(cls, context):
         return not obstacle(context.object)
+
+
+class PropertiesPanel:
+    """A panel in the tab of the object in the Properties editor, with what one in the sidebar has."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
 
 
 class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
@@ -98,11 +116,11 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             _draw_splats(layout, context, obj)
         elif DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
-        row = layout.row(align=True)
+        row = beside_or_below(layout, context, "Analyze Points", "Modes 100")
         row.operator("meshfree.analyze").modes = obj.meshfree.modes
         row.prop(obj.meshfree, "modes")
         if is_analyzed(obj):
-            _draw_result(layout, obj.meshfree)
+            _draw_result(layout, context, obj.meshfree)
             if is_stale(obj, glance=True):
                 draw_text(layout, context, "Results are stale: analyze again", "ERROR")
         _draw_compared(layout, context, obj)
@@ -148,7 +166,7 @@ def _draw_notices(layout, context, obj):
         box.operator("meshfree.dismiss", text="Dismiss All").index = -1
 
 
-def _draw_result(layout, result):
+def _draw_result(layout, context, result):
     """Draw the total area, and of components, boundaries and points left out what is worth telling."""
     lines = [("Total Area", area_text(result.total_area))]
     if result.subset_count:
@@ -161,7 +179,7 @@ def _draw_result(layout, result):
         lines.append(("Points Left Out", f"{result.left_out_count:,}"))
     column = layout.column(align=True)
     for name, value in lines:
-        row = column.row()
+        row = beside_or_below(column, context, name, value)
         row.label(text=name)
         row.label(text=value)
 
@@ -199,12 +217,12 @@ def _draw_splats(layout, context, obj):
     layout.prop(obj.meshfree, "leave_out_floaters")
 
 
-class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
-    """Settings that change results"""
+class Settings:
+    """What the panels with the settings have in common."""
 
-    bl_label = "Settings"
-    bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 3  # the last ones
+    @classmethod
+    def poll(cls, context):
+        return not obstacle(context.object)
 
     def draw(self, context):
         layout = self.layout
@@ -212,8 +230,7 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
         row.menu("MESHFREE_MT_presets", text=bpy.types.MESHFREE_MT_presets.bl_label)
         row.operator("meshfree.add_preset", text="", icon="ADD")
         row.operator("meshfree.add_preset", text="", icon="REMOVE").remove_active = True
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        split_properties(layout, context)
         obj = context.object
         for group in _SETTINGS:
             column = layout.column(align=True)
@@ -221,6 +238,20 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
                 row = column.row(align=True)
                 row.active = _counts(obj.meshfree, name)
                 draw_setting(row, obj.meshfree, name, obj)
+
+
+class MESHFREE_PT_settings(Settings, ReadyPanel, bpy.types.Panel):
+    """Settings that change results"""
+
+    bl_label = "Settings"
+    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 3  # the last ones
+
+
+class MESHFREE_PT_settings_properties(Settings, PropertiesPanel, bpy.types.Panel):
+    """Settings that change results, beside those of the object"""
+
+    bl_label = "Mesh-Free Settings"
 
 
 def _counts(settings, name):
@@ -265,11 +296,8 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
             draw_text(layout, context, more)
 
 
-class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
-    """What is shown as colors on the points"""
-
-    bl_label = "Display"
-    bl_order = 1  # open and long: below the tools, which are closed
+class Display:
+    """What the panels about colors have in common."""
 
     @classmethod
     def poll(cls, context):
@@ -291,8 +319,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             return
         if shown in attributes:
             layout.operator("meshfree.colormap", text="Update Colors")
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        split_properties(layout, context)
         if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
             layout.prop(obj.meshfree, "component")
             if shown in ALONG_SURFACE:
@@ -300,7 +327,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
                 if has_input(find_display(obj).node_group, LENGTH):
                     layout.prop(*input_property(find_display(obj), LENGTH), text=LENGTH)
         if range_node(obj) is not None:
-            _draw_colors(layout, obj)
+            _draw_colors(layout, context, obj)
         if DISC in attributes:
             layout.prop(obj.meshfree, "point_shape")
             layout.prop(obj.meshfree, "smooth")
@@ -311,6 +338,19 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             layout.prop(*input_property(find_display(obj), MOST), text=MOST)
         if shown_scale(obj, context.scene) is not None:
             _draw_legend(layout, context, obj)
+
+
+class MESHFREE_PT_display(Display, ReadyPanel, bpy.types.Panel):
+    """What is shown as colors on the points"""
+
+    bl_label = "Display"
+    bl_order = 1  # open and long: below the tools, which are closed
+
+
+class MESHFREE_PT_display_properties(Display, PropertiesPanel, bpy.types.Panel):
+    """What is shown as colors on the points, beside the settings of the object"""
+
+    bl_label = "Mesh-Free Display"
 
 
 def _draw_legend(layout, context, obj):
@@ -335,7 +375,7 @@ def _draw_own_looks(column, obj, shown):
         column.operator("meshfree.own_material", depress=seen)
 
 
-def _draw_colors(layout, obj):
+def _draw_colors(layout, context, obj):
     """Draw the settings of colors for numbers."""
     settings = obj.meshfree
     column = layout.column(align=True)
@@ -345,7 +385,9 @@ def _draw_colors(layout, obj):
     column.prop(settings, "range_mode")
     if settings.range_mode in {"AUTO", "PERCENTILE", "SYMMETRIC"}:
         column.prop(settings, "coverage")
-    if settings.range_mode == "LOCKED" or not step_colors(obj):
+    if shows_zeros(obj):
+        draw_text(column, context, "All values are zero", "INFO")
+    elif settings.range_mode == "LOCKED" or not step_colors(obj):
         bounds = column.column(align=True)
         bounds.enabled = settings.range_mode == "LOCKED"  # in other modes they tell what the range came to
         bounds.prop(settings, "range_low")
@@ -354,6 +396,7 @@ def _draw_colors(layout, obj):
     column.prop(settings, "outside")
     if not step_colors(obj):
         column.prop(settings, "iso_lines")
+        column.operator("meshfree.iso_lines_to_curves")
     layout.operator("meshfree.select_by_range")
 
 
@@ -368,4 +411,11 @@ def _draw_mode_steps(layout, attributes, shown):
         column.operator("meshfree.colormap", text=text, icon=icon, depress=name == shown).attribute = name
 
 
-CLASSES = (MESHFREE_PT_main, MESHFREE_PT_settings, MESHFREE_PT_spectrum, MESHFREE_PT_display)
+CLASSES = (
+    MESHFREE_PT_main,
+    MESHFREE_PT_settings,
+    MESHFREE_PT_spectrum,
+    MESHFREE_PT_display,
+    MESHFREE_PT_display_properties,
+    MESHFREE_PT_settings_properties,
+)

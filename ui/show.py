@@ -34,6 +34,7 @@ from .display import (
     find_display,
     find_material,
     is_colored,
+    is_distance,
     is_texture,
     numbers,
     own_material,
@@ -62,7 +63,7 @@ from .nodes import (
     shade,
     stroke_material,
 )
-from .value_range import STEPPED, fit_range
+from .value_range import STEPPED, all_zero, fit_range
 
 _MOST_HANDLES = 6  # that have colors
 _MOST_GROUPS = 12  # attributes that a material reads for them: Blender's shaders take 15
@@ -378,9 +379,10 @@ def _color(obj, name, values):
             chosen = [
                 way if way != "AUTO" else zero for way, zero in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
             ]
-        color_map, low, high = fit_range(without_unreached(name, shown), *chosen, settings.coverage, locked)
+        counted = without_unreached(name, shown)
+        color_map, low, high = fit_range(counted, *chosen, settings.coverage, locked, is_distance(name, values, part))
         if settings.range_mode != "LOCKED":
-            settings.range_low, settings.range_high = low, high
+            settings.range_low, settings.range_high = (0.0, 0.0) if all_zero(counted) else (low, high)
         component_shown, stepped = part if values.ndim > 1 else "", color_map in STEPPED
         width = _LINE_WIDTH * settings.spacing * math.sqrt(point_count(obj.data))
         color_by_number(material, name, component_shown, color_map, low, high, settings, groups, width)

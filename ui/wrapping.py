@@ -3,9 +3,11 @@
 import blf
 
 _FONT = 0  # Blender's own
-_MARGIN = 28.0  # around what is in a panel, in units of the user interface
+_MARGIN = 38.0  # around what is in a panel, in units of the user interface
 _TABS = 20.0  # of a sidebar
 _ICON = 20.0
+_PADDING = 12.0  # of a button beside its text
+_SPLIT = 210.0  # room from which on names stand before settings
 
 
 def draw_text(layout, context, text: str, icon: str = "NONE", taken: float = 0.0):
@@ -17,6 +19,19 @@ def draw_text(layout, context, text: str, icon: str = "NONE", taken: float = 0.0
     for line in wrapped(text, _room(context, taken + (_ICON if icon != "NONE" else 0.0)), _measure(context)):
         column.label(text=line, icon=icon)
         icon = "BLANK1" if icon != "NONE" else icon
+
+
+def beside_or_below(layout, context, *texts: str):
+    """Return a row for so many things of the same width, with these texts; a column where one would be cut."""
+    measure = _measure(context)
+    widest = max(map(measure, texts)) + _PADDING * context.preferences.system.ui_scale
+    return (layout.row if len(texts) * widest <= _room(context, 0.0) else layout.column)(align=True)
+
+
+def split_properties(layout, context):
+    """Let names of settings stand before them, or within them where there is no room for that."""
+    layout.use_property_split = _room(context, 0.0) >= _SPLIT * context.preferences.system.ui_scale
+    layout.use_property_decorate = False
 
 
 def wrapped(text: str, room: float, measure) -> list:

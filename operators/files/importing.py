@@ -42,6 +42,7 @@ OWN = tuple(
 )  # Blender reads those by itself, too
 
 _QUICK = 80_000  # points whose discs are found in less than two seconds
+_DEPTH = 10.0  # how far a view looks beyond what it has in its middle
 _DRAWN = 200_000  # splats whose ellipsoids are drawn by themselves
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
 if bpy.app.version >= (4, 5, 0):
@@ -288,6 +289,8 @@ def _frame_selected(context):
             region = next(region for region in area.regions if region.type == "WINDOW")
             with context.temp_override(area=area, region=region):
                 bpy.ops.view3d.view_selected()
+                space, view = area.spaces.active, area.spaces.active.region_3d
+                space.clip_end = max(space.clip_end, _DEPTH * view.view_distance)  # or a large scan would not be seen
 
 
 def _read_all(paths, columns, choices, surface, progress):

@@ -6,6 +6,7 @@ from ... import core
 from ...core import PointCloudError
 from ...core.files import WRITABLE, PointTable, write_points
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
+from ..objects.colors import own_colors
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
@@ -77,8 +78,8 @@ def _choose_object(path, name, option):
 def save(path, obj, arrays, shown="") -> list:
     """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, points or splats, or the arrays by name.
 
-    The scene shows the attribute `shown`, or else another result that the points have. Returns what is written
-    otherwise than it is.
+    The scene shows the attribute `shown`, or else another result that the points have, or their own colors. Returns
+    what is written otherwise than it is.
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
@@ -94,6 +95,8 @@ def save(path, obj, arrays, shown="") -> list:
         names = [name for name in (shown, *APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
         if names:
             tell("result_written", obj, names[0])
+        elif own_colors(obj.data):
+            tell("colors_found", [obj])
         save_scene(path)
     return []
 

@@ -1,7 +1,6 @@
 """From a Blender object to its points, in lengths of the world."""
 
 import zlib
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import bpy
@@ -11,6 +10,7 @@ from ... import core
 from ...core import PointCloudError
 from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_attribute
 from .counting import members
+from .evaluated import evaluated_positions
 from .groups import chosen_members
 from .modifiers import is_own, is_sequence, modifier_settings
 from .splats import LEFT_BEHIND, are_left_behind, has_splats, read_splats
@@ -62,6 +62,11 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
             " collection in the Outliner, and select its objects"
         )
     if not point_count(obj.data):
+        if any(item.type == "NODES" and not is_own(item) for item in obj.modifiers):
+            return (
+                f'"{obj.name}" has no {kind} but those that its nodes make. Put the node Points to Vertices at the end'
+                " of the nodes, and apply them"
+            )
         return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
 
@@ -159,7 +164,7 @@ def seen_positions(context, obj):
     """Read the local positions of an object's points as `read_points` takes them, whatever they are, (n, 3) float32."""
     context.view_layer.update()  # a script may have moved the object a line ago
     if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
-        return _evaluated_positions(context, obj)
+        return evaluated_positions(context, obj)
     return own_positions(obj.data)
 
 
@@ -174,41 +179,6 @@ def key_positions(key):
     positions = np.empty((len(key.points), 3), np.float32)
     key.points.foreach_get("co", positions.reshape(-1))
     return positions
-
-
-def _evaluated_positions(context, obj):
-    """Positions after shape keys, and after the modifiers if the settings ask for them; never after our own."""
-    with _left_out([item for item in obj.modifiers if is_own(item) or not obj.meshfree.use_modifiers]):
-        evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
-        if not evaluated.is_evaluated:
-            raise PointCloudError(
-                f'"{obj.name}" is disabled in viewports, so its shape keys and modifiers are not computed.'
-                " Enable it in the Outliner (monitor icon)."
-            )
-        if obj.type == "MESH":
-            positions = own_positions(evaluated.to_mesh())
-            evaluated.to_mesh_clear()
-        else:
-            positions = own_positions(evaluated.data)
-    if len(positions) != point_count(obj.data):
-        raise PointCloudError(
-            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)},'
-            " instances not counted, so results have no place. Apply these modifiers, or turn off Use Modifiers."
-        )
-    return positions
-
-
-@contextmanager
-def _left_out(modifiers):
-    """Take modifiers out of the viewport's evaluation, and put them back."""
-    shown = [modifier for modifier in modifiers if modifier.show_viewport]
-    try:
-        for modifier in shown:
-            modifier.show_viewport = False
-        yield
-    finally:
-        for modifier in shown:
-            modifier.show_viewport = True
 
 
 def metric(obj):

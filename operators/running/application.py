@@ -26,6 +26,7 @@ class Tool:
 
     asks = ()  # names of the settings that a dialog asks for before the work; without any there is none
     adjustable = ()  # names of those that Adjust Last Operation, which waits, offers: they compute nothing long again
+    at_zero = {}  # words that stand beside settings of 0, by their names, where that is no number but leaves it open
     writes = ()  # names of the attributes that `write` makes
 
     @property

@@ -18,6 +18,7 @@ class Compare(Tool):
 
     writes = (DEVIATION, COMPARED)
     asks = ("greatest", "show", "hide_reference")
+    at_zero = {"greatest": "Any"}
 
     greatest: FloatProperty(
         name="Greatest Distance",

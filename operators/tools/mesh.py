@@ -48,14 +48,8 @@ class MeshSurface(Tool):
         reading, operator = operator_reader(context, obj)
         detail, kept = self.detail, _Kept(obj)
 
-        def make(laplacian, progress):
-            mesh = core.mesh_surface(laplacian, detail, progress=progress)
-            carrying = core.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
-            return mesh, carrying
-
         def compute(progress):
-            laplacian = operator(progress)
-            mesh, carrying = cache.result(laplacian, "mesh", detail, compute=lambda: make(laplacian, progress))
+            mesh, carrying = surface_mesh(operator(progress), detail, progress)
             faces = mesh.faces if np.linalg.det(reading.matrix) > 0.0 else mesh.faces[:, ::-1]
             return reading.local(mesh.vertices), faces, kept.carried(carrying, len(mesh.vertices))
 
@@ -96,6 +90,16 @@ class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Opera
 
     bl_idname = "meshfree.mesh_surface"
     bl_label = "Surface from Points"
+
+
+def surface_mesh(laplacian, detail, progress):
+    """Return a mesh of the points of an operator, and the `Prolongation` to its vertices, made only once."""
+
+    def make():
+        mesh = core.mesh_surface(laplacian, detail, progress=progress)
+        return mesh, core.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
+
+    return cache.result(laplacian, "mesh", detail, compute=make)
 
 
 class _Kept:

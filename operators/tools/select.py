@@ -190,6 +190,8 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.select_grow"
     bl_label = "Grow Selection"
+    asks = ("distance",)
+    at_zero = {"distance": "Automatic"}
 
     distance: FloatProperty(
         name="Distance",

@@ -70,6 +70,8 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
     bl_idname = "meshfree.analyze_sequence"
     bl_label = "Analyze Sequence"
     bl_options = {"REGISTER", "UNDO"}
+    asks = ("modes", "shown_mode", "show")
+    at_zero = {"shown_mode": "Mean Curvature"}
 
     modes: IntProperty(
         name="Modes", description="Compute this many vibration modes of each frame", default=0, min=0, soft_max=50

@@ -24,6 +24,8 @@ _FINEST = 8.0  # details finer than this share of the wavelength count as noise,
 class Smooth(Tool):
     """The settings and the work of `meshfree.smooth`."""
 
+    at_zero = {"wavelength": "Automatic"}
+
     method: EnumProperty(
         name="Method",
         description="What is smoothed, and how",
@@ -183,6 +185,7 @@ class ModeShape(Tool):
     """The settings and the work of `meshfree.mode_shape`."""
 
     adjustable = ("mode", "amplitude", "phase", "animate", "period", "target")
+    at_zero = {"amplitude": "Automatic"}
 
     mode: IntProperty(
         name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100

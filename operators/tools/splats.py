@@ -111,13 +111,14 @@ class MESHFREE_OT_join_splats(SplatOperator, bpy.types.Operator):
         _check_near(obj, others, parts)
         for each in filter(lambda each: are_left_behind(each.data), (obj, *others)):
             self.warn(f"{each.name}: {LEFT_BEHIND}", obj)
+        count = point_count(obj.data) + sum(map(len, parts))
         left_alone = len(context.selected_objects) - len(others) - obj.select_get()
         with all_or_nothing([obj]):
             _join(context, obj, others, parts)
             _remove(context, others)
         if left_alone:
             self.warn(f"{left_alone} selected objects hold no splats and were left alone", obj)
-        self.report({"INFO"}, f"{obj.name}: the splats of {len(parts) + 1} objects, {point_count(obj.data):,} in all")
+        self.report({"INFO"}, f"{obj.name}: the splats of {len(parts) + 1} objects, {count:,} in all")
         return {"FINISHED"}
 
 

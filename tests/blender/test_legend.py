@@ -141,3 +141,37 @@ def test_the_panel_speaks_of_the_legend_only_where_colors_are(cloud):
     bpy.ops.meshfree.show_surface()
     assert obj.modifiers
     assert not {"Colors differ from the legend:", "legend", "histogram", "Legend in Renders"} & set(draw())
+
+
+def shown_bounds(obj):
+    return obj.meshfree.range_low, obj.meshfree.range_high
+
+
+def test_the_range_of_distances_begins_at_zero(cloud):
+    add_group(cloud, "Source", [0])
+    bpy.ops.meshfree.geodesic_distance()
+    low, high = shown_bounds(cloud)
+    assert low == 0.0
+    assert 2.5 < high < 3.3
+    cloud.meshfree.range_mode = "PERCENTILE"
+    assert cloud.meshfree.range_low > 0.0
+    cloud.meshfree.range_mode = "AUTO"
+    bpy.ops.meshfree.colormap(attribute="lb_area")
+    assert cloud.meshfree.range_low > 0.0
+
+
+@pytest.mark.parametrize("color_map", ["AUTO", "COOL_WARM", "MAGMA"])
+def test_nothing_but_zeros_is_said_to_be_that(overlay, cloud, color_map):
+    cloud.data.attributes.new("nothing", "FLOAT", "POINT")
+    cloud.meshfree.histogram = True
+    bpy.ops.meshfree.colormap(attribute="nothing", color_map=color_map)
+    legend, histogram = overlay.pictures(cloud, bpy.context.scene)
+    assert [text.text for text in legend.texts] == ["Nothing", "All Zero"]
+    assert "All Zero" in [text.text for text in histogram.texts]
+    assert shown_bounds(cloud) == (0.0, 0.0)
+    assert "All values are zero" in draw()
+    assert "range_low" not in draw()
+    cloud.data.attributes["nothing"].data[0].value = 2.0
+    bpy.ops.meshfree.colormap()
+    assert "All values are zero" not in draw()
+    assert "All Zero" not in [text.text for text in legend_of(overlay, cloud).texts]

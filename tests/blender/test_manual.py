@@ -18,6 +18,7 @@ UNITS = {"PERCENTAGE": " %", "DISTANCE": " m", "ANGLE": "°"}
 KEPT = {
     "name",
     "notices",
+    "own_material",
     "compared_with",
     "compared_within",
     "spacing",

@@ -150,6 +150,15 @@ class TestImport:
         assert [shown(obj) for obj in frames] == ["Color"] * 3
         assert len(bpy.data.materials) == 1
 
+    def test_scenes_that_the_command_line_writes(self, tmp_path, module, shown):
+        opening = module("operators.files.opening")
+        path = tmp_path / "red.xyz"
+        save(path, evenly(800))
+        obj, _ = opening.load(path)
+        opening.save(tmp_path / "red.blend", obj, {})
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "red.blend"))
+        assert shown(bpy.data.objects["red"]) == "Color"
+
     def test_one_undo_takes_all_of_it_back(self, imported):
         bpy.ops.ed.undo_push()
         imported()
