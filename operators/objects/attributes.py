@@ -55,6 +55,7 @@ DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
 SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of splats that are carried along
 MOVED_DISC = "lb_moved_disc"  # what a deformation makes of the disc
+ONLY_DRAWN = DISC, MOVED_DISC, CORNER  # which say nothing about the points, only how they are drawn
 SPLAT_HARMONIC = "lb_splat_sh_"  # followed by the number of the harmonic, from 0
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
