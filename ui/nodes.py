@@ -44,7 +44,7 @@ _COLORED = "COLOR"  # where points have colors of their own
 _CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
 CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
 _DEVIATIONS = 2.0  # standard deviations at which the ellipsoid of a splat ends
-_UNSEEN = f"{HARMONIC}*", "ply_*", "lb_*"  # attributes of splats that do not show
+_UNSEEN = f"{HARMONIC}*", "ply_*", ".splat_*", "lb_*"  # attributes of splats that do not show
 _SPLATTED, _CONSTANT = "SPLATS", 0.28209479  # the harmonic of degree 0
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
