@@ -17,7 +17,7 @@ from ..operators.objects.attributes import (
     SIGNED_DISTANCE,
     read_attribute,
 )
-from ..operators.objects.colors import is_color, own_colors
+from ..operators.objects.colors import is_color, own_colors, own_material
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
@@ -34,7 +34,6 @@ from .display import (
     is_colored,
     is_texture,
     numbers,
-    own_material,
     shown_attribute,
     without_unreached,
 )
