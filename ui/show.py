@@ -19,7 +19,7 @@ from ..operators.objects.attributes import (
     positions_now,
     read_attribute,
 )
-from ..operators.objects.colors import is_color, own_colors
+from ..operators.objects.colors import is_color, own_colors, own_material
 from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, has_group, role_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
@@ -37,7 +37,6 @@ from .display import (
     is_distance,
     is_texture,
     numbers,
-    own_material,
     shown_attribute,
     sloping,
     without_unreached,
