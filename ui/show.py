@@ -332,7 +332,8 @@ def reshape(obj):
         if has_input(group, FILLED):
             set_input(modifier, FILLED, known and formed)
         if has_input(group, SMOOTH):  # slopes do not turn
-            set_input(modifier, SMOOTH, turned and deform is None and obj.meshfree.slopes_of != "")
+            sloping_now = turned and deform is None and obj.meshfree.slopes_of != ""
+            set_input(modifier, SMOOTH, shown_attribute(obj) if sloping_now else "")
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
         dots, bound = not (turned and draws_discs(obj)), deform is not None
@@ -388,7 +389,7 @@ def _color(obj, name, values):
     dim_back(material, settings.dim_back)
     shade(material, settings.shaded)
     columns = [] if values is None or stepped or not settings.smooth else sloping(name, values, part)
-    smooth.follow(obj, f"{name} {part}", columns, settings.spacing)
+    smooth.follow(obj, name, part, columns, settings.spacing)
     for other in sharing_objects(obj):  # which may show something else
         reshape(other)
     obj.update_tag()
