@@ -126,9 +126,7 @@ class TestPicked:
             assert abs(place[0] - x) + abs(place[2] - z) < 0.2
         # Seen through, where Blender takes the nearest on the screen.
         gui.python("view3d()[0].spaces.active.shading.type = 'SOLID'")
-        gui.python(
-            "view3d()[0].spaces.active.shading.show_xray = True"
-        )
+        gui.python("view3d()[0].spaces.active.shading.show_xray = True")
         behind = gui.python("next(i for i in np.argsort(-points[:, 1]) if np.hypot(*points[i, [0, 2]]) < 0.5)")
         gui.click(*gui.python(f"on_screen(points[{behind}])"))
         assert gui.python(SELECTED) == [behind]
