@@ -17,7 +17,17 @@ from ..operators.objects.attributes import (
     positions_now,
     read_attribute,
 )
-from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, has_group, role_group
+from ..operators.objects.groups import (
+    ANCHOR,
+    BOUNDARY_GROUP,
+    HANDLE,
+    HIGH,
+    LOW,
+    ROLES,
+    handle_names,
+    has_group,
+    role_group,
+)
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, spacing, typical_distance
@@ -54,6 +64,7 @@ from .nodes import (
 from .value_range import fit_range
 
 _MOST_HANDLES = 6  # that have colors
+_LATE = LOW, HIGH  # groups that came with a later version
 _MOST_GROUPS = 13  # attributes that a material reads for them: Blender's shaders take 15
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
 _noted = {}  # Group Colors of objects in Edit Mode while something is undone, by session_uid
@@ -210,8 +221,10 @@ def show_alike(obj, made):
 
 
 def use_material_preview(context):
-    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
+    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview, if there is."""
     space = context.space_data
+    if context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
+        return
     if space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
         space.shading.type = "MATERIAL"
 
@@ -316,12 +329,13 @@ def _group_colors(obj) -> dict:
     """Return the colours of groups by their names: none if they are not shown, and not all of very many.
 
     Groups that are still to come are among them, so that they are seen as soon as points are assigned, while there is
-    room.
+    room; but for those that materials of earlier versions do not know.
     """
     settings = obj.meshfree
     if not settings.show_groups:
         return {}
-    names = {role_group(obj, role): role for role in ROLES}
+    there = [role for role in ROLES if role not in _LATE or has_group(obj, role)]
+    names = {role_group(obj, role): role for role in there}
     if settings.boundary_group:
         names[settings.boundary_group] = BOUNDARY_GROUP
     names[settings.deform.anchors or ANCHOR] = ANCHOR

@@ -8,8 +8,7 @@ import tutorial
 # Small and plain, for a machine without a graphics card.
 RENDERING = """
 scene = bpy.context.scene
-scene.render.engine, scene.render.resolution_percentage = "BLENDER_WORKBENCH", 25
-scene.display.shading.color_type = "TEXTURE"
+scene.eevee.taa_render_samples, scene.render.resolution_percentage = 1, 15
 bpy.context.preferences.view.render_display_type = "AREA"
 """
 SELECTED = """
