@@ -221,7 +221,7 @@ def show_alike(obj, made):
 
 
 def use_material_preview(context):
-    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview, if there is."""
+    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
     space = context.space_data
     if context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
         return
