@@ -4,11 +4,12 @@ import bpy
 
 from ..operators.deform.bake import MESHFREE_OT_deform_bake
 from ..operators.deform.tools import MESHFREE_OT_deform_apply, keyed_empties
-from ..operators.files.exporting import MESHFREE_OT_export_points
+from ..operators.files.exporting import MESHFREE_OT_export_points, MESHFREE_OT_export_splats
 from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, has_group
 from ..operators.running.application import ApplicationOperator
-from ..operators.tools.select import selection
+from ..operators.tools.select import MESHFREE_OT_select_grow, selection
+from ..operators.tools.sequence import MESHFREE_OT_analyze_sequence
 
 _OPTIONAL = LOW, HIGH, VALUE  # one or two of them do
 
@@ -21,6 +22,10 @@ def draw_setting(layout, settings, name: str, obj):
         layout.prop_search(settings, name, bpy.data, "objects")
     elif name == "source":
         layout.prop_search(settings, name, obj.data, "attributes")
+    elif name in getattr(settings, "at_zero", ()) and not getattr(settings, name):
+        row = layout.row(align=True)
+        row.prop(settings, name)
+        row.label(text=settings.at_zero[name])
     else:
         layout.prop(settings, name)
 
@@ -73,6 +78,14 @@ def _draw(operator, context, names):
 
 # Here, and not when they are registered: it is then that Blender looks whether a class has a layout of its own.
 ApplicationOperator.draw = _draw_tool
-for kind in (MESHFREE_OT_export_points, MESHFREE_OT_import_points, MESHFREE_OT_deform_bake):
+_ASKING = (
+    MESHFREE_OT_export_points,
+    MESHFREE_OT_export_splats,
+    MESHFREE_OT_import_points,
+    MESHFREE_OT_deform_bake,
+    MESHFREE_OT_analyze_sequence,
+    MESHFREE_OT_select_grow,
+)
+for kind in _ASKING:
     kind.draw = _draw_asked
 MESHFREE_OT_deform_apply.draw = _draw_apply

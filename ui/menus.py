@@ -7,8 +7,8 @@ from ..operators.objects.reading import TYPES
 from .panel import TASKS
 
 _TOOLS = (
-    ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "legend"),
-    ("mesh_surface", "compare"),
+    ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "own_material", "legend"),
+    ("mesh_surface", "iso_lines_to_curves", "compare"),
     ("principal_curvatures", "roughness", "orient_normals"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
@@ -16,7 +16,7 @@ _TOOLS = (
     ("signed_distance", "nearest_source", "unwrap", "extend_direction"),
     ("deform_bind", "deform_update", "deform_reset", "deform_apply", "deform_to_shape_key", "deform_unbind"),
     ("deform_bake", "deform_free"),
-    ("apply_to_splats",),
+    ("apply_to_splats", "join_splats"),
     ("minimal_surface",),
     ("stop",),
 )
@@ -99,7 +99,9 @@ def _draw_points_quick(menu, context):
 
 
 def _draw_import(self, _context):
-    self.layout.operator("meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.csv/.npy)")
+    self.layout.operator(
+        "meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.ptx/.csv/.npy/.splat/.spz)"
+    )
 
 
 def _draw_export(self, _context):

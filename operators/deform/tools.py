@@ -5,7 +5,8 @@ import numpy as np
 from bpy.props import BoolProperty
 from mathutils import Matrix, Vector
 
-from ...core import PointCloudError, opposite_ends
+from ... import core
+from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.animation import moves_by_keys, stop_moving
 from ..objects.attributes import (
@@ -181,7 +182,7 @@ def _plan_ends(context, obj):
     def choose(laplacian, progress):
         progress("Ends", 0.0)
         points, kept = laplacian.points, held > 0.0
-        ends = opposite_ends(laplacian)
+        ends = core.opposite_ends(laplacian)
         if kept.any():
             middle = points[kept].mean(axis=0)
             ends = sorted(ends, key=lambda rows: np.linalg.norm(points[rows].mean(axis=0) - middle))
@@ -334,7 +335,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         if keyed and not self.keep_keyframes:
             for empty in keyed:
                 stop_moving(empty)
-            self.report({"WARNING"}, _lost_keyframes(context.scene, keyed))
+            self.warn(_lost_keyframes(context.scene, keyed), obj)
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"
 
 

@@ -41,6 +41,8 @@ COMPONENT = "lb_component"
 TRUST = "lb_trust"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"  # principal ones
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
+SLOPE, SLOPE_2 = ".lb_slope", ".lb_slope_2"  # of what is shown, or of both texture coordinates; Blender lists no dots
+RISE = "lb_rise"  # by how much what is shown rises in discs that the display draws
 CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
 DEVIATION, COMPARED = "lb_deviation", "lb_compared"  # from another cloud, and where there is one
@@ -66,7 +68,7 @@ APPLICATIONS = (
 )
 _TYPES = {  # all others are FLOAT
     **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DIRECTION), "FLOAT_VECTOR"),
-    **dict.fromkeys((DISC, MOVED_DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
+    **dict.fromkeys((DISC, MOVED_DISC, DISPLACEMENT, REST, SLOPE, SLOPE_2), "FLOAT_VECTOR"),
     **dict.fromkeys((COMPONENT, SEGMENT, CELL), "INT"),
     **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
     UV: "FLOAT2",

@@ -299,7 +299,8 @@ class JobOperator(ReadyOperator):
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            self.report({"WARNING"}, f"{job.label} wrote nothing: {change}")
+            there = [snapshot.find() for snapshot in job.snapshots]
+            self.warn(f"{job.label} wrote nothing: {change}", *filter(None, there))
             return {"CANCELLED"}
         return self.finish(context, objects, results)
 

@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ...core import PointCloudError, harmonic_field, solve_poisson
+from ... import core
+from ...core import PointCloudError
 from ..objects.attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
 from ..objects.groups import HIGH, LOW, SOURCE, VALUE, chosen_weights, group_kind, has_group, is_chosen
 from ..objects.result import length_text
@@ -78,7 +79,7 @@ class HarmonicField(Tool):
                     "harmonic",
                     fixed,
                     given,
-                    compute=lambda: harmonic_field(laplacian, fixed, given, progress=progress),
+                    compute=lambda: core.harmonic_field(laplacian, fixed, given, progress=progress),
                 )
                 return low + (high - low) * field
             values = low + (high - low) * given
@@ -88,7 +89,7 @@ class HarmonicField(Tool):
                 source,
                 fixed,
                 values,
-                compute=lambda: solve_poisson(laplacian, source, fixed, values, progress=progress),
+                compute=lambda: core.solve_poisson(laplacian, source, fixed, values, progress=progress),
             )
 
         return compute

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy_extras import view3d_utils
 
 from ... import core
-from ...core import PointCloudError, floaters, grow
+from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
     SELECTION,
@@ -34,7 +34,7 @@ from ..objects.groups import (
     role_group,
 )
 from ..objects.handlers import tell
-from ..objects.reading import obstacle, sharing_objects, typical_distance
+from ..objects.reading import obstacle, sharing_objects
 from ..objects.splats import read_splats
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
@@ -190,6 +190,8 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.select_grow"
     bl_label = "Grow Selection"
+    asks = ("distance",)
+    at_zero = {"distance": "Automatic"}
 
     distance: FloatProperty(
         name="Distance",
@@ -203,7 +205,7 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
         chosen = selected(obj)
         _, laplacian = analyzed(context, obj)
         distance = self.distance or 4.0 * np.sqrt(np.median(laplacian.areas))
-        grown = grow(laplacian, chosen, distance)
+        grown = core.grow(laplacian, chosen, distance)
         return lambda: select(context, obj, grown)
 
 
@@ -400,7 +402,7 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
             points = positions_now(obj) @ matrix[:3, :3].T + matrix[:3, 3]
             points[_hidden(obj)] = np.nan
             known = obj.meshfree.spacing * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))  # where a display measured it
-            index = core.front_point(points, eye, direction, 2.0 * (known or typical_distance(points)))
+            index = core.front_point(points, eye, direction, 2.0 * (known or core.geometry.typical_distance(points)))
             if index >= 0:
                 found.append(((points[index] - eye) @ direction, obj.name, obj, index))
         return min(found)[2:] if found else None
@@ -467,7 +469,7 @@ class MESHFREE_OT_select_floaters(SelectionOperator, bpy.types.Operator):
     surface = False
 
     def prepare(self, context, obj):
-        chosen = floaters(read_splats(obj.data))
+        chosen = core.floaters(read_splats(obj.data))
         if not chosen.any():
             raise PointCloudError(f'None of the {len(chosen):,} splats of "{obj.name}" is a floater.')
         return lambda: select(context, obj, chosen)

@@ -255,7 +255,7 @@ class TestManyPoints:
     @pytest.fixture(autouse=True)
     def few(self, core, live, monkeypatch):
         """Take a strip for many points."""
-        monkeypatch.setattr(live, "CoarseDeformer", functools.partial(core.CoarseDeformer, count=300))
+        monkeypatch.setattr(core, "CoarseDeformer", functools.partial(core.CoarseDeformer, count=300))
 
     @pytest.fixture
     def unattended(self, live):

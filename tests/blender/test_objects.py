@@ -496,6 +496,7 @@ class TestConverting:
 
     def test_there_and_back(self, ready, module):
         display, result = module("ui.display"), module("operators.objects.result")
+        ready.meshfree.point_shape = "DOTS"
         material, values = display.find_material(ready), attribute(ready, "lb_eigenvector_002")
         eigenvalues, points = list(ready["lb_eigenvalues"]), local_points(ready)
         for target in ("POINTCLOUD", "MESH"):

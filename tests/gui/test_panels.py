@@ -12,6 +12,10 @@ import os
 folders = bpy.utils.preset_paths("meshfree_laplacian")
 sorted(name for folder in folders for name in os.listdir(folder) if name.endswith(".py"))
 """
+COLORED = """
+shading = view3d()[0].spaces.active.shading
+shading.type, shading.color_type = "SOLID", "VERTEX"  # quick to draw, and as good as colored for the legend
+"""
 INFO_LOG = """
 area = next(area for area in main_window().screen.areas if area.type == "PROPERTIES")
 area.type = "INFO"
@@ -107,7 +111,7 @@ class TestView:
         gui.python("bpy.context.view_layer.objects.active = bpy.data.objects['Cloud']")
         gui.python("bpy.ops.meshfree.spectrum(count=5)")
         settings = "bpy.data.objects['Cloud'].meshfree"
-        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        gui.python(COLORED)
         gui.python(f"{settings}.histogram = {settings}.plot_eigenvalues = False")
 
         def drawn():
@@ -126,6 +130,35 @@ class TestView:
         gui.key("KP_Divide")
         gui.wait_until("view3d()[0].spaces.active.local_view is None")
         gui.wait_for(lambda: drawn() == pytest.approx(shown, rel=0.1), "the legend is drawn as before")
+
+    def test_the_mouse_drags_the_legend(self, gui):
+        add_sphere(gui)
+        gui.python("bpy.ops.meshfree.analyze(); bpy.ops.ed.undo_push(message='Analyzed')")
+        gui.python(COLORED)
+        place = "list(bpy.data.objects['Cloud'].meshfree.legend_place)"
+
+        def drawn():
+            return colors(gui.pixels(corner(gui)))
+
+        gui.wait_for(lambda: drawn() > 1000, "the legend is drawn")
+        x, y, _, height = corner(gui)
+        gui.shot("legend_in_its_corner")
+        gui.drag((x + 80, y + height - 60), (x - 320, y - 200))
+        gui.wait_until(f"{place}[0] < 0.7")
+        gui.wait_for(lambda: drawn() < 100, "the legend has left its corner")
+        assert gui.python(f"{place}[1]") > 0.3
+        gui.shot("legend_dragged")
+        gui.key("ctrl+z")
+        gui.wait_until(f"{place} == [1.0, 0.0]")
+        gui.wait_for(lambda: drawn() > 1000, "undo brings it back")
+
+    def test_the_legend_is_there_where_colors_are(self, gui):
+        add_sphere(gui)
+        gui.python("bpy.ops.meshfree.analyze()")
+        gui.python(COLORED)
+        gui.wait_for(lambda: colors(gui.pixels(corner(gui))) > 1000, "the legend is drawn")
+        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        gui.wait_for(lambda: colors(gui.pixels(corner(gui))) < 100, "no legend without colors")
 
     def test_the_active_object_outside_of_the_local_view(self, gui):
         add_sphere(gui)
