@@ -106,7 +106,6 @@ class TestAnalysis:
         assert gui.python("view3d()[0].spaces.active.shading.type") == "MATERIAL"
         gui.wait_for(lambda: colored(gui.pixels(middle)) > gray + 20000, "the points are colored", 240)
 
-
     def test_where_there_is_no_material_preview(self, gui):
         add_sphere(gui)
         gui.python("bpy.context.scene.render.engine = 'BLENDER_WORKBENCH'")
