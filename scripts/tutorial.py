@@ -37,7 +37,9 @@ class Reader:
     """
 
     def __init__(self, text):
-        self._text, self._place = " ".join(text.partition("\n## Go on")[0].split()), 0
+        told = text.partition("\n## Go on")[0].splitlines()
+        self._text = " ".join(" ".join(line for line in told if not line.startswith(("#", "!["))).split())
+        self._place = 0
 
     def __call__(self, words):
         """Go on to the words that tell what is done next."""
