@@ -88,11 +88,22 @@ def front_point(points, eye, direction, reach):
     int
         Its number; -1 if there is none around the ray.
 
+    See Also
+    --------
+    grow : Takes the points around it in.
+
     Examples
     --------
+    From above one sees the upper pole of the unit sphere, not the lower one:
+
+    >>> import numpy as np
     >>> import core
-    >>> core.front_point([[0.1, 0, 1], [0, 0, 5], [3, 0, 0]], eye=[0, 0, 0], direction=[0, 0, 2], reach=0.5)
-    0
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> seen = core.front_point(points, eye=[0, 0, 5], direction=[0, 0, -1], reach=0.25)
+    >>> print(points[seen, 2].round(1))
+    1.0
     """
     offset = np.asarray(points, dtype=np.float64) - np.asarray(eye, dtype=np.float64)
     axis = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)

@@ -28,6 +28,7 @@ SHOWN = [
     "estimate_areas",
     "estimate_normals",
     "fair_points",
+    "front_point",
     "geodesic_distance",
     "grow",
     "harmonic_field",
