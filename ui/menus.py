@@ -18,7 +18,7 @@ _TOOLS = (
     ("deform_bake", "deform_free"),
     ("apply_to_splats", "join_splats"),
     ("minimal_surface",),
-    ("stop",),
+    ("dismiss", "stop"),
 )
 _SELECTING = (
     "select_grow",
