@@ -50,7 +50,8 @@ class Seen:
         self.gui.python(PLACES)
         anchors = np.array(self.gui.python("places[members('Anchor'), 0]"))
         assert anchors.min() == pytest.approx(0.2, abs=0.02)
-        assert len(anchors) == pytest.approx(self.gui.python("(places[:, 0] > 0.2).sum()"), rel=0.02)
+        right = self.gui.python("(places[:, 0] > 0.2).sum()")
+        assert 0.8 * right < len(anchors) <= 1.01 * right  # Blender leaves out what is behind another vertex
         handles = np.array(self.gui.python("places[members('Handle')]"))
         assert (handles[:, 0].min(), handles[:, 0].max()) == pytest.approx((-2.0, -1.3), abs=0.15)
         assert 300 < len(handles) < 1500
