@@ -36,7 +36,20 @@ def _modules():
         surface,
     )
     from .operators.tools import select as selecting
-    from .ui import applications, colormap, drag, legend, menus, overlay, panel, points, presets, range_selection, show
+    from .ui import (
+        applications,
+        colormap,
+        drag,
+        legend,
+        menus,
+        overlay,
+        panel,
+        points,
+        preferences,
+        presets,
+        range_selection,
+        show,
+    )
     from .ui import deform as deform_panel
 
     return (
@@ -80,6 +93,7 @@ def _modules():
         menus,
         overlay,
         drag,
+        preferences,
     )
 
 
