@@ -5,13 +5,9 @@ _registered = []
 
 def _modules():
     """All modules with something to register, in their order: classes, and what is attached to Blender otherwise."""
-    try:
-        from . import core  # noqa: F401
-    except ImportError as error:  # no wheel is for this Python, or another extension brings a scipy that is no good
-        if (error.name or "").partition(".")[0] != "scipy":
-            raise
-        from .ui import missing
+    from .ui import missing
 
+    if not missing.scipy_serves():
         return (missing,)
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
@@ -40,6 +36,8 @@ def _modules():
         applications,
         colormap,
         drag,
+        iso_lines,
+        keys,
         legend,
         menus,
         overlay,
@@ -85,12 +83,14 @@ def _modules():
         colormap,
         legend,
         range_selection,
+        iso_lines,
         presets,
         panel,
         points,
         applications,
         deform_panel,
         menus,
+        keys,
         overlay,
         drag,
         preferences,

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..operators.objects.attributes import DISPLACEMENT, DISTANCE, point_count, read_attribute
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, is_display
-from .nodes import ATTRIBUTE, COLORS, DISC_COST, MOST, RANGE
+from .nodes import ATTRIBUTE, COLORS, DISC_COST, DISCS, MOST, RANGE, shows_own
 from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"
@@ -20,6 +20,18 @@ def find_material(obj):
     modifier = find_display(obj)
     material = modifier and get_input(modifier, "Material")
     return material if material is not None and DISPLAY_TAG in material else None
+
+
+def is_colored(obj) -> bool:
+    """Whether an object shows colors that its points have of their own."""
+    return bool(shown_attribute(obj)) and shows_own(find_material(obj))
+
+
+def draws_faces(obj) -> bool:
+    """Whether viewports draw faces of an object, those of a mesh or discs, and no dots."""
+    modifier = find_display(obj)
+    discs = modifier is not None and get_input(modifier, DISCS) and draws_discs(obj)
+    return obj.type == "MESH" and bool(discs or obj.data.polygons)
 
 
 def draws_discs(obj) -> bool:
@@ -130,6 +142,19 @@ def is_texture(values) -> bool:
 def without_unreached(name: str, values):
     """Leave out the numbers that say that no source reaches a point, which do not count for the range."""
     return values[values >= 0.0] if name == DISTANCE else values
+
+
+def sloping(name: str, values, part: str) -> list:
+    """Return the numbers to show that change from point to point, (n,) each: two for texture coordinates.
+
+    Labels do not, nor truth values, and directions have colours of their own. Those that no source reaches are NaN.
+    """
+    shown = numbers(values, part)
+    if values.dtype.kind != "f" or (shown is None and not is_texture(values)):
+        return []
+    if shown is None:
+        return list(values.T)
+    return [np.where(shown >= 0.0, shown, np.nan) if name == DISTANCE else shown]
 
 
 def _find_node(obj, name):

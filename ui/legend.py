@@ -67,8 +67,9 @@ def renew(obj):
         legend = find_legend(scene, obj)
         if legend is None:
             continue
+        legend.hide_viewport = legend.hide_render = shown_scale(obj, scene) is None  # such as for colors of its own
         camera = next((part.parent for part in legend.objects if part.parent is not None), scene.camera)
-        if camera is not None and camera.type == "CAMERA" and shown_attribute(obj):
+        if camera is not None and camera.type == "CAMERA" and not legend.hide_render:
             _fill(legend, scene, obj, camera, written_title(legend))
 
 
@@ -115,8 +116,9 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
                 return {"FINISHED"}
             if scene.camera is None:
                 raise PointCloudError("The scene has no camera to put a legend in front of. Add one with Add > Camera.")
-            if not shown_attribute(obj):
-                raise PointCloudError(f'"{obj.name}" shows no colors yet. Choose what to see under Display first.')
+            if shown_scale(obj, scene) is None:
+                what = "its own colors, which stand for no values" if shown_attribute(obj) else "no colors yet"
+                raise PointCloudError(f'"{obj.name}" shows {what}. Choose what to see under Display first.')
         except PointCloudError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -13,13 +13,22 @@ from ..operators.objects.attributes import (
     mode_number,
     point_count,
 )
+from ..operators.objects.colors import own_colors, own_material, shows_own_material
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
-from ..operators.objects.splats import has_splats
+from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
-from .display import draws_discs, find_display, label, range_node, shown_attribute, shows_zeros, step_colors
+from .display import (
+    draws_discs,
+    find_display,
+    label,
+    range_node,
+    shown_attribute,
+    shows_zeros,
+    step_colors,
+)
 from .legend import find_legend
 from .nodes import LENGTH, MOST
 from .scale import shown_scale
@@ -30,7 +39,7 @@ _NOTICES = 6  # there at a time
 _CROSS = 44.0  # width of the cross beside a notice, and of the box around it
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
-_TASKS = (  # that one click does, each with its defaults
+TASKS = (  # that one click does, each with its defaults
     ("smooth", "Clean"),
     ("segment", "Segment"),
     ("principal_curvatures", "Curvature"),
@@ -103,7 +112,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         _draw_summary(layout, context, obj)
         _draw_notices(layout, context, obj)
         if has_splats(obj.data):
-            _draw_splats(layout, obj.meshfree)
+            _draw_splats(layout, context, obj)
         elif DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
         row = beside_or_below(layout, context, "Analyze Points", "Modes 100")
@@ -115,7 +124,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
                 draw_text(layout, context, "Results are stale: analyze again", "ERROR")
         _draw_compared(layout, context, obj)
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        for name, text in _TASKS:
+        for name, text in TASKS:
             grid.operator(f"meshfree.{name}", text=text).at_once = True
 
 
@@ -194,14 +203,17 @@ def _draw_summary(layout, context, obj):
         column.prop(obj.meshfree, "make_single_user")
 
 
-def _draw_splats(layout, settings):
+def _draw_splats(layout, context, obj):
     """Draw what is there for Gaussian splats alone."""
+    if are_left_behind(obj.data, glance=True):
+        draw_text(layout, context, LEFT_BEHIND[0].upper() + LEFT_BEHIND[1:], "ERROR")
     column = layout.column(align=True)
     column.operator("meshfree.show_splats")
     column.operator("meshfree.select_floaters")
     column.operator("meshfree.apply_to_splats")
+    column.operator("meshfree.join_splats")
     column.operator("meshfree.export_splats", text="Export Splats...")
-    layout.prop(settings, "leave_out_floaters")
+    layout.prop(obj.meshfree, "leave_out_floaters")
 
 
 class Settings:
@@ -296,6 +308,7 @@ class Display:
         shown = shown_attribute(obj)
         attributes = obj.data.attributes
         column = layout.column(align=True)
+        _draw_own_looks(column, obj, shown)
         for name in (*RESULTS, *(name for name in APPLICATIONS if name in attributes)):
             row = column.row(align=True)
             row.enabled = name in attributes
@@ -316,7 +329,9 @@ class Display:
             _draw_colors(layout, context, obj)
         if DISC in attributes:
             layout.prop(obj.meshfree, "point_shape")
+            layout.prop(obj.meshfree, "smooth")
             layout.prop(obj.meshfree, "dim_back")
+        layout.prop(obj.meshfree, "shaded", slider=True)
         layout.prop(obj.meshfree, "point_size")
         if not draws_discs(obj):
             layout.prop(*input_property(find_display(obj), MOST), text=MOST)
@@ -349,6 +364,15 @@ def _draw_legend(layout, context, obj):
         layout.prop(context.scene.view_settings, "view_transform")
 
 
+def _draw_own_looks(column, obj, shown):
+    """Draw buttons to what an object looks like without results: the colors of its points, and its material."""
+    colors, material = own_colors(obj.data), own_material(obj)
+    if colors:
+        column.operator("meshfree.colormap", text="Color", depress=colors == shown).attribute = colors
+    if material is not None and find_display(obj) is not None:
+        column.operator("meshfree.own_material", depress=shows_own_material(obj))
+
+
 def _draw_colors(layout, context, obj):
     """Draw the settings of colors for numbers."""
     settings = obj.meshfree
@@ -370,6 +394,7 @@ def _draw_colors(layout, context, obj):
     column.prop(settings, "outside")
     if not step_colors(obj):
         column.prop(settings, "iso_lines")
+        column.operator("meshfree.iso_lines_to_curves")
     layout.operator("meshfree.select_by_range")
 
 

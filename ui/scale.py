@@ -5,6 +5,7 @@ from typing import NamedTuple
 from .display import (
     color_node,
     find_material,
+    is_colored,
     label,
     range_node,
     shown_attribute,
@@ -62,9 +63,9 @@ class Scale(NamedTuple):
 
 
 def shown_scale(obj, scene) -> Scale | None:
-    """Return the scale of what an object shows, in units of a scene; None if it shows nothing."""
+    """Return the scale of what an object shows, in units of a scene; None if it shows nothing, or colors of its own."""
     name = shown_attribute(obj)
-    if not name:
+    if not name or is_colored(obj):
         return None
     title = label(name)
     if range_node(obj) is None:

@@ -96,6 +96,7 @@ class Splats:
         -------
         Splats
             With the covariances F R S^2 R^T F^T. Harmonics turn by the rotation next to F, mirrored where F mirrors.
+            Further lengths of their file grow as the root of the volume.
 
         Raises
         ------
@@ -110,14 +111,16 @@ class Splats:
                 f"{bad} of {len(self)} splats get positions or gradients that are not finite (NaN or infinity). Give a"
                 " place and a map for each."
             )
-        scales, rotations = mapped(self.scales, self.rotations, maps)
-        return replace(
-            self,
-            positions=places,
-            scales=scales,
-            rotations=rotations,
-            harmonics=turned(self.harmonics, orthogonal_parts(maps)) if self.harmonics.shape[1] else self.harmonics,
-        )
+        scales, rotations = (np.array(part, dtype=np.float64) for part in (self.scales, self.rotations))
+        harmonics = np.array(self.harmonics)
+        rows = np.flatnonzero((maps != np.eye(3)).any(axis=(1, 2)))  # others keep every bit
+        if len(rows):
+            part = slice(None) if len(rows) == len(self) else rows
+            scales[part], rotations[part] = mapped(scales[part], rotations[part], maps[part])
+            if harmonics.shape[1]:
+                harmonics[part] = turned(harmonics[part], orthogonal_parts(maps[part]))
+        file = self.file and self.file.scaled(np.cbrt(np.abs(np.linalg.det(maps))))
+        return replace(self, positions=places, scales=scales, rotations=rotations, harmonics=harmonics, file=file)
 
 
 def orthogonal_parts(gradients):

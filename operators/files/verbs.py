@@ -1,8 +1,11 @@
 """Verbs of the command line: what one is, the analysis, and those of tools that need nothing but their settings."""
 
+from functools import partial
+
 import bpy
 
 from ...core import PointCloudError
+from ...core.files import LasChoices, parse_classes
 from ..objects import options
 from ..objects.attributes import point_count
 from ..objects.notices import renew
@@ -69,6 +72,16 @@ class ObjectVerb(Verb):
 
     def add_options(self, parser):
         parser.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
+        parser.add_argument(
+            "--columns",
+            default="",
+            metavar="NAMES",
+            help='names of the columns of text files, such as "x y z - r g b"; else those found',
+        )
+        parser.add_argument(
+            "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
+        )
+        parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
         settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
         for name in _SETTINGS:
             add_setting(parser, settings[name])
@@ -80,7 +93,10 @@ class ObjectVerb(Verb):
 
     def open(self, path, option, arguments):
         """Open a file in place of all that is loaded; return the object that an option names, set up, and notices."""
-        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}")
+        columns = arguments.columns if option == "object" else ""
+        las = LasChoices(parse_classes(arguments.classes), arguments.withheld)
+        read = partial(files.read_file, columns=columns, las=las)
+        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}", read)
         reason = obstacle(obj)
         if reason:
             raise PointCloudError(reason)
@@ -146,8 +162,7 @@ class Analyze(ObjectVerb):
             obj.data = obj.data.copy()
         write_result(obj, analysis, arguments.write_limit)
         renew(obj, self.operator.name, analysis.notices)
-        if output is not None:
-            opening.save(output, obj, _arrays(obj, analysis))
+        written = [] if output is None else opening.save(output, obj, _arrays(obj, analysis))
         return {
             "points": len(analysis.measures.areas),
             "total_area": analysis.total_area,
@@ -155,7 +170,7 @@ class Analyze(ObjectVerb):
             "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
             **matched,
             "seconds": _rounded(analysis.seconds),
-            "notices": analysis.notices,
+            "notices": [*analysis.notices, *written],
         }
 
 
@@ -200,22 +215,21 @@ class Apply(ObjectVerb):
         ((*notices, line),) = tool.write_all(bpy.context, [obj], results)
         renew(obj, self.operator.name, notices)
         figures = self.figures(tool, results[0])
-        if output is not None:
-            self.save(tool, obj, output)
+        written = [] if output is None else self.save(tool, obj, output)
         return {
             "points": point_count(obj.data),
             "done": line,
             **figures,
             "seconds": _rounded(stages.seconds),
-            "notices": notices,
+            "notices": [*notices, *written],
         }
 
     def prepare(self, tool, obj, path, arguments):
         """Give the tool what its settings do not hold."""
 
-    def save(self, tool, obj, output):
-        """Write the output."""
-        opening.save(output, obj, files.attribute_arrays(obj), tool.shown)
+    def save(self, tool, obj, output) -> list:
+        """Write the output, and return what is written otherwise than it is."""
+        return opening.save(output, obj, files.attribute_arrays(obj), tool.shown)
 
     def figures(self, tool, result) -> dict:
         """Return numbers to print, beside the line about what was done."""

@@ -269,6 +269,23 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         default=True,
         update=_reshape,
     )
+    smooth: BoolProperty(
+        name="Smooth Colors",
+        description="Let colors run on from each disc to the next, by the slope of what is shown; otherwise each disc"
+        " has the one color of its point, as labels and directions have",
+        default=True,
+        update=_recolor,
+    )
+    shaded: FloatProperty(
+        name="Shaded",
+        description="How much the light shows the form: 0 for flat colors, as in the legend, 1 for a surface that is"
+        " nothing but lit. In Material Preview and renders; Solid shades by itself",
+        default=0.4,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_recolor,
+    )
     dim_back: BoolProperty(
         name="Dim Back Side",
         description="Darken discs that are seen from behind, such as those of the inside of an open scan",
@@ -315,6 +332,12 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         min=0.0,
         subtype="DISTANCE",
     )
+    own_material: PointerProperty(
+        type=bpy.types.Material,
+        name="Own Material",
+        description="Material of the first slot that the display shows, and will follow",
+    )
+    slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
 
     notices: CollectionProperty(

@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
-from ...core import PointCloudError, surface_deviation
+from ... import core
+from ...core import PointCloudError
 from ..objects.attributes import COMPARED, DEVIATION, tag_changed, write_attribute
 from ..objects.place import hide
 from ..objects.reading import TYPES, obstacle
@@ -41,7 +42,7 @@ class Compare(Tool):
             normals = operator(lambda stage, fraction: progress(stage, 0.4 * fraction)).normals
             with naming(name):
                 laplacian = other_operator(lambda stage, fraction: progress(stage, 0.4 + 0.4 * fraction))
-            found = surface_deviation(
+            found = core.surface_deviation(
                 reading.points + shift,
                 normals,
                 laplacian,

@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ...core import PointCloudError, orient_normals
+from ... import core
+from ...core import PointCloudError
 from ..objects.attributes import NORMAL, ORIENTATION, RESULTS, read_attribute
 from ..objects.reading import read_points
 from ..objects.result import write_result
@@ -61,7 +62,7 @@ class OrientNormals(Tool):
             progress("Orientation", 0.9)
 
             def compute():
-                return orient_normals(reading.points, normals, method=way, viewpoint=viewpoint, areas=areas)
+                return core.orient_normals(reading.points, normals, method=way, viewpoint=viewpoint, areas=areas)
 
             return sign * cache.result(measured.laplacian, "sides", reading.points, way, viewpoint, compute=compute)
 

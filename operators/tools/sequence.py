@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ...core import PointCloudError, match_modes
+from ... import core
+from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import MEAN_CURVATURE, eigenvector_name
 from ..objects.handlers import tell
@@ -58,7 +59,7 @@ def continue_modes(analysis, points, earlier):
     count = spectrum.eigenvectors.shape[1]  # of a subset fewer may be carried to all points
     spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
     if earlier is not None:
-        matched = match_modes(spectrum, analysis.measures.areas, points, *earlier)
+        matched = core.match_modes(spectrum, analysis.measures.areas, points, *earlier)
         spectrum, overlaps = matched.spectrum, matched.overlaps
     return replace(analysis, spectrum=spectrum), overlaps, (spectrum, points)
 

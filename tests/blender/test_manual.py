@@ -18,6 +18,7 @@ UNITS = {"PERCENTAGE": " %", "DISTANCE": " m", "ANGLE": "°"}
 KEPT = {
     "name",
     "notices",
+    "own_material",
     "compared_with",
     "compared_within",
     "spacing",
@@ -38,8 +39,7 @@ def read(path):
 
 
 def operators():
-    names = [name for name in dir(bpy.ops.meshfree) if name != "escape"]  # which nobody presses
-    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in names}
+    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in dir(bpy.ops.meshfree)}
 
 
 def sections(text):

@@ -222,15 +222,12 @@ def test_switching_off_and_on_leaves_nothing_behind(extension):
 
 WITHOUT_SCIPY = """
 import sys
+from importlib.machinery import PathFinder
 import bpy
 
-class Hidden:
-    def find_spec(self, name, path=None, target=None):
-        if name == "scipy" or name.startswith("scipy."):
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
 bpy.ops.wm.read_factory_settings(use_empty=True)
-sys.meta_path.insert(0, Hidden())
+find = PathFinder.find_spec
+PathFinder.find_spec = lambda name, *rest: None if name.partition(".")[0] == "scipy" else find(name, *rest)
 bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
 
 def told():
@@ -268,6 +265,32 @@ def test_without_a_scipy_for_this_python_it_says_so(archive, tmp_path):
         "RESULT ['MESHFREE_PT_missing'] False ['bl_ext.user_default.meshfree_laplacian']",
         "RESULT [] False []",
     ]
+
+
+START = """
+import sys
+import bpy
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
+print("RESULT", *(name for name in sys.modules if ".meshfree_laplacian.core" in name))
+print("HEAVY", *(name for name in sys.modules if name.partition(".")[0] in ("scipy", "laspy", "lazrs")))
+bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
+print("RUN", bpy.ops.meshfree.analyze(modes=0))
+print("THEN", len([name for name in sys.modules if name.partition(".")[0] == "scipy"]) > 100)
+"""
+LIGHT = ("core", "core.arguments", "core.errors", "core.memory", "core.options")
+
+
+def test_blender_starts_without_what_only_the_tools_need(archive, tmp_path):
+    """Of core only errors, options and the kinds of files are imported before a tool runs; scipy takes a second."""
+    lines = {line.split(" ")[0]: line.split(" ")[1:] for line in run_apart(tmp_path, START, archive)}
+    names = {name.partition(".meshfree_laplacian.")[2] for name in lines["RESULT"]}
+    assert names >= {"core", "core.errors"}
+    assert [name for name in names if name not in LIGHT and not name.startswith("core.files")] == []
+    assert lines["HEAVY"] == []
+    assert lines["RUN"] == ["{'FINISHED'}"]
+    assert lines["THEN"] == ["True"]
 
 
 OTHER_SCIPY = """

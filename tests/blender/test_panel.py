@@ -2,12 +2,14 @@
 
 import importlib
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 
+from tests import splat_files
 from tests.blender.clouds import add_object, grid_points, sphere_points
 from tests.blender.splats import add_splats, bar_splats
 
@@ -30,7 +32,6 @@ OPERATORS = (
     "deform_unbind",
     "deform_update",
     "dismiss",
-    "escape",
     "export_eigenvalues",
     "export_operator",
     "export_points",
@@ -41,12 +42,15 @@ OPERATORS = (
     "handle_add",
     "harmonic_field",
     "import_points",
+    "iso_lines_to_curves",
+    "join_splats",
     "legend",
     "mesh_surface",
     "minimal_surface",
     "mode_shape",
     "nearest_source",
     "orient_normals",
+    "own_material",
     "principal_curvatures",
     "roughness",
     "segment",
@@ -57,6 +61,7 @@ OPERATORS = (
     "select_group",
     "select_grow",
     "select_boundary",
+    "select_point",
     "separate_by_segment",
     "show_splats",
     "show_surface",
@@ -70,6 +75,7 @@ OPERATORS = (
 DIALOGS = (  # operators that ask before they work, in a layout of ours
     "compare",
     "export_points",
+    "export_splats",
     "extend_direction",
     "geodesic_distance",
     "harmonic_field",
@@ -196,6 +202,32 @@ def test_panel_tells_calmly_of_groups_without_points():
     assert "No points assigned yet" not in draw()
 
 
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [(0, "Select a point in Edit Mode first"), (1, "Uses the selected point"), (12, "Uses the 12 selected points")],
+)
+@pytest.mark.parametrize("name", ["geodesic_distance", "nearest_source", "unwrap", "extend_direction"])
+def test_dialogs_say_that_the_selection_is_used(name, count, text):
+    obj = add_object(sphere_points())
+    obj.data.vertices.foreach_set("select", np.arange(1000) < count)
+    assert texts_of(name)[:2] == ["group", text]
+    obj.vertex_groups.new(name="Source")
+    assert texts_of(name)[:1] == ["group"]
+    assert text not in texts_of(name)
+
+
+def texts_of(name):
+    """Return what the dialog of an operator holds as it opens."""
+    texts, operator = [], getattr(bpy.types, f"MESHFREE_OT_{name}")
+    properties = getattr(bpy.ops.meshfree, name).get_rna_type().properties
+    values = {item.identifier: item.default for item in properties if hasattr(item, "default")}
+    settings = Settings(layout=Layout(texts), **values)
+    settings.asks = value_of(operator.asks, settings)
+    settings.is_repeated = lambda context: False
+    operator.draw(settings, bpy.context)
+    return texts
+
+
 def test_panel_offers_what_tools_wrote_and_updates_only_what_is_on_show(modifiers):
     obj = add_object(sphere_points())
     bpy.ops.meshfree.show_surface()
@@ -225,8 +257,27 @@ def test_panel_of_splats_has_what_is_for_them(core):
     add_object(sphere_points())
     assert "Show Splats" not in draw()
     add_splats(bar_splats(core))
-    names = {"Show Splats", "Select Floaters", "Apply Transform to Splats", "Export Splats...", "leave_out_floaters"}
+    names = {
+        "Show Splats",
+        "Select Floaters",
+        "Apply Transform to Splats",
+        "Join Splats",
+        "Export Splats...",
+        "leave_out_floaters",
+    }
     assert names <= set(draw())
+
+
+def test_panel_tells_of_splats_that_blender_joined(tmp_path):
+    for number in range(2):
+        splat_files.write_ply(tmp_path / "a.ply", splat_files.some_columns(100, seed=number))
+        bpy.ops.meshfree.import_points(filepath=str(tmp_path / "a.ply"))
+    assert not any("turned or scaled without" in text for text in draw())
+    bpy.context.object.rotation_euler.x = 0.5
+    for obj in bpy.data.objects:
+        obj.select_set(True)
+    bpy.ops.object.join()
+    assert any("turned or scaled without" in text for text in draw())
 
 
 def test_panel_follows_the_order_of_work():
@@ -246,7 +297,7 @@ def test_panel_follows_the_order_of_work():
 
 def test_panel_counts_the_points_of_each_group():
     obj = add_object(sphere_points())
-    assert draw().count("0") == 6
+    assert draw().count("0") == 8
     obj.data.vertices.foreach_set("select", np.arange(1000) < 12)
     bpy.ops.meshfree.group_from_selection(role="ANCHOR")
     texts = draw()
@@ -335,15 +386,16 @@ def test_dialogs_show_every_setting(name):
     properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if not item.is_hidden]
     properties = [item for item in properties if item.type != "POINTER" and item.identifier != "filepath"]
     values = {item.identifier: item.default for item in properties}
+    hidden = {"_chosen": lambda: [Path("a.las"), Path("b.txt")]} if name == "import_points" else {}
     choices = [item for item in properties if item.type == "ENUM"]
     variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]
     texts = []
     for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
-        settings = Settings(layout=Layout(texts), **values | variant)
+        settings = Settings(layout=Layout(texts), **values | variant | hidden)
         settings.asks = value_of(operator.asks, settings)
         settings.is_repeated = lambda context: False
         operator.draw(settings, bpy.context)
-    assert set(texts) - {"No points assigned yet"} == set(values)
+    assert {text for text in texts if " " not in text} == set(values)
 
 
 @pytest.mark.parametrize("name", OPERATORS)

@@ -175,6 +175,32 @@ class TestView:
         gui.wait_until("view3d()[0].spaces.active.local_view is None")
 
 
+class TestGroupColors:
+    """Group Colors in Edit Mode."""
+
+    @pytest.mark.parametrize("opened", ["MESHFREE_PT_points"], indirect=True)
+    def test_undo_leaves_them_as_they_were(self, opened):
+        shown = "bpy.context.object.meshfree.show_groups and len(bpy.context.object.modifiers)"
+        groups = "bpy.context.object.vertex_groups.keys()"
+        opened.point_at_view()
+        opened.key("Tab", "alt+a")
+        opened.wait_until("bpy.context.object.mode == 'EDIT'")
+        opened.python("bpy.context.object.meshfree.show_groups = True")
+        opened.point_at_view()
+        opened.key("a")
+        opened.press("meshfree.group_from_selection(role='ANCHOR'")
+        opened.wait_until(f"{groups} == ['Anchor']")
+        opened.point_at_view()
+        for _ in range(3):
+            opened.key("ctrl+z")
+            assert opened.python(shown) == 1
+        assert opened.python(groups) == []
+        for _ in range(3):
+            opened.key("ctrl+shift+z")
+            assert opened.python(shown) == 1
+        assert opened.python(groups) == ["Anchor"]
+
+
 class TestSidebar:
     """The tab and its buttons."""
 

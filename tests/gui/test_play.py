@@ -124,6 +124,21 @@ class TestJobs:
         finish(job, 5)
         assert job.python(UNCHANGED)
 
+    def test_keys_of_what_runs_beside_it(self, job):
+        """The first Esc ends the drag that began meanwhile, the second one the work."""
+        place = job.python("list(bpy.context.object.location)")
+        job.point_at_view()
+        job.key("g")
+        x, y = job.view_center()
+        job.move(x + 90, y + 40)
+        assert job.python("list(bpy.context.object.location)") != place
+        job.key("Escape")
+        assert job.python("list(bpy.context.object.location)") == place
+        assert job.python(WORKING) == ["MESHFREE_OT_analyze"]
+        job.key("Escape")
+        finish(job, 5)
+        assert job.python(UNCHANGED)
+
     def test_undo_takes_back_what_was_before(self, job):
         job.key("ctrl+z")
         finish(job, 5)

@@ -94,6 +94,32 @@ def opened(gui):
     return gui
 
 
+class TestDrag:
+    """A handle that is dragged, with a rest in which the exact result is begun to be prepared."""
+
+    def test_esc_ends_the_drag(self, gui):
+        add_sphere(gui, 20000)  # too many to be solved for at each move
+        gui.python(PART)
+        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        gui.open_tab()
+        gui.press("meshfree.deform_bind", across=0.75)
+        gui.wait_until("bpy.context.object.name == 'Cloud Handle'", 90)
+        finish(gui)
+        place = gui.python("[list(row) for row in bpy.context.object.matrix_world]")
+        gui.point_at_view()
+        gui.key("g")
+        x, y = gui.view_center()
+        gui.move(x + 60, y - 60)
+        gui.wait_until(f"{MOVED} > 0.05")
+        gui.wait_until(BINDING)
+        gui.key("Escape")
+        assert gui.python(WORKING) == []
+        assert gui.python("[list(row) for row in bpy.context.object.matrix_world]") == place
+        gui.wait_until(f"{MOVED} == 0.0")
+        gui.wait_until("not live._jobs")
+        assert gui.python(MOVED) == 0.0
+
+
 class TestTwoWindows:
     """What is done in one window is seen in the other, and ends with neither."""
 
@@ -126,7 +152,7 @@ class TestTwoWindows:
         else:
             start(gui, "Smooth Points")
             gui.open_second()
-        gui.wait_until(f"all('MESHFREE_OT_escape' in names for names in {HEARING})")
+        gui.wait_until(f"any('MESHFREE_OT_smooth' in names for names in {HEARING})")
         gui.shot("work_in_two_windows")
         gui.point_at_second()
         gui.key("Escape")
