@@ -11,7 +11,8 @@ _MOST_DECIMALS = 9  # that are looked for, and ...
 _MEANT = 6  # ... that numbers have because they were measured so; more come out of a computation
 _SINGLE = 9  # digits with which single precision is written
 _FINE = 1e-5  # step of single precision that does not hurt, as a share of the extent ...
-_FINEST = 1e-3  # ... and of a number that is the same at all points
+_FINEST = 1e-3  # ... and in all: a millisecond, say, unless an offset does not help
+_HELPFUL = 0.125  # share of the largest number that is left by an offset that helps
 _FIRST = 1000  # numbers that are looked at before all others
 
 
@@ -78,6 +79,22 @@ def join_digits(parts, digits):
     return np.where(np.abs(rounded - values) <= error, rounded, values)
 
 
+def shortest(values):
+    """Return numbers of single precision as doubles of so few decimals that they still are these numbers.
+
+    Single precision keeps 0.123 as 0.123000003.
+    """
+    doubles = values.astype(np.float64)
+    for decimals in range(_MOST_DECIMALS + 1):
+        for rows in slice(_FIRST), slice(None):  # a few tell it mostly
+            rounded = np.round(doubles[rows], decimals)
+            if not _same(rounded.astype(np.float32), values[rows]):
+                break
+        else:
+            return rounded
+    return doubles
+
+
 def _split_whole(values, known):
     low, high = (int(values.min()), int(values.max())) if len(values) else (0, 0)
     if _fit(low, high):
@@ -141,13 +158,13 @@ def _split_floats(values, known):
     decimals = _decimals(finite)
     if decimals == 0 and len(finite) == len(values):
         return _split_whole(values.astype(np.int64), known)
-    offsets = [0.0, _float_offset(finite)]
-    if known is not None and isinstance(known.offset, float):
-        offsets.insert(0, known.offset)
-    for offset in offsets:
+    if _is_plain(finite, decimals):
+        return [values.astype(np.float32)], None
+    offsets = [known.offset] if known is not None and isinstance(known.offset, float) else []
+    for offset in (*offsets, _float_offset(finite)):
+        less = values - offset
         if _is_fine(finite, offset, decimals):
-            return [(values - offset).astype(np.float32)], Digits(offset, decimals) if offset else None
-    less = values - offset
+            return [less.astype(np.float32)], Digits(offset, decimals) if offset else None
     first = less.astype(np.float32)
     return [first, (less - first).astype(np.float32)], Digits(offset, decimals, "rest")
 
@@ -156,9 +173,7 @@ def _split_vectors(values):
     finite = values[np.isfinite(values).all(axis=1)]
     if values.dtype != np.float64 or len(finite) == 0 or np.abs(finite).max() > _LARGEST:
         return [values], None
-    offsets = [
-        0.0 if _is_kept(axis) or _is_fine(axis, 0.0, _decimals(axis)) else _float_offset(axis) for axis in finite.T
-    ]
+    offsets = [0.0 if _is_kept(axis) or _is_plain(axis) else _float_offset(axis) for axis in finite.T]
     return ([values - offsets], Digits(offsets)) if any(offsets) else ([values], None)
 
 
@@ -168,24 +183,31 @@ def _decimals(values):
     for decimals in range(_MOST_DECIMALS + 1):
         if largest * 10.0**decimals >= _EXACT:
             break
-        if all(_same(np.round(part, decimals), part) for part in (values[:_FIRST], values)):
+        if all(_same(np.round(part, decimals), part) for part in (values[:_FIRST], values)):  # a few tell it mostly
             return decimals
     return None
 
 
 def _float_offset(values):
-    """Return the middle of numbers, rounded to a power of ten below their extent."""
+    """Return the middle of numbers, rounded to a power of ten below their extent; zero if that does not help."""
     low, high = float(values.min()), float(values.max())
     if high - low < _SMALLEST:
         return low
-    decimals = -int(np.floor(np.log10(high - low)))
-    return float(np.round(0.5 * low + 0.5 * high, decimals))
+    offset = float(np.round(0.5 * low + 0.5 * high, -int(np.floor(np.log10(high - low)))))
+    left = max(high - offset, offset - low)
+    return offset if left < _HELPFUL * max(abs(low), abs(high)) else 0.0
 
 
-def _is_fine(values, offset, decimals):
+def _is_plain(values, decimals=None):
+    """Whether single precision does not hurt numbers as they are."""
+    return _is_fine(values, 0.0, _decimals(values) if decimals is None else decimals, _FINEST)
+
+
+def _is_fine(values, offset, decimals, finest=np.inf):
     """Whether single precision does not hurt numbers less an offset.
 
-    Those that were measured to some decimals have these again when they are rounded. Others keep their differences.
+    Those that were measured to some decimals have these again when they are rounded. Others keep their differences, in
+    steps that are no coarser than the finest.
     """
     less = values - offset
     single = less.astype(np.float32)
@@ -198,4 +220,4 @@ def _is_fine(values, offset, decimals):
     if extent < _SMALLEST:
         return step <= _FINEST
     gaps = np.diff(np.unique(values))
-    return step <= min(_FINE * extent, 0.5 * float(np.median(gaps)))
+    return step <= min(_FINE * extent, 0.5 * float(np.median(gaps)), finest)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InvalidPointsError
 from .cells import Rows, find_rows, load, load_whole
+from .digits import shortest
 from .guess import guess_names
 from .layout import find_layout, given_layout
 from .lines import is_number, read_text
@@ -188,7 +189,10 @@ def write_columns(path, table, delimiter=" ", double=True):
         Whether coordinates are written with the digits of double precision.
     """
     columns = to_columns(table)
+    if not double:
+        columns.update((axis, columns[axis].astype(np.float32)) for axis in "xyz")
     formats = [_text_format(values) for values in columns.values()]
+    columns = {name: shortest(item) if item.dtype == np.float32 else item for name, item in columns.items()}
     if double:
         formats[:3] = 3 * ["%.15g"]
     with open(path, "w", encoding="utf-8", newline="\n") as file:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import bpy
 
 from ...core.files import Digits, join_digits
-from ..objects.attributes import read_attribute
+from ..objects.attributes import point_count, read_attribute
 from ..objects.place import COLUMNS
 
 
@@ -18,16 +18,24 @@ class Column(NamedTuple):
 
 
 def remember_columns(obj, columns):
-    """Keep on an object how columns are kept, `Column` by the names of attributes."""
+    """Keep on an object how columns are kept, `Column` by the names of attributes, and for how many points."""
     if columns:
         kept = {name: {**column.digits._asdict(), "second": column.second} for name, column in columns.items()}
-        obj[COLUMNS] = json.dumps(kept)
+        obj[COLUMNS] = json.dumps({"points": point_count(obj.data), "columns": kept})
 
 
 def kept_columns(obj) -> dict:
     """Return how columns of an object are kept, `Column` by the names of attributes."""
-    kept = json.loads(obj.get(COLUMNS, "{}"))
+    kept = json.loads(obj.get(COLUMNS, "{}")).get("columns", {})
     return {name: Column(second=found.pop("second"), digits=Digits(**found)) for name, found in kept.items()}
+
+
+def doubted_columns(obj) -> list:
+    """Return a notice if an object has points of others, by Blender's Join, whose columns may be kept otherwise."""
+    names = [name for name in kept_columns(obj) if name in obj.data.attributes]
+    if not names or point_count(obj.data) <= json.loads(obj[COLUMNS])["points"]:
+        return []
+    return [f"{obj.name} has more points than were imported: {', '.join(names)} may be off by an offset at these"]
 
 
 def known_digits(name):

@@ -102,7 +102,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
         def write(path, progress):
             progress("Write", 0.0)
             notices = write_points(path, table, double=not table.single)
-            return *notices, f"{name}: {len(table.points):,} points written to {path.name}"
+            return *table.notices, *notices, f"{name}: {len(table.points):,} points written to {path.name}"
 
         return write
 

@@ -21,7 +21,6 @@ from ...core.files import (
     numbered_files,
     order_frames,
     parse_classes,
-    read_points,
 )
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
@@ -34,7 +33,7 @@ from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
 from .columns import tell_columns
-from .objects import add_object, file_filter
+from .objects import add_object, file_filter, read_file
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
 
@@ -307,7 +306,7 @@ def _read_all(paths, columns, choices, surface, progress):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
         key = ("file", str(path), state and (state.st_mtime_ns, state.st_size), columns, choices)
-        tables.append(cache.fetch(key, lambda path=path: _read(path, columns, choices)))
+        tables.append(cache.fetch(key, lambda path=path: read_file(path, columns, choices)))
     if not surface:
         return [(table, None) for table in tables]
     total = sum(len(table.points) for table in tables if not isinstance(table, core.Splats))
@@ -316,13 +315,6 @@ def _read_all(paths, columns, choices, surface, progress):
     return [
         (table, None if isinstance(table, core.Splats) else _find_discs(table.points, progress)) for table in tables
     ]
-
-
-def _read(path, columns, choices):
-    """Read one file, as splats where it holds such."""
-    if columns.strip():
-        return read_points(path, columns)
-    return core.splats.read_file(path, lambda path: read_points(path, las=choices))
 
 
 def _find_discs(points, progress):

@@ -4,24 +4,25 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
+from ... import core
 from ...core import PointCloudError
 from ...core.files import (
     READABLE,
     SPLATS,
     WRITABLE,
+    LasChoices,
     PointTable,
     choose_origin,
     is_coarse,
+    read_points,
     replacing,
     split_digits,
 )
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
 from ..objects.attributes import (
-    CORNER,
-    DISC,
-    MOVED_DISC,
     NORMAL,
+    ONLY_DRAWN,
     PREFIX,
     STORABLE,
     own_positions,
@@ -33,13 +34,13 @@ from ..objects.colors import COLOR, own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions
-from .columns import Column, known_digits, read_columns, remember_columns
+from .columns import Column, doubted_columns, known_digits, read_columns, remember_columns
 
 INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
+_ALL = LasChoices()
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
 _PART = 5  # of them that tell the second part of a column
-_UNSEEN = DISC, MOVED_DISC, CORNER  # attributes that only draw points
 
 
 def file_filter(*suffixes):
@@ -50,6 +51,26 @@ def file_filter(*suffixes):
         default=";".join(f"*{suffix}" for suffix in suffixes),
         options={"HIDDEN"},
     )
+
+
+def read_file(path, columns="", las=_ALL):
+    """Read a file, as splats where it holds such.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    columns : str
+        Names of the columns of a file of text; empty to find them.
+    las : LasChoices
+        Which points of LAS files are read.
+
+    Returns
+    -------
+    Splats or PointTable
+    """
+    if columns.strip():
+        return read_points(path, columns)
+    return core.splats.read_file(path, lambda path: read_points(path, las=las))
 
 
 def add_object(name, table, collection, known=None, with_attributes=True):
@@ -98,7 +119,10 @@ def _add_parts(mesh, name, values):
     if name.startswith(PREFIX) or (name in (SCANNER, FILE_NORMAL) and values.ndim == 2):
         add_column(mesh, name, values)
         return {}
-    parts, digits = split_digits(values, known_digits(name))
+    parts, digits = split_digits(values)
+    known = None if digits is None else known_digits(name)
+    if known is not None:
+        parts, digits = split_digits(values, known)
     first = add_column(mesh, name, parts[0])
     if digits is None:
         return {}
@@ -144,7 +168,8 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     Returns
     -------
     PointTable
-        With normals and places of scanners of the world. `single` tells that single precision does for the coordinates.
+        With normals and places of scanners of the world. `single` tells that single precision does for the coordinates,
+        and notices tell which columns are in doubt.
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     with np.errstate(invalid="ignore"):  # infinite points have no place when they are turned
@@ -154,7 +179,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     names = [layer.name for layer in data.attributes if _is_column(layer)] if attributes != "NONE" else []
     if attributes == "RESULTS":
         names = [name for name in names if name.startswith(PREFIX)]
-    table.attributes = read_columns(obj, names)
+    table.attributes, table.notices = read_columns(obj, names), doubted_columns(obj) if names else []
     vectors = [name for name in (NORMAL, FILE_NORMAL) if np.ndim(table.attributes.get(name)) == 2]
     normals = [table.attributes.pop(name) for name in vectors]
     if normals:
@@ -167,7 +192,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
 
 
 def _is_column(layer):
-    hidden = layer.name.startswith(".") or layer.name == "position" or layer.name in _UNSEEN
+    hidden = layer.name.startswith(".") or layer.name == "position" or layer.name in ONLY_DRAWN
     return not hidden and layer.domain == "POINT" and layer.data_type in STORABLE
 
 
@@ -282,9 +307,9 @@ def attribute_arrays(obj):
     """Return the points in the world, and what this extension wrote by its names without the lb_."""
     arrays = {"points": file_points(obj)}
     for attribute in obj.data.attributes:
-        if attribute.name.startswith(PREFIX):
+        if attribute.name.startswith(PREFIX) and attribute.name not in ONLY_DRAWN:
             arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)
     for name, values in obj.items():
-        if name.startswith(PREFIX):
+        if name.startswith(PREFIX) and not isinstance(values, str):
             arrays[name.removeprefix(PREFIX)] = np.array(values)
     return arrays

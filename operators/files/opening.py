@@ -4,18 +4,18 @@ import bpy
 
 from ... import core
 from ...core import PointCloudError
-from ...core.files import WRITABLE, PointTable, read_points, write_points
+from ...core.files import WRITABLE, PointTable, write_points
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.colors import own_colors
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
 from .columns import tell_columns
-from .objects import add_object, point_table, save_arrays
+from .objects import add_object, point_table, read_file, save_arrays
 from .splats import add_splats, splats_to_write, with_results
 
 
-def load(path, name: str = "", option: str = "--object", columns: str = ""):
+def load(path, name: str = "", option: str = "--object", read=read_file):
     """Open a file in place of everything that is loaded.
 
     Parameters
@@ -26,8 +26,8 @@ def load(path, name: str = "", option: str = "--object", columns: str = ""):
         The object's name; empty for the active one, or else the only mesh.
     option : str
         Of the command line, by which one names it.
-    columns : str
-        Names of the columns of a file of text; empty to find them.
+    read : callable
+        What reads a file that is no .blend, of a path.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def load(path, name: str = "", option: str = "--object", columns: str = ""):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        given = read_points(path, columns) if columns.strip() else core.splats.read_file(path)
+        given = read(path)
         bpy.ops.wm.read_homefile(use_empty=True)
         add = add_object if isinstance(given, PointTable) else add_splats
         obj = add(path.stem, given, bpy.context.scene.collection)
@@ -88,7 +88,7 @@ def save(path, obj, arrays, shown="") -> list:
         core.write_splats(path, with_results(splats_to_write(obj), obj.data))
     elif suffix in WRITABLE:
         table = point_table(bpy.context, obj)
-        return write_points(path, table, double=not table.single)
+        return [*table.notices, *write_points(path, table, double=not table.single)]
     else:
         for other in bpy.context.view_layer.objects:
             other.select_set(other == obj)

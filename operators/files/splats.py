@@ -8,7 +8,7 @@ import numpy as np
 from ... import core
 from ...core.files import choose_origin
 from ...core.files.table import split_columns
-from ..objects.attributes import PREFIX, STORABLE, read_attribute, write_attribute
+from ..objects.attributes import ONLY_DRAWN, PREFIX, STORABLE, read_attribute, write_attribute
 from ..objects.place import OFFSET, place_of
 from ..objects.splat_file import (
     OWN_OFFSET,
@@ -75,12 +75,14 @@ def _write_shifted(obj, places, turn, known):
     """Write places of a file, those far away less an offset, which the object keeps as it is in the world."""
     turned = places @ turn.T
     origin = choose_origin(turned, known)
-    # Where a few floaters lie far away, the others would lose digits by a shift to the middle of all.
-    if not origin.any() or np.median(np.abs(turned - origin)) > np.median(np.abs(turned)):
-        return write_places(obj.data, places)
+    if known is None or (origin != known).any():
+        # Where a few floaters lie far away, the others would lose digits by a shift to the middle of all.
+        nearer = np.median(np.abs(turned - origin), axis=0) < np.median(np.abs(turned), axis=0)
+        origin = np.where(nearer, origin, 0.0)
     own = origin @ turn
-    obj[OFFSET], obj[OWN_OFFSET] = origin.tolist(), own.tolist()
-    return write_places(obj.data, places - own)
+    if origin.any():
+        obj[OFFSET], obj[OWN_OFFSET] = origin.tolist(), own.tolist()
+    write_places(obj.data, places - own)
 
 
 def _keep_file(obj, splats):
@@ -156,6 +158,6 @@ def with_results(splats, data):
     """Return splats to be written with the results that their points hold, as columns of the file beside its own."""
     columns = {} if splats.file is None else dict(splats.file.columns)
     for layer in data.attributes:
-        if layer.name.startswith(PREFIX) and layer.data_type in STORABLE:
+        if layer.name.startswith(PREFIX) and layer.name not in ONLY_DRAWN and layer.data_type in STORABLE:
             columns.update(split_columns(layer.name, read_attribute(data, layer.name)))
     return replace(splats, file=(splats.file or core.splats.SplatFile({}))._replace(columns=columns))

@@ -1,8 +1,11 @@
 """Verbs of the command line: what one is, the analysis, and those of tools that need nothing but their settings."""
 
+from functools import partial
+
 import bpy
 
 from ...core import PointCloudError
+from ...core.files import LasChoices, parse_classes
 from ..objects import options
 from ..objects.attributes import point_count
 from ..objects.notices import renew
@@ -75,6 +78,10 @@ class ObjectVerb(Verb):
             metavar="NAMES",
             help='names of the columns of text files, such as "x y z - r g b"; else those found',
         )
+        parser.add_argument(
+            "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
+        )
+        parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
         settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
         for name in _SETTINGS:
             add_setting(parser, settings[name])
@@ -87,7 +94,9 @@ class ObjectVerb(Verb):
     def open(self, path, option, arguments):
         """Open a file in place of all that is loaded; return the object that an option names, set up, and notices."""
         columns = arguments.columns if option == "object" else ""
-        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}", columns)
+        las = LasChoices(parse_classes(arguments.classes), arguments.withheld)
+        read = partial(files.read_file, columns=columns, las=las)
+        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}", read)
         reason = obstacle(obj)
         if reason:
             raise PointCloudError(reason)

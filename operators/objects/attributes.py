@@ -41,7 +41,8 @@ COMPONENT = "lb_component"
 TRUST = "lb_trust"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"  # principal ones
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
-SLOPE, SLOPE_2 = ".lb_slope", ".lb_slope_2"  # of what is shown, or of both texture coordinates; Blender lists no dots
+# Slopes of what is shown, or of both texture coordinates, and the values, by their means. Blender hides such names.
+SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
 RISE = "lb_rise"  # by how much what is shown rises in discs that the display draws
 CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
@@ -55,6 +56,7 @@ DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
 SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of splats that are carried along
 MOVED_DISC = "lb_moved_disc"  # what a deformation makes of the disc
+ONLY_DRAWN = DISC, MOVED_DISC, CORNER  # which say nothing about the points, only how they are drawn
 SPLAT_HARMONIC = "lb_splat_sh_"  # followed by the number of the harmonic, from 0
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale

@@ -1,17 +1,21 @@
 """Where an object's points were in the file that they come from, and whether the object is seen where it is."""
 
+import json
+
 import numpy as np
 
-OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
+from .attributes import point_count
 
+OFFSET = "lb_offset"  # custom property of an object: what its coordinates in the file were before import, less now
 COLUMNS = "lb_columns"  # another one: what numbers of its attributes were in the file, in JSON; see operators/files
 
 
 def copy_place(obj, other):
-    """Let an object tell the same about its file as another one whose points and attributes it has."""
-    for name in (OFFSET, COLUMNS):
-        if name in other:
-            obj[name] = other[name]
+    """Let an object tell the same about its file as another one whose attributes it has, for all of its points."""
+    if OFFSET in other:
+        obj[OFFSET] = other[OFFSET]
+    if COLUMNS in other:
+        obj[COLUMNS] = json.dumps({**json.loads(other[COLUMNS]), "points": point_count(obj.data)})
 
 
 def offset_of(obj):

@@ -145,6 +145,26 @@ def test_what_of_a_file_is_left_out_is_told(run, tmp_path):
     ]
 
 
+def test_classes_and_withheld_points_of_scans(run, tmp_path):
+    import laspy
+
+    las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    las.x, las.y, las.z = np.vstack([POINTS, 2.0 * POINTS]).T
+    las.classification = np.repeat([2, 5], len(POINTS))
+    las.withheld = np.arange(2 * len(POINTS)) == 0
+    las.write(str(tmp_path / "in.las"))
+    for options, count in (
+        (["--classes", "2"], len(POINTS) - 1),
+        (["--classes", "5"], len(POINTS)),
+        (["--classes", "2", "--withheld"], len(POINTS)),
+    ):
+        code, (line,) = run("analyze", tmp_path / "in.las", *options)
+        assert (code, line["points"]) == (0, count)
+        assert any("points of other classes" in notice for notice in line["notices"])
+    code, (line,) = run("analyze", tmp_path / "in.las", "--classes", "ground")
+    assert "no class of LAS" in line["error"]
+
+
 def test_stiffness_of_the_arrays(core, run, tmp_path):
     from scipy.sparse import load_npz  # bundled with the extension
 

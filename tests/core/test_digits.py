@@ -69,6 +69,17 @@ def test_times_without_decimals_keep_their_differences():
     assert np.abs(found - times).max() < 1e-6
 
 
+def test_gps_times_of_a_flight_keep_a_millisecond_at_least():
+    times = 245_370.0 + np.sort(RANDOM.random(COUNT)) * 4400.0
+    found, parts, _ = kept(times)
+    assert len(parts) == 1
+    assert np.abs(found - times).max() < 5e-4
+
+
+def test_large_numbers_that_no_offset_helps_stay_as_they_are():
+    assert split_digits(1e6 * RANDOM.random(COUNT))[1] is None
+
+
 @pytest.mark.parametrize(
     "values",
     [
@@ -136,6 +147,17 @@ def test_text_has_all_digits(tmp_path):
     for name, values in COLUMNS.items():
         assert [float(value) for value in read.attributes[name]] == [float(value) for value in values]
     assert [int(value) for value in read.attributes["hash"]] == COLUMNS["hash"].tolist()
+
+
+def test_text_has_no_digits_of_single_precision_alone(tmp_path):
+    values = np.array([0.123, 0.25, -7.5, 0.001], np.float32)
+    table = PointTable(np.column_stack([values, values, values]).astype(np.float64), {"value": values})
+    write_points(tmp_path / "a.csv", table, double=False)
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    assert lines[:2] == ["x,y,z,value", "0.123,0.123,0.123,0.123"]
+    random = RANDOM.random(COUNT).astype(np.float32) * np.float32(1e-5)
+    write_points(tmp_path / "a.csv", PointTable(RANDOM.random((COUNT, 3)), {"value": random}))
+    assert_array_equal(read_points(tmp_path / "a.csv").attributes["value"].astype(np.float32), random)
 
 
 def test_ply_has_all_digits(tmp_path):
