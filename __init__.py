@@ -43,6 +43,7 @@ def _modules():
         overlay,
         panel,
         points,
+        preferences,
         presets,
         range_selection,
         show,
@@ -92,6 +93,7 @@ def _modules():
         keys,
         overlay,
         drag,
+        preferences,
     )
 
 

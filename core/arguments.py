@@ -73,7 +73,7 @@ def check_positions(positions, count, name, singular):
             f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers."
             f" Give x, y, z for each {singular}."
         )
-    given = given.astype(np.float64)  # in single precision the limit would be infinite
+    given = as_doubles(given)  # in single precision the limit would be infinite
     bad = int(np.count_nonzero(~(np.abs(given) < _HUGE).all(axis=1)))
     if bad:
         raise InvalidPointsError(

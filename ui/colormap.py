@@ -5,8 +5,9 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..operators.objects.all_or_nothing import all_or_nothing
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
+from ..operators.objects.colors import own_material
 from ..operators.running.ready import ReadyOperator, reporting
-from .display import find_display, is_colored, own_material
+from .display import find_display, is_colored
 from .show import show_attribute, show_in_solid, show_own_material, use_material_preview
 
 

@@ -27,12 +27,6 @@ def is_colored(obj) -> bool:
     return bool(shown_attribute(obj)) and shows_own(find_material(obj))
 
 
-def own_material(obj):
-    """Return the user's material of an object, that of its first slot; None without one."""
-    material = obj.material_slots[0].material if obj.material_slots else None
-    return None if material is None or DISPLAY_TAG in material else material
-
-
 def draws_faces(obj) -> bool:
     """Whether viewports draw faces of an object, those of a mesh or discs, and no dots."""
     modifier = find_display(obj)

@@ -8,7 +8,7 @@ from .panel import TASKS
 
 _TOOLS = (
     ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "own_material", "legend"),
-    ("mesh_surface", "iso_lines_to_curves", "compare"),
+    ("mesh_surface", "iso_lines_to_curves", "compare", "compare_swap"),
     ("principal_curvatures", "roughness", "orient_normals"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
@@ -18,7 +18,7 @@ _TOOLS = (
     ("deform_bake", "deform_free"),
     ("apply_to_splats", "join_splats"),
     ("minimal_surface",),
-    ("stop",),
+    ("dismiss", "stop"),
 )
 _SELECTING = (
     "select_grow",

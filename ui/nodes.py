@@ -5,7 +5,7 @@ from functools import partial
 
 import bpy
 
-from ..operators.objects.attributes import CORNER, DISC, RISE, SLOPE, SLOPE_2
+from ..operators.objects.attributes import CORNER, DISC, RISE, SLOPE, SLOPE_2, SLOPE_OF
 from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, has_input, is_intact, new_group
 from ..operators.objects.splats import BASE, HARMONIC, ROTATION, SCALE
 from . import colormaps
@@ -16,7 +16,7 @@ DISCS = "Discs"  # another: whether it draws discs
 STROKES = "Strokes"  # another: the attribute that has them
 FILLED = "Filled"  # another: whether dots are as large as discs
 SPLATS = "Splats"  # another: whether it draws their ellipsoids
-SMOOTH = "Smooth"  # another: whether values change within discs
+SMOOTH = "Smooth"  # another: the attribute that changes within discs
 LENGTH, INK = "Stroke Length", "Stroke Material"  # others: what they look like
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
@@ -36,6 +36,7 @@ _INK = (0.012, 0.012, 0.016, 1.0)  # color of strokes
 _INK_TAG = "meshfree_strokes"  # custom property of the material of strokes
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
+_ROUNDING = 1e-5  # share by which values may differ that are the same
 _BROADEST = 0.3  # of that, half of it, where steps are narrow
 _BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
 _DIM = 0.85  # how dark the back side becomes where it is dimmed
@@ -44,7 +45,7 @@ _COLORED = "COLOR"  # where points have colors of their own
 _CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
 CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
 _DEVIATIONS = 2.0  # standard deviations at which the ellipsoid of a splat ends
-_UNSEEN = f"{HARMONIC}*", "ply_*", "lb_*"  # attributes of splats that do not show
+_UNSEEN = f"{HARMONIC}*", "ply_*", ".splat_*", "lb_*"  # attributes of splats that do not show
 _SPLATTED, _CONSTANT = "SPLATS", 0.28209479  # the harmonic of degree 0
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
@@ -67,7 +68,12 @@ def display_group():
     add_input(group, DISCS, "Bool", f"Draw discs that lie in the surface, as the attribute {DISC} says")
     add_input(group, FILLED, "Bool", f"Draw dots as large as the discs of {DISC}, so that they leave no holes")
     add_input(group, SPLATS, "Bool", f"Draw ellipsoids, as the attributes {SCALE} and {ROTATION} say")
-    add_input(group, SMOOTH, "Bool", "Let what is shown change within each disc, as its slopes along the surface say")
+    add_input(
+        group,
+        SMOOTH,
+        "String",
+        "Attribute that changes within discs, by its slopes along the surface; empty for none",
+    )
     add_input(
         group, STROKES, "String", "Attribute with directions along the surface, which strokes show; empty for none"
     )
@@ -250,14 +256,11 @@ def _rising(group, given, corners):
     """Add the nodes that tell by how much what is shown rises from the middle of a disc to each corner.
 
     That of texture coordinates is x and y; that of a number is x, with y how steep it is, and z to tell that it is
-    known.
+    known. All is zero where values have changed since their slopes were found.
     """
     middle, first, second = (
-        add_node(group, "GeometryNodeInputNamedAttribute", 8, -2300 - 200 * row, data_type="FLOAT_VECTOR")
-        for row in range(3)
+        _named(group, 8, -2300 - 200 * row, name) for row, name in enumerate((RISE, SLOPE, SLOPE_2))
     )
-    for node, name in ((middle, RISE), (first, SLOPE), (second, SLOPE_2)):
-        node.inputs["Name"].default_value = name
     place = add_node(group, "GeometryNodeInputPosition", 8, -2900)
     step = add_node(group, "ShaderNodeVectorMath", 9, -2300, operation="SUBTRACT")
     along, across = (
@@ -266,7 +269,8 @@ def _rising(group, given, corners):
     steep = add_node(group, "ShaderNodeVectorMath", 10, -2700, operation="LENGTH")
     single = _math(group, 10, -2900, "SUBTRACT", 1.0, second.outputs["Exists"])
     combined = add_node(group, "ShaderNodeCombineXYZ", 12, -2300)
-    stored, value = _stored(group, 13, -2300, RISE, "FLOAT_VECTOR")
+    valid = add_node(group, "ShaderNodeVectorMath", 13, -2500, operation="SCALE")
+    stored, value = _stored(group, 14, -2300, RISE, "FLOAT_VECTOR")
     steep_or_none = _math(group, 11, -2700, "MULTIPLY", steep.outputs["Value"], single)
     for source, target in (
         (place.outputs["Position"], step.inputs[0]),
@@ -279,19 +283,44 @@ def _rising(group, given, corners):
         (along.outputs["Value"], combined.inputs["X"]),
         (_math(group, 11, -2500, "ADD", across.outputs["Value"], steep_or_none), combined.inputs["Y"]),
         (single, combined.inputs["Z"]),
+        (combined.outputs[0], valid.inputs[0]),
+        (_unchanged(group, given), valid.inputs["Scale"]),
         (corners, stored.inputs["Geometry"]),
-        (combined.outputs[0], value),
+        (valid.outputs[0], value),
     ):
         group.links.new(source, target)
-    return _where_smooth(group, given, 14, -2300, corners, stored.outputs["Geometry"])
+    return _where_smooth(group, given, 15, -2300, corners, stored.outputs["Geometry"])
+
+
+def _unchanged(group, given):
+    """Add the nodes that tell whether an attribute has the values that slopes were found of; return that, 1 or 0."""
+    now, then = (_named(group, 9, -3100 - 200 * row, SLOPE_OF, "FLOAT") for row in range(2))
+    group.links.new(given.outputs[SMOOTH], now.inputs["Name"])
+    same = _math(group, 11, -3100, "COMPARE", now.outputs["Attribute"], then.outputs["Attribute"])
+    size = _math(group, 10, -3300, "ABSOLUTE", then.outputs["Attribute"])
+    group.links.new(_math(group, 10, -3500, "MULTIPLY", size, _ROUNDING), same.node.inputs[2])
+    return _math(group, 12, -3100, "MULTIPLY", same, then.outputs["Exists"])
 
 
 def _where_smooth(group, given, column, y, plain, smooth):
-    """Add a node that takes the smooth geometry where that is asked for; else it costs no time."""
+    """Add nodes that take the smooth geometry where that is asked for; else it costs no time."""
+    asked = add_node(group, "FunctionNodeCompare", column, y - 200, data_type="STRING", operation="NOT_EQUAL")
     chosen = add_node(group, "GeometryNodeSwitch", column, y, input_type="GEOMETRY")
-    for source, name in ((given.outputs[SMOOTH], "Switch"), (plain, "False"), (smooth, "True")):
-        group.links.new(source, chosen.inputs[name])
+    for source, target in (
+        (given.outputs[SMOOTH], next(item for item in asked.inputs if item.name == "A" and item.type == "STRING")),
+        (asked.outputs["Result"], chosen.inputs["Switch"]),
+        (plain, chosen.inputs["False"]),
+        (smooth, chosen.inputs["True"]),
+    ):
+        group.links.new(source, target)
     return chosen.outputs["Output"]
+
+
+def _named(group, column, y, name, data_type="FLOAT_VECTOR"):
+    """Add a node that reads an attribute; return it."""
+    node = add_node(group, "GeometryNodeInputNamedAttribute", column, y, data_type=data_type)
+    node.inputs["Name"].default_value = name
+    return node
 
 
 def _stored(group, column, y, name, data_type):

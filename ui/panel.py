@@ -13,8 +13,8 @@ from ..operators.objects.attributes import (
     mode_number,
     point_count,
 )
-from ..operators.objects.colors import own_colors
-from ..operators.objects.modifiers import get_input, has_input, input_property, is_own, is_sequence
+from ..operators.objects.colors import own_colors, own_material, shows_own_material
+from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
 from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
@@ -24,7 +24,6 @@ from .display import (
     draws_discs,
     find_display,
     label,
-    own_material,
     range_node,
     shown_attribute,
     shows_zeros,
@@ -371,8 +370,7 @@ def _draw_own_looks(column, obj, shown):
     if colors:
         column.operator("meshfree.colormap", text="Color", depress=colors == shown).attribute = colors
     if material is not None and find_display(obj) is not None:
-        seen = get_input(find_display(obj), "Material") == material
-        column.operator("meshfree.own_material", depress=seen)
+        column.operator("meshfree.own_material", depress=shows_own_material(obj))
 
 
 def _draw_colors(layout, context, obj):

@@ -19,8 +19,18 @@ from ..operators.objects.attributes import (
     positions_now,
     read_attribute,
 )
-from ..operators.objects.colors import is_color, own_colors
-from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, has_group, role_group
+from ..operators.objects.colors import is_color, own_colors, own_material
+from ..operators.objects.groups import (
+    ANCHOR,
+    BOUNDARY_GROUP,
+    HANDLE,
+    HIGH,
+    LOW,
+    ROLES,
+    handle_names,
+    has_group,
+    role_group,
+)
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
@@ -37,7 +47,6 @@ from .display import (
     is_distance,
     is_texture,
     numbers,
-    own_material,
     shown_attribute,
     sloping,
     without_unreached,
@@ -66,6 +75,7 @@ from .nodes import (
 from .value_range import STEPPED, all_zero, fit_range
 
 _MOST_HANDLES = 6  # that have colors
+_LATE = LOW, HIGH  # groups that came with a later version
 _MOST_GROUPS = 12  # attributes that a material reads for them: Blender's shaders take 15
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
 _LINE_WIDTH = 1.0 / 250.0  # of iso lines, in the root of the area
@@ -290,6 +300,8 @@ def show_in_solid(obj):
 def use_material_preview(context):
     """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
     space = context.space_data
+    if context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
+        return
     if space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
         space.shading.type = "MATERIAL"
 
@@ -333,7 +345,8 @@ def reshape(obj):
         if has_input(group, FILLED):
             set_input(modifier, FILLED, known and formed)
         if has_input(group, SMOOTH):  # slopes do not turn
-            set_input(modifier, SMOOTH, turned and deform is None and obj.meshfree.slopes_of != "")
+            sloping_now = turned and deform is None and obj.meshfree.slopes_of != ""
+            set_input(modifier, SMOOTH, shown_attribute(obj) if sloping_now else "")
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
         dots, bound = not (turned and draws_discs(obj)), deform is not None
@@ -389,7 +402,7 @@ def _color(obj, name, values):
     dim_back(material, settings.dim_back)
     shade(material, settings.shaded)
     columns = [] if values is None or stepped or not settings.smooth else sloping(name, values, part)
-    smooth.follow(obj, f"{name} {part}", columns, settings.spacing)
+    smooth.follow(obj, name, part, columns, settings.spacing)
     for other in sharing_objects(obj):  # which may show something else
         reshape(other)
     obj.update_tag()
@@ -416,12 +429,13 @@ def _group_colors(obj) -> dict:
     """Return the colours of groups by their names: none if they are not shown, and not all of very many.
 
     Groups that are still to come are among them, so that they are seen as soon as points are assigned, while there is
-    room.
+    room; but for those that materials of earlier versions do not know.
     """
     settings = obj.meshfree
     if not settings.show_groups:
         return {}
-    names = {role_group(obj, role): role for role in ROLES}
+    there = [role for role in ROLES if role not in _LATE or has_group(obj, role)]
+    names = {role_group(obj, role): role for role in there}
     if settings.boundary_group:
         names[settings.boundary_group] = BOUNDARY_GROUP
     names[settings.deform.anchors or ANCHOR] = ANCHOR

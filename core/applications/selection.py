@@ -88,6 +88,11 @@ def front_point(points, eye, direction, reach):
     int
         Its number; -1 if there is none around the ray.
 
+    Raises
+    ------
+    PointCloudError
+        A direction of no length.
+
     See Also
     --------
     grow : Takes the points around it in.
@@ -106,7 +111,10 @@ def front_point(points, eye, direction, reach):
     1.0
     """
     offset = np.asarray(points, dtype=np.float64) - np.asarray(eye, dtype=np.float64)
-    axis = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
+    length = np.linalg.norm(direction)
+    if not 0.0 < length < np.inf:
+        raise PointCloudError("The direction of the ray has no length. Give one that is not zero.")
+    axis = np.asarray(direction, dtype=np.float64) / length
     with np.errstate(invalid="ignore"):
         depth = offset @ axis
         away = np.linalg.norm(offset - depth[:, None] * axis, axis=1)

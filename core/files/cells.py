@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 
@@ -80,7 +81,7 @@ def find_rows(blocks, path) -> Rows:
             continue
         for delimiter in _DELIMITERS:
             words = split_row(line, delimiter)
-            if sum(map(is_number, words)) >= 3:
+            if _is_row(words):
                 rows = Rows(blocks, path, number, delimiter, before, [words])
                 rows.sample += filter(any, (split_row(text, delimiter) for text in islice(lines, _SAMPLE)))
                 return rows
@@ -90,6 +91,21 @@ def find_rows(blocks, path) -> Rows:
             break
     problem = "there are none" if texts <= _HEADER else f"there are none in its first {_HEADER} lines"
     raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {problem}. Correct the file.")
+
+
+def _is_row(words):
+    """Tell whether words are those of a point: three numbers, of which cells may lack one; not numbers of columns.
+
+    As pandas writes them, with an empty name for that of rows.
+    """
+    numbers = sum(map(is_number, words))
+    numbered = words[:1] == [""] and words[1:] == [str(index) for index in range(len(words) - 1)]
+    return not numbered and (numbers >= 3 or (numbers == 2 and "" in words))
+
+
+def is_numeric(words) -> bool:
+    """Tell whether there are numbers among words, and nothing else."""
+    return any(map(is_number, words)) and all(is_number(word) or _IS_MISSING.fullmatch(word) for word in words)
 
 
 def split_row(line, delimiter) -> list:
@@ -111,17 +127,16 @@ def _unquoted(text, delimiter):
 
 
 def kinds(rows):
-    """Return the indices of the columns that hold numbers, and of those that hold text, in most rows of the sample."""
-    numeric, textual = [], []
+    """Return the indices of the columns that hold numbers, text, or nothing, in most rows of the sample."""
+    numeric, textual, empty = [], [], []
     for index in range(rows.width):
         words = [row[index] for row in rows.sample if index < len(row)]
         there = [word for word in words if not _IS_MISSING.fullmatch(word)]
-        numbers = sum(map(is_number, there))
-        if 2 * numbers >= len(there) and any(map(is_number, words)):
+        if 2 * sum(map(is_number, there)) >= len(there) and any(map(is_number, words)):
             numeric.append(index)
-        elif there:
-            textual.append(index)
-    return numeric, textual
+        else:
+            (textual if there else empty).append(index)
+    return numeric, textual, empty
 
 
 def load(rows, places, others, name):
@@ -147,7 +162,7 @@ def load(rows, places, others, name):
     list of str
         Notices.
     """
-    notices, others = [], list(others)
+    notices = []
     for _ in range(_ROUNDS):
         try:
             values = _load(rows, places + others)
@@ -155,20 +170,28 @@ def load(rows, places, others, name):
             faults = _find_faults(rows, places, others)
             if not faults:
                 raise
-            fatal = next((text for index, text in faults.items() if index in places and text), "")
-            if fatal:
-                raise InvalidPointsError(
-                    f"{rows.path} does not hold columns of numbers x y z: {fatal}. Correct the file."
-                ) from None
+            _refuse_places(faults, places, rows.path)
             rows.filled = rows.filled or "" in faults.values()
-            for text in filter(None, dict.fromkeys(faults.values())):
-                wrong = [index for index, fault in faults.items() if fault == text]
-                others = [index for index in others if index not in wrong]
-                notices.append(f"{rows.path.name}: left out {brief(', '.join(map(name, wrong)))}, for {text}.")
+            others = [index for index in others if not faults.get(index)]
+            notices += _tell_faults(faults, name, rows.path)
         else:
-            return others, values, notices + _count_missing(rows, values, places + others, name)
+            return _without_empty(rows, values, places, others, name, notices)
     notices = [f"{rows.path.name}: left out all columns but x y z, for many of them hold text in some rows."]
     return [], _load(rows, places), notices
+
+
+def _refuse_places(faults, places, path):
+    """Refuse a file in which a place is text, or missing."""
+    fatal = next((text for index, text in faults.items() if index in places and text), "")
+    if fatal:
+        raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {fatal}. Correct the file.") from None
+
+
+def _tell_faults(faults, name, path):
+    """Tell which columns are left out, and for what."""
+    wrong = [name(index) for index, text in faults.items() if text]
+    why = next(filter(None, faults.values()), "")
+    return [f"{path.name}: left out {brief(', '.join(wrong))}, for {why}."] if wrong else []
 
 
 def load_whole(rows, index):
@@ -191,8 +214,8 @@ def load_whole(rows, index):
 
 
 def _load(rows, columns, dtype=float):
-    plain = _filled if rows.filled else _plain
-    lines = chain.from_iterable(plain(block, rows.delimiter, columns) for block in _blocks(rows))
+    clean = partial(_filled, columns=columns) if rows.filled else _plain
+    lines = chain.from_iterable(clean(block, rows.delimiter) for block in _blocks(rows))
     return np.loadtxt(lines, dtype=dtype, delimiter=rows.delimiter, usecols=columns, ndmin=2)
 
 
@@ -205,7 +228,7 @@ def _blocks(rows):
         left = max(left - len(lines), 0)
 
 
-def _plain(lines, delimiter, _):
+def _plain(lines, delimiter):
     """Return lines as numpy reads them: it knows comments with # alone, decimal points, and no quotes."""
     if delimiter is not None and any(map(str.isspace, lines)):
         lines = ["" if line.isspace() else line for line in lines]
@@ -221,7 +244,7 @@ def _plain(lines, delimiter, _):
 
 def _filled(lines, delimiter, columns):
     """Return lines as numpy reads them, with NaN for cells without a number."""
-    text = "\n".join(_plain([line.replace("#N/A", "") for line in lines], delimiter, columns))
+    text = "\n".join(_plain([line.replace("#N/A", "") for line in lines], delimiter))
     text = re.sub("#.*", "", text)
     if delimiter is None:
         return re.sub(rf"(?i)(?<!\S){_MISSING}(?!\S)", "nan", text).split("\n")
@@ -259,10 +282,17 @@ def _find_faults(rows, places, others):
     return {}
 
 
-def _count_missing(rows, values, columns, name):
-    """Tell how many cells of which columns have no number."""
+def _without_empty(rows, values, places, others, name, notices):
+    """Leave out columns without any number, and tell how many cells of which others have none."""
     if not rows.filled:
-        return []
+        return others, values, notices
     missing = np.isnan(values).sum(axis=0)
-    texts = [f"{count} of {name(index)}" for index, count in zip(columns, missing, strict=True) if count]
-    return [f"{rows.path.name}: cells without a number are NaN: {brief(', '.join(texts))}."] if texts else []
+    kept = (missing < len(values)) | (np.arange(len(missing)) < len(places))
+    told = list(map(name, [*places, *others]))
+    empty = [name for name, there in zip(told, kept, strict=True) if not there]
+    gaps = [f"{n} of {name}" for name, n, there in zip(told, missing, kept, strict=True) if n and there]
+    if empty:
+        notices.append(f"{rows.path.name}: left out {brief(', '.join(empty))}, which has no numbers.")
+    if gaps:
+        notices.append(f"{rows.path.name}: cells without a number are NaN: {brief(', '.join(gaps))}.")
+    return [index for index, there in zip(others, kept[len(places) :], strict=True) if there], values[:, kept], notices

@@ -1,6 +1,7 @@
 """The names of the columns of a text, from the lines before its rows."""
 
 import re
+from collections import Counter
 
 from .cells import is_comment
 from .lines import is_number
@@ -91,9 +92,9 @@ def unnamed(index) -> str:
 
 def _distinct(names):
     """Number names that come again."""
-    result = []
+    seen, result = Counter(), []
     for index, name in enumerate(names):
         name = unnamed(index) if name == "" else name
-        again = sum(other == name for other in names[:index]) if name else 0
-        result.append(f"{name}_{again + 1}" if again else name)
+        seen[name] += 1
+        result.append(f"{name}_{seen[name]}" if name and seen[name] > 1 else name)
     return result

@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 from ..errors import InvalidPointsError
-from .cells import kinds
+from .cells import is_numeric, kinds, split_row
 from .header import counts, find_names, unnamed
 from .lines import brief
-from .names import find_places, is_known
+from .names import find_places, is_other
 
 _SKIPPED, _REST = "-", "..."  # among names that a user gives
 _GIVE = "If that is wrong, give the names of all columns in Columns at the import"
@@ -73,9 +73,9 @@ def given_layout(columns, rows) -> Layout:
             f"{rows.path}: {len(names)} columns are named, but its first point has {width}. Write {_SKIPPED} for a"
             f" column to leave out, and {_REST} at the end for all that follow."
         )
-    numeric, textual = kinds(rows)
+    numeric, textual, empty = kinds(rows)
     places = [lower.index(axis) for axis in "xyz"]
-    others = [index for index in numeric if index < len(names) and names[index] and index not in places]
+    others = [index for index in (*numeric, *empty) if index < len(names) and names[index] and index not in places]
     texts = [names[index] for index in textual if index < len(names) and names[index] and index not in places]
     return Layout(names, places, others, _tell_texts(texts, rows.path))
 
@@ -94,7 +94,7 @@ def find_layout(rows, usual) -> Layout:
     InvalidPointsError
         The names tell that no three columns are places.
     """
-    numeric, textual = kinds(rows)
+    numeric, textual, empty = kinds(rows)
     names = find_names(rows, numeric)
     found = find_places(names, numeric) if names else None
     notices = []
@@ -103,24 +103,29 @@ def find_layout(rows, usual) -> Layout:
         notices += _tell_places(found, names, rows.path)
     else:
         if names:
-            _refuse_known(names, rows.path)
+            _refuse_others(names, rows.path)
         names = [*usual.get(rows.width, [None] * rows.width)]
         places = _first_places(rows, numeric)
     shortest = min(map(len, rows.sample))
     read = [index for index in numeric if index < len(names) and (names[index] or index < shortest)]
-    others = [index for index in read if index not in places]
+    sparse = [index for index in empty if index < len(names) and names[index] not in (None, unnamed(index))]
+    others = [index for index in sorted(read + sparse) if index not in places]
     layout = Layout(names, places, others, notices, _announced(rows), bool(found and found.degrees))
-    texts = [layout.label(index) for index in textual if index < len(names)]
-    there = (*numeric, *textual)
-    empty = [name for index, name in enumerate(names) if index not in there and name not in (None, unnamed(index))]
-    notices += _tell_texts(texts, rows.path)
-    if empty:
-        notices.append(f"{rows.path.name}: left out {brief(', '.join(empty))}, which has no numbers.")
+    notices += _tell_texts([layout.label(index) for index in textual if index < len(names)], rows.path)
     if len(read) < len(numeric):
         notices.append(
             f"{rows.path.name}: left out {len(numeric) - len(read)} columns or more at the end, which have no names."
         )
+    passed = [line.strip() for line in rows.before if _is_odd_row(line, rows.delimiter)]
+    if passed:
+        notices.append(f"{rows.path.name}: passed over {brief(repr(passed[0]))}, which stands before the first point.")
     return layout
+
+
+def _is_odd_row(line, delimiter):
+    """Tell whether a line before the first point holds numbers, but is neither a point nor their number."""
+    words = split_row(line, delimiter)
+    return len(words) > 1 and is_numeric(words)
 
 
 def _tell_places(found, names, path):
@@ -134,10 +139,10 @@ def _tell_places(found, names, path):
     return notices
 
 
-def _refuse_known(names, path):
-    """Refuse a file most of whose columns are known to be no places."""
+def _refuse_others(names, path):
+    """Refuse a file with names of columns that are no places, if there are too few others; a title has none of them."""
     told = [name for name in names if name]
-    if 2 * sum(map(is_known, told)) > len(told):
+    if any(map(is_other, told)):
         raise InvalidPointsError(
             f"{path} has no x y z among its columns {brief(', '.join(told))}. Give the names of all columns in Columns"
             " at the import, with x y z among them."

@@ -4,42 +4,58 @@ import re
 import unicodedata
 from typing import NamedTuple
 
-_AXES = (  # pairs of words for x and y that go together, and words for z; the surest first
-    ({"x"}, {"y"}),
-    (
-        {"easting", "eastings", "east", "e", "rechtswert", "rechts", "rw", "ostwert", "ost", "este", "est", "utme"},
-        {"northing", "northings", "north", "n", "hochwert", "hoch", "hw", "nordwert", "nord", "norte", "utmn"},
-    ),
-    (
-        {"longitude", "long", "lon", "lng", "longitud", "laengengrad", "laenge", "geolaenge"},
-        {"latitude", "lat", "latitud", "breitengrad", "breite", "geobreite"},
-    ),
-    ({"0"}, {"1"}),  # of a vector: Points:0, Points:1, Points:2
-    ({"1"}, {"2"}),
-)
-_DEGREES = 2  # which of the pairs holds angles
-_PLAIN = ({"z"}, {"2"}, {"3"})
+
+class _System(NamedTuple):
+    """Words for coordinates that go together."""
+
+    x: set
+    y: set
+    z: tuple  # sets of words, the surest first
+
+
 _HEIGHTS = (
+    {"z"},
     {"elevation", "elev", "ele", "el"},
-    {"height", "hgt", "ht", "hoehe", "h", "gelaendehoehe", "zed"},
+    {"height", "hgt", "ht", "hoehe", "h", "gelaendehoehe", "zed", "hae"},
     {"altitude", "alt", "altitud", "altura", "hauteur", "altezza", "cota", "quota", "level", "rl", "up", "u"},
     {"depth", "tiefe"},
 )
-_ANY = set().union(*(words for pair in _AXES for words in pair), *_PLAIN, *_HEIGHTS)
-_FILLERS = re.compile(  # words that say nothing of what is measured: where, in which system, in which unit
-    r"(points?|pts?|pos|positions?|locations?|loc|vertex|vertices|vert|utm\d*s?|epsg|grid|map|local|world|global"
-    r"|ecef|geo|gps|gnss|wgs\d*|msl|asl|tvd(ss)?|nn|nhn|navd\d*|gk|mga\d*|ellipsoidal|ellipsoid|ell|orthometric|ortho|cent(er|re)"
-    r"|centroid|mean|m|mm|cm|km|ft|usft|feet|met(er|re)s?|deg|degrees?|dd|p)"
+_DEGREES = _System(
+    {"longitude", "long", "lon", "lng", "longitud", "laengengrad", "laenge"},
+    {"latitude", "lat", "latitud", "breitengrad", "breite"},
+    _HEIGHTS,
 )
-_JOINED = re.compile(r"(coord(inate)?s?|koord(inaten?)?|koordinaten?|points?|positions?)")  # without a space as well
+_SYSTEMS = (  # the surest first
+    _System({"x"}, {"y"}, _HEIGHTS),
+    _System(
+        {"easting", "eastings", "east", "e", "rechtswert", "rechts", "rw", "ostwert", "ost", "este", "est", "utme"},
+        {"northing", "northings", "north", "n", "hochwert", "hoch", "hw", "nordwert", "nord", "norte", "utmn"},
+        _HEIGHTS,
+    ),
+    _DEGREES,
+    _System({"0"}, {"1"}, ({"2"},)),  # of a vector: Points:0, Points:1, Points:2
+    _System({"1"}, {"2"}, ({"3"},)),
+)
+_ANY = set().union(*(words for system in _SYSTEMS for words in (system.x, system.y, *system.z)))
+_FILLERS = re.compile(  # words that say nothing of what is measured: where, in which system, in which unit
+    r"(points?|pts?|p|pos|positions?|locations?|loc|vertex|vertices|vert|cent(er|re)|centroid|mean|wert"
+    r"|grid|map|local|world|global|utm\d*s?|epsg|ecef|geo|gps|gnss|wgs\d*|gk|mga\d*"
+    r"|msl|asl|tvd(ss)?|nn|nhn|ue|ueber|navd\d*|ellipsoidal|ellipsoid|ellps|ell|orthometric|ortho"
+    r"|m|mm|cm|km|ft|usft|feet|met(er|re)s?|deg|degrees?|dd)"
+)
+_JOINED = re.compile(  # without a space as well
+    r"(coord(inate|onnee|enada|inata)?s?|koord(inaten?)?|points?|positions?|(?<![a-z])pos|pos(?![a-z]))"
+)
 _OTHERS = re.compile(  # of columns that are no places
     r"(.*(id|number|nummer|index|name|time|zeit|date|datum|stamp|code|class|colou?r|norm(al)?|intensity|ance|ivity)"
     r"|no|nos|nr|num|nbr|label|idx|key|station|sta|pkt|punkt|track|line|ring|channel|beam|row|col|column"
-    r"|[bdfnuvw][xyz]|t|s|sec|secs|seconds?|hour|min|utc|sod|epoch|week|tow"
+    r"|[dfnuvw][xyz]|t|s|sec|secs|seconds?|hour|min|utc|sod|epoch|week|tow"
     r"|classification|desc|description|layer|remarks?|comments?|type|status|flags?|group|cluster|segment|object"
-    r"|i|int|intensit(aet|e)|amplitude|returns?|scalar|value|rgba?|r|g|b|a|red|green|blue|alpha|normals"
-    r"|curvature|error|confidence|quality|roughness|density|range|azimuth|angle|temperature|speed|sigma|std|rms|count|scan)"
+    r"|i|int|intensit(aet|e)|amplitude|returns?|scalar|rgba?|r|g|b|a|red|green|blue|alpha|normals"
+    r"|curvature|error|confidence|quality|roughness|density|range|azimuth|angle|temperature|sigma|std|rms|count|scan"
+    r"|speed|velocity|vel|gyro|rotation|rot|size|scale|width|length)"
 )
+_BRACKETS = re.compile(r"[\[(<{].*?([\])>}]|$)")
 _SPELLED = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue"})
 _ABOUT_COLORS = ("color", "colour", "rgb", "rgba", "diffuse")
 _TRIPLES = {
@@ -62,8 +78,8 @@ class Places(NamedTuple):
 
 def _words(text):
     """Return the words of a name that say something, in lower case and without accents."""
-    text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text.translate(_SPELLED)).lower())
-    text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    text = unicodedata.normalize("NFKD", text.translate(_SPELLED)).encode("ascii", "ignore").decode()
+    text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text).lower())
     return [word for word in re.findall(r"[a-z0-9]+", text) if not _FILLERS.fullmatch(word)]
 
 
@@ -72,17 +88,20 @@ def _place(name):
 
     What stands in brackets is most often a unit, but may tell it better: Y (Rechtswert).
     """
-    inside = " ".join(re.findall(r"[\[(<{]([^\])>}]*)", name))
-    words = _words(re.sub(r"[\[(<{].*?([\])>}]|$)", " ", name))
-    words += [word for word in _words(inside) if word in _ANY]
-    if not words or not _ANY.issuperset(words):
-        return ""
-    return max(words, key=len)
+    words = _words(_BRACKETS.sub(" ", name))
+    words += [word for word in _words(" ".join(re.findall(r"[\[(<{]([^\])>}]*)", name))) if word in _ANY]
+    return max(words, key=len) if words and _ANY.issuperset(words) else ""
+
+
+def _hint(name):
+    """Return the only word of a name that could tell its axis, beside others that are not known: Shape_X."""
+    words = [word for word in _words(_BRACKETS.sub(" ", name)) if word in _ANY]
+    return words[0] if len(words) == 1 and not is_other(name) else ""
 
 
 def is_other(name) -> bool:
     """Tell whether a name is known as one of what is no place: a number, a time, a color and so on."""
-    words = _words(re.sub(r"[\[(<{].*?([\])>}]|$)", " ", name))
+    words = _words(_BRACKETS.sub(" ", name))
     return not words or (not _place(name) and any(_OTHERS.fullmatch(word) for word in words))
 
 
@@ -107,23 +126,36 @@ def find_places(names, numeric):
     """
     names = [name or "" for name in names]
     words = {index: _place(names[index]) for index in numeric if index < len(names)}
-    heights = (*_PLAIN, *_HEIGHTS)
-    for number, (easts, norths) in enumerate(_AXES):
-        x, y = _first(words, easts), _first(words, norths)
-        if x is None or y is None:
-            continue
-        fitting = heights if number < 3 else heights[number - 2 : number - 1]
-        z = next((z for z in (_first(words, kind) for kind in fitting) if z not in (None, x, y)), None)
+    found = _find_system(words)
+    if found:
+        return found
+    hints = {index: word or _hint(names[index]) for index, word in words.items()}
+    found = _find_system(hints)
+    if found:
+        return found._replace(sure=False)
+    unknown = [index for index in words if not is_other(names[index])]
+    system, *pair = next((found for found in _pairs(hints) if found[0].z is _HEIGHTS), [None])
+    if pair:
+        unknown = [*pair, *(index for index in unknown if not hints[index])]
+    return Places(unknown[:3], False, False, system is _DEGREES) if len(unknown) > 2 else None
+
+
+def _find_system(words):
+    """Find columns of x y z by words that tell their axes, by index."""
+    for system, x, y in _pairs(words):
+        z = next((z for z in (_first(words, kind) for kind in system.z) if z is not None), None)
         if z is not None:
             plain = [words[index] for index in (x, y, z)] == ["x", "y", "z"]
-            return Places([x, y, z], sure=True, plain=plain, degrees=number == _DEGREES)
-        if number < 3:
-            unknown = [
-                index for index in words if index not in (x, y) and not words[index] and not is_other(names[index])
-            ]
-            return Places([x, y, unknown[0]], False, False, number == _DEGREES) if unknown else None
-    unknown = [index for index in words if not is_other(names[index])]
-    return Places(unknown[:3], False, False, False) if len(unknown) > 2 else None
+            return Places([x, y, z], sure=True, plain=plain, degrees=system is _DEGREES)
+    return None
+
+
+def _pairs(words):
+    """Yield systems of which there are x and y, with the indices of both."""
+    for system in _SYSTEMS:
+        x, y = _first(words, system.x), _first(words, system.y)
+        if x is not None and y is not None:
+            yield system, x, y
 
 
 def standard_names(names) -> dict:

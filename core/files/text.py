@@ -67,8 +67,7 @@ def _read_text(blocks, path, columns, usual=None):
         guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless)
         extra = _renamed(extra, dict(zip(nameless, guessed, strict=True)))
         notices.append(_tell_guess(path, layout.places, nameless, guessed))
-    extra = _renamed(extra, standard_names(extra))
-    table = from_columns({**dict(zip("xyz", values.T, strict=False)), **extra}, path)
+    table = from_columns(dict(zip("xyz", values.T, strict=False)) | _renamed(extra, standard_names(extra)), path)
     table.degrees = layout.degrees
     table.notices += [*layout.notices, *notices]
     if layout.announced not in (None, len(values)):
@@ -85,12 +84,16 @@ def _exact(rows, index, values):
 
 
 def _renamed(columns, names):
-    """Return columns by new names, unless they are taken; those of the places are."""
+    """Return columns by new names, but for those that others have, such as the places."""
     taken = {*"xyz", *columns} - {*names}
-    return {
-        new if (new := names.get(name, name)) == name not in "xyz" or new not in taken else f"{new}_2": values
-        for name, values in columns.items()
-    }
+    return {_free(names.get(name, name), name, taken): values for name, values in columns.items()}
+
+
+def _free(new, old, taken):
+    """Return the new name of a column if it is free, otherwise the old one, which no place may have."""
+    if new != old and new not in taken:
+        return new
+    return f"{old}_2" if old in ("x", "y", "z") else old
 
 
 def _tell_guess(path, places, labels, names):

@@ -451,8 +451,8 @@ def estimate_normals(points, options=LaplacianOptions()):
     Returns
     -------
     ndarray, (n, 3)
-        Unit normals. Those from quadrics agree in sign, outwards on closed surfaces; those from the covariance are of
-        arbitrary sign unless ``options.orient``. Points left out get the z axis.
+        Unit normals. Those from quadrics agree in sign, outwards on closed surfaces, up on sheets such as terrain;
+        those from the covariance are of arbitrary sign unless ``options.orient``. Points left out get the z axis.
 
     Raises
     ------
@@ -487,7 +487,8 @@ class Discs:
     Attributes
     ----------
     normals : ndarray, (n, 3)
-        Unit normals, outwards on closed surfaces; the z axis at points that lie off the surface.
+        Unit normals, outwards on closed surfaces, up on sheets such as terrain; the z axis at points that lie off the
+        surface.
     radii : ndarray, (n,)
         As far as the part of the surface reaches that is nearest to the point [L], so that all together leave no hole.
     """

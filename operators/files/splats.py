@@ -75,12 +75,14 @@ def _write_shifted(obj, places, turn, known):
     """Write places of a file, those far away less an offset, which the object keeps as it is in the world."""
     turned = places @ turn.T
     origin = choose_origin(turned, known)
-    # Where a few floaters lie far away, the others would lose digits by a shift to the middle of all.
-    if not origin.any() or np.median(np.abs(turned - origin)) > np.median(np.abs(turned)):
-        return write_places(obj.data, places)
+    if known is None or (origin != known).any():
+        # Where a few floaters lie far away, the others would lose digits by a shift to the middle of all.
+        nearer = np.median(np.abs(turned - origin), axis=0) < np.median(np.abs(turned), axis=0)
+        origin = np.where(nearer, origin, 0.0)
     own = origin @ turn
-    obj[OFFSET], obj[OWN_OFFSET] = origin.tolist(), own.tolist()
-    return write_places(obj.data, places - own)
+    if origin.any():
+        obj[OFFSET], obj[OWN_OFFSET] = origin.tolist(), own.tolist()
+    write_places(obj.data, places - own)
 
 
 def _keep_file(obj, splats):

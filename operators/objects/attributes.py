@@ -41,7 +41,8 @@ COMPONENT = "lb_component"
 TRUST = "lb_trust"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"  # principal ones
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
-SLOPE, SLOPE_2 = ".lb_slope", ".lb_slope_2"  # of what is shown, or of both texture coordinates; Blender lists no dots
+# Slopes of what is shown, or of both texture coordinates, and the values, by their means. Blender hides such names.
+SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
 RISE = "lb_rise"  # by how much what is shown rises in discs that the display draws
 CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"

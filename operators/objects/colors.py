@@ -1,10 +1,11 @@
-"""Colors that points have of their own, such as those of a photograph, beside what results are shown in."""
+"""What objects look like without results: the colors of their points, as of a photograph, and their own material."""
 
 import bpy
 import numpy as np
 
 from ... import core
 from .attributes import read_attribute
+from .modifiers import DISPLAY_TAG, get_input, is_display
 from .splats import BASE, has_splats
 
 COLOR = "Color"  # the name that imported ones get
@@ -34,3 +35,15 @@ def splat_colors(data):
     base[:, :3] = np.maximum(core.splats.CONSTANT * base[:, :3] + 0.5, 0.0) ** _GAMMA
     base[:, 3] = 1.0
     return base
+
+
+def own_material(obj):
+    """Return the user's material of an object, that of its first slot; None without one."""
+    material = obj.material_slots[0].material if obj.material_slots else None
+    return None if material is None or DISPLAY_TAG in material else material
+
+
+def shows_own_material(obj) -> bool:
+    """Whether an object is seen in a material of the user's: without a display, or as its display shows that one."""
+    display, material = next(filter(is_display, obj.modifiers), None), own_material(obj)
+    return material is not None and (display is None or get_input(display, "Material") == material)

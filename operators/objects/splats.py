@@ -14,7 +14,6 @@ from .attributes import (
     SPLAT_ROTATION,
     SPLAT_SCALE,
     own_positions,
-    point_count,
     read_attribute,
     tag_changed,
     write_attribute,
@@ -30,7 +29,7 @@ LEFT_BEHIND = (
 )
 _MOST_STEPS = 32  # that splats take with their ellipsoids: those of parts that were moved, not turned or scaled
 _STEP = 1e-5  # of the largest coordinate: a step as large as this is told from none
-_GLANCE = 20_000  # splats that a panel looks at
+_GLANCE = 4000  # splats that a panel looks at
 _TYPES = {SCALE: ("FLOAT_VECTOR",), ROTATION: ("QUATERNION",), BASE: ("FLOAT4", "FLOAT_COLOR")}
 
 
@@ -81,9 +80,11 @@ def write_splats(data, splats):
     Further lengths that they have grow with their sizes.
     """
     moved = splats.positions - own_positions(data)
+    write_own_positions(data, splats.positions)
     if PLACE in data.attributes:
         write_attribute(data, PLACE, read_attribute(data, PLACE) + moved, "FLOAT_VECTOR")
-    write_own_positions(data, splats.positions)
+    else:
+        remember_places(data)
     grown = growth(read_attribute(data, SCALE), splats.scales)
     for name in core.splats.LENGTHS:
         if name in data.attributes:
@@ -131,16 +132,22 @@ def remember_places(data):
 def are_left_behind(data, glance=False) -> bool:
     """Whether splats were turned or scaled without their ellipsoids, as Blender's own Join and Apply do.
 
-    Where splats are only moved, they take one step, or few different ones. A glance looks at some of them.
+    Where splats are only moved, they take one step, or few different ones. A glance, quick enough for a panel, looks at
+    some of them.
     """
     if PLACE not in data.attributes or not has_splats(data):
         return False
-    every = 1 + point_count(data) // _GLANCE if glance else 1
-    now, before = own_positions(data)[::every], read_attribute(data, PLACE)[::every]
+    now, before = own_positions(data), read_attribute(data, PLACE)
+    every = 1 + len(now) // _GLANCE if glance else 1
+    return _count_steps(now[::every], before[::every]) > _MOST_STEPS
+
+
+def _count_steps(now, before):
+    """Count how many different steps splats took from where they were, (n, 3) both."""
     known = before.any(axis=1)  # those of other origin have zeros
     size = max(np.abs(values[known]).max(initial=0.0) for values in (now, before)) or 1.0
     steps = np.round((now - before)[known].astype(np.float64) / (_STEP * size)).astype(np.int64)
-    return len(np.unique(steps @ [1, 1 << 20, 1 << 40])) > _MOST_STEPS
+    return len(np.unique(steps @ [1, 1 << 20, 1 << 40]))
 
 
 def _between(one, other, share):

@@ -7,6 +7,7 @@ from bpy.props import BoolProperty
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, write_attribute
+from ..objects.colors import own_material, shows_own_material
 from ..objects.handlers import tell
 from ..objects.options import laplacian_options
 from ..objects.reading import TYPES, discs, obstacle, read_points, sharing_objects
@@ -129,6 +130,12 @@ class ShownOperator(ApplicationOperator):
         if self.show:
             for obj in objects:
                 _write_discs(context, obj)
+            for obj in filter(shows_own_material, [*objects, *sharing]):
+                self.report(
+                    {"WARNING"},
+                    f'{obj.name}: colors take the place of the material "{own_material(obj).name}". Own Material under'
+                    " Display brings it back.",
+                )
             for obj in [*objects, *sharing]:
                 tell("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
 

@@ -27,7 +27,11 @@ class OrientNormals(Tool):
         description="How the side is found",
         items=[
             ("WINDING", "Winding Number", "As closed as the surface can be, through gaps and in noise"),
-            ("OUTSIDE", "Outside", "Neighbors agree, each component points away from its middle: as analyzed at first"),
+            (
+                "OUTSIDE",
+                "Outside",
+                "Neighbors agree, each component points away from its middle, terrain up: as analyzed at first",
+            ),
             ("VIEWPOINT", "Viewpoint", "To where an object is, such as the camera"),
             ("ATTRIBUTE", "Attribute", "By a vector of each point, such as the place of the scanner"),
             ("KEEP", "As They Are", "The side that they have, to flip it"),

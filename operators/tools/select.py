@@ -401,7 +401,8 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
             matrix = np.array(obj.matrix_world)
             points = positions_now(obj) @ matrix[:3, :3].T + matrix[:3, 3]
             points[_hidden(obj)] = np.nan
-            index = core.front_point(points, eye, direction, 2.0 * core.geometry.typical_distance(points))
+            known = obj.meshfree.spacing * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))  # where a display measured it
+            index = core.front_point(points, eye, direction, 2.0 * (known or core.geometry.typical_distance(points)))
             if index >= 0:
                 found.append(((points[index] - eye) @ direction, obj.name, obj, index))
         return min(found)[2:] if found else None

@@ -23,6 +23,7 @@ KEPT = {
     "compared_within",
     "spacing",
     "spacing_of",
+    "slopes_of",
     "deform",
     "stages",
     "fingerprint",

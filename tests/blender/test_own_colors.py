@@ -336,11 +336,15 @@ class TestOwnMaterial:
         bpy.ops.meshfree.show_surface()
         assert looks(BLUE, tmp_path)
 
-    def test_a_result_is_shown_in_its_colors_and_it_comes_back(self, tmp_path, shown):
+    def test_a_result_is_shown_in_its_colors_which_is_told_and_it_comes_back(self, tmp_path, shown, capfd):
         obj = add_object(evenly(800))
         material = add_material(obj, BLUE)
         bpy.ops.meshfree.analyze()
         assert shown(obj) == "lb_mean_curvature"
+        told = 'Cloud: colors take the place of the material "Mine"'
+        assert told in capfd.readouterr().out
+        bpy.ops.meshfree.analyze()
+        assert told not in capfd.readouterr().out
         assert not looks(BLUE, tmp_path)
         assert "Own Material" in draw()
         bpy.ops.meshfree.own_material()

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from tests.blender.clouds import add_object, attribute, sphere_points
 from tests.blender.test_display import rendered
 
-SLOPES = ".lb_slope", ".lb_slope_2"
+SLOPES = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
 
 
 @pytest.fixture
@@ -119,7 +119,7 @@ def test_what_has_no_slope_stays_flat(obj, way):
     else:
         obj.meshfree.point_shape = "DOTS"
     assert rise(obj) is None
-    assert slopes(obj) == ([SLOPES[0]] if way == "dots" else [])
+    assert slopes(obj) == ([SLOPES[0], SLOPES[2]] if way == "dots" else [])
 
 
 def test_points_that_no_source_reaches_spoil_no_others(obj):
@@ -130,6 +130,24 @@ def test_points_that_no_source_reaches_spoil_no_others(obj):
     assert not found[height > 0.5].any()
     steep = np.linalg.norm(found[height < 0.5], axis=1)
     assert np.abs(steep - np.sqrt(1.0 - height[height < 0.5] ** 2)).max() < 0.3
+
+
+@pytest.mark.parametrize("kind", ["FLOAT", "FLOAT2", "FLOAT_VECTOR"])
+def test_of_values_that_changed_since_no_slopes_are_drawn(obj, kind):
+    places = attribute(obj, "position") + [0.1, 0.2, 0.3]
+    width = {"FLOAT": 1, "FLOAT2": 2, "FLOAT_VECTOR": 3}[kind]
+    obj.meshfree.component = "Y"
+    add_values(obj, "values", places[:, :width], kind)
+    show(obj, "values")
+    assert (np.abs(rise(obj)).max(axis=1).reshape(-1, 9).max(axis=1) > 0.0).mean() > 0.99
+    changed = places[:, 0] > 0.0
+    places[changed] *= 1.01
+    add_values(obj, "values", places[:, :width], kind)
+    obj.data.update()
+    moving = np.abs(rise(obj)).max(axis=1).reshape(-1, 9).max(axis=1) > 0.0
+    assert (moving == ~changed).mean() > 0.99
+    show(obj, "values")
+    assert (np.abs(rise(obj)).max(axis=1).reshape(-1, 9).max(axis=1) > 0.0).mean() > 0.99
 
 
 def test_slopes_follow_the_values_and_the_points(obj):
@@ -193,7 +211,7 @@ def test_what_is_changed_in_edit_mode_is_flat_until_it_is_shown_again(obj):
     show(obj, "vector")
     bpy.ops.object.mode_set(mode="EDIT")
     obj.meshfree.reverse = True
-    assert obj.meshfree.slopes_of.startswith("vector X ")
+    assert obj.meshfree.slopes_of.startswith("X vector ")
     obj.meshfree.component = "Y"
     bpy.ops.object.mode_set(mode="OBJECT")
     assert rise(obj) is None

@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import re
 from dataclasses import dataclass, field
 
 import laspy
@@ -135,6 +136,10 @@ SURVEYS = {  # names, in the order easting, northing, height, and whether a noti
     "mixed": (["X", "Y", "Elevation"], True),
     "upper": (["EASTING", "NORTHING", "HEIGHT"], True),
     "Spanish": (["Este", "Norte", "Cota"], True),
+    "French": (["Coordonnée X", "Coordonnée Y", "Altitude"], True),
+    "German letters": (["X-Wert", "Y-Wert", "Höhe"], True),
+    "joined degrees": (["GPSLongitude", "GPSLatitude", "AltitudeMSL"], True),
+    "Metashape": (["X/Easting", "Y/Northing", "Z/Altitude"], True),
     "systems": (["UTM_Easting", "UTM_Northing", "Ellipsoidal Height"], True),
 }
 STYLES = {
@@ -238,7 +243,7 @@ def test_names_of_surveys(tmp_path, survey, delimiter):
     """In any order, beside numbers of points and times, which never become places; a notice names the columns."""
     names, named = SURVEYS[survey]
     if delimiter == "spaces":
-        names = [name.replace(" H", "_H") for name in names]
+        names = [re.sub(r" (?=[A-Z])", "_", name) for name in names]
     columns = dict(zip(names, xyz(FAR), strict=True))
     for order in itertools.permutations(names):
         given = Columns(
@@ -254,6 +259,46 @@ def test_names_of_surveys(tmp_path, survey, delimiter):
         first = names[0].replace(" (", "(") if delimiter == "spaces" else names[0]
         assert (f"took {first}, " in told(table)) == named
         assert ("degrees" in told(table)) == ("degrees" in survey)
+
+
+@pytest.mark.parametrize(
+    ("head", "passed"),
+    [
+        (",0,1,2", True),  # as pandas numbers columns, with an empty name for that of rows
+        ("17,4", True),
+        ("Exported by somebody", False),
+        ("# 17 4 3", False),
+        ("Rows,Columns\n17,4", True),
+    ],
+)
+def test_lines_of_numbers_before_the_points_are_told(tmp_path, head, passed):
+    cells = [whole(range(COUNT)), *PLAIN]
+    table = read_points(write(tmp_path / "a.csv", [head, *lines_of(Columns([], cells), "commas")[1]]))
+    assert_allclose(table.points, PLACES, rtol=0.0, atol=1e-9)
+    assert ("passed over" in told(table)) == passed
+
+
+@pytest.mark.parametrize("row", [0, 150])
+@pytest.mark.parametrize("delimiter", ["commas", "semicolons", "tabs"])
+def test_a_column_of_few_numbers(tmp_path, delimiter, row):
+    """Even if there is none for long."""
+    mark = DELIMITERS[delimiter]
+    rows = [mark.join(["1", "2", "3", "7" if index == row else "", ""]) for index in range(200)]
+    table = read_points(write(tmp_path / "a.csv", [mark.join(["x", "y", "z", "heat", "none"]), *rows]))
+    assert_array_equal(table.attributes["heat"], np.where(np.arange(200) == row, 7.0, np.nan))
+    assert list(table.attributes) == ["heat"]
+    assert "199 of heat" in told(table)
+    assert "left out none, which has no numbers" in told(table)
+
+
+@pytest.mark.parametrize("row", [0, GAP])
+@pytest.mark.parametrize("column", [0, 1, 2])
+def test_a_point_of_three_cells_of_which_one_is_empty(tmp_path, column, row):
+    cells = list(PLAIN)
+    cells[column] = holed(cells[column], row, "")
+    table = read_points(write(tmp_path / "a.csv", ["x,y,z", *lines_of(Columns([], cells), "commas")[1]]))
+    assert_allclose(table.points, PLACES[np.arange(COUNT) != row], rtol=0.0, atol=1e-9)
+    assert f"1 of {'xyz'[column]}" in told(table)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
@@ -301,13 +346,18 @@ def test_a_color_without_a_number_leaves_the_others_as_they_are(tmp_path, word):
     [
         ("u,v,w,heat", "u, v, w"),
         ("id,u,v,w", "u, v, w"),
-        ("time,heat,mass,size", "heat, mass, size"),
+        ("time,heat,mass,gain", "heat, mass, gain"),
+        ("time,heat,mass,size", None),
+        ("Point,heat,mass,time", None),
+        ("Y_Local7,X_Local7,Z_Local7,heat", "X_Local7, Y_Local7, Z_Local7"),
         ("x,y,heat,mass", "x, y, heat"),
         ("code,lon,lat,bathymetry", "lon, lat, bathymetry"),
         ("id,time,u,v", None),
         ("time,intensity,range,azimuth", None),
         ("id,r,g,b", None),
         ("lat,lon,time,speed", None),
+        ("X,Y,X,heat", "X, Y, heat"),
+        ("X,Y,X,time", None),
         ("nx,ny,nz,curvature", None),
         ("range,azimuth,elevation,intensity", None),
     ],
@@ -319,7 +369,7 @@ def test_names_that_are_no_places(tmp_path, names, taken):
     if taken:
         assert f"Took {taken} for them" in told(read_points(path))
     else:
-        with pytest.raises(ValueError, match=f"has no x y z among its columns {names.replace(',', ', ')}"):
+        with pytest.raises(ValueError, match=f"has no x y z among its columns {names[:3].replace(',', ', ')}"):
             read_points(path)
 
 

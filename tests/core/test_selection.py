@@ -152,6 +152,10 @@ class TestFrontPoint:
         for index in (1000, 1830, 2500):
             assert core.front_point(slant, slant[index] + [0.0, 0.0, 5.0], [0.0, 0.0, -2.0], 0.1) == index
 
+    def test_a_direction_of_no_length(self):
+        with pytest.raises(core.PointCloudError, match="has no length"):
+            core.front_point([[0.0, 0.0, 1.0]], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
+
     def test_nothing_behind_the_eye_far_from_the_ray_or_without_a_place(self):
         points = np.array([[0.0, 0.0, 9.0], [3.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0]])
         assert core.front_point(points, [0.0, 0.0, 5.0], [0.0, 0.0, -1.0], 0.5) == -1

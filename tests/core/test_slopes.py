@@ -25,6 +25,13 @@ def test_linear_functions_are_exact_to_the_very_boundary(scale):
     assert_allclose(slopes.of(points @ [3.0, -2.0, 7.0] + 5.0), np.tile([3.0, -2.0, 0.0], (2000, 1)), atol=1e-6)
 
 
+def test_points_in_single_precision():
+    """As Blender keeps them: numpy 2 warns of a bound that single precision does not reach."""
+    points = np.column_stack([square_random(500)[:, :2], np.zeros(500)]).astype(np.float32)
+    slopes = core.Slopes(points, core.surface_discs(points)).of(points[:, 0])
+    assert_allclose(slopes, np.tile([1.0, 0.0, 0.0], (500, 1)), atol=1e-5)
+
+
 def test_on_a_curved_surface_they_are_close_and_lie_in_the_tangent_planes(sphere):
     points, discs = sphere
     found = core.Slopes(points, discs).of(points[:, 2])

@@ -8,7 +8,7 @@ from tests.gui.test_tasks import DROP, IMPORTED
 SCAN = """
 import os
 scan = os.path.join(bpy.app.tempdir, "Egg.xyz")
-rows = np.hstack([sphere_points({count}), np.tile([255, 0, 0], ({count}, 1))])
+rows = np.hstack([{size} * sphere_points({count}), np.tile([255, 0, 0], ({count}, 1))])
 np.savetxt(scan, rows, header="x y z red green blue")
 """
 SHADING = "view3d()[0].spaces.active.shading.type"
@@ -21,10 +21,17 @@ def red_share(gui):
     return np.mean(pixels[:, :, 0] > 100 + pixels[:, :, 1:].max(axis=2))
 
 
-@pytest.mark.parametrize(("count", "shading"), [(3000, "SOLID"), (12000, "MATERIAL")], ids=["discs", "dots"])
-def test_a_red_scan_is_red(gui, count, shading):
-    """Of 12,000 points dots are drawn where there is no graphics card, and Solid cannot color these."""
-    gui.python(SCAN.format(count=count))
+@pytest.mark.parametrize(
+    ("count", "size", "shading"),
+    [(3000, 1.0, "SOLID"), (12000, 1.0, "MATERIAL"), (3000, 2000.0, "SOLID")],
+    ids=["discs", "dots", "kilometers"],
+)
+def test_a_red_scan_is_red(gui, count, size, shading):
+    """Of 12,000 points dots are drawn where there is no graphics card, and Solid cannot color these.
+
+    A view of Blender's own settings ends at a kilometer.
+    """
+    gui.python(SCAN.format(count=count, size=size))
     gui.python(f"{SHADING} = 'SOLID'")
     gui.python(DROP)
     gui.key("Return")

@@ -230,6 +230,24 @@ class TestSidebar:
         gui.wait_for(lambda: red(gui.pixels(around)) > 100, "red words in a tooltip")
         assert not gui.python("bpy.ops.meshfree.separate_by_segment.poll()")
 
+    def test_a_notice_stays_until_it_is_dismissed(self, gui):
+        add_sphere(gui, 500)
+        gui.python("bpy.context.object.data.vertices[0].co = (0.0, 0.0, 9.0)")
+        gui.python("bpy.ops.ed.undo_push(message='One far away')")
+        gui.open_tab()
+        gui.press("meshfree.analyze")
+        gui.wait_until(ANALYZED, 60)
+        gui.wait_until(f"not {WORKING}")
+        notices = "[told.text for told in bpy.context.object.meshfree.notices]"
+        told = gui.python(notices)
+        assert told
+        gui.shot("notices")
+        gui.press("meshfree.dismiss", across=0.79)
+        gui.wait_until(f"len({notices}) == {len(told) - 1}")
+        gui.point_at_view()
+        gui.key("ctrl+z")
+        gui.wait_until(f"{notices} == {told!r}")
+
     def test_the_info_log_has_the_words_of_scripts(self, gui):
         add_sphere(gui, 500)
         gui.open_tab()

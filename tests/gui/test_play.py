@@ -106,6 +106,14 @@ class TestAnalysis:
         assert gui.python("view3d()[0].spaces.active.shading.type") == "MATERIAL"
         gui.wait_for(lambda: colored(gui.pixels(middle)) > gray + 20000, "the points are colored", 240)
 
+    def test_where_there_is_no_material_preview(self, gui):
+        add_sphere(gui)
+        gui.python("bpy.context.scene.render.engine = 'BLENDER_WORKBENCH'")
+        gui.open_tab()
+        gui.press("meshfree.analyze")
+        gui.wait_until(ANALYZED, 60)
+        assert gui.python("view3d()[0].spaces.active.shading.type") == "SOLID"
+
 
 class TestJobs:
     """Work that goes on while the window stays alive, and what ends it."""

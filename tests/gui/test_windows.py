@@ -237,6 +237,37 @@ class TestOpenedFile:
         assert opened.python("live.trouble(bpy.data.objects['Cloud'])") == ""
 
 
+class TestApply:
+    """Apply asks before keyframes of handles are lost."""
+
+    PRESS = """
+area, region, _ = view3d()
+with bpy.context.temp_override(window=main_window(), area=area, region=region):
+    bpy.ops.meshfree.deform_apply("INVOKE_DEFAULT")
+"""
+    SAME = "everything(bpy.data.objects['Cloud']) == pose and handle.animation_data is not None"
+
+    def test_esc_and_return(self, bound):
+        bound.python(ANIMATED)
+        bound.python("bpy.context.scene.frame_set(6)")
+        bound.wait_until(f"not live._jobs and {MOVED} > 0.4")
+        bound.python("bpy.ops.ed.undo_push(message='Pose'); pose = everything(bpy.data.objects['Cloud'])")
+        bound.point_at_view()
+        bound.python(self.PRESS)
+        bound.settle()
+        bound.shot("apply_asks")
+        bound.key("Escape")
+        assert bound.python(self.SAME)
+        bound.point_at_view()
+        bound.python(self.PRESS)
+        bound.key("Return")
+        bound.wait_until("handle.animation_data is None")
+        assert bound.python(MOVED) == 0.0
+        bound.key("Right")  # the next frame
+        bound.wait_until("bpy.context.scene.frame_current == 7")
+        assert bound.python(MOVED) == 0.0
+
+
 class TestBake:
     """A bake works beside the window as other work does."""
 
