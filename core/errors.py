@@ -57,5 +57,9 @@ class SolverError(PointCloudError):
     """An iterative solver that did not reach its tolerance."""
 
 
+class BrokenLibraryError(PointCloudError):
+    """A scipy that is missing, or does not fit this Python or its numpy."""
+
+
 class Cancelled(Exception):
     """Raised by a progress callback to stop the work; nothing was changed."""

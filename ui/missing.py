@@ -1,8 +1,28 @@
 """What stands in the sidebar in place of all panels where there is no scipy that serves."""
 
+import importlib.util
 import sys
+from pathlib import Path
 
 import bpy
+
+from .. import core
+from .wrapping import draw_text
+
+_OURS = "scipy-1.15.*.dist-info"  # what a wheel of the manifest leaves beside the package
+
+
+def scipy_serves():
+    """Whether there is a scipy that serves; it is imported, which takes a second, only where it is not ours."""
+    found = importlib.util.find_spec("scipy")
+    if found is None:
+        return False  # no wheel is for this Python
+    if any(Path(found.origin).parents[1].glob(_OURS)):
+        return True
+    try:
+        return hasattr(core, "applications")
+    except core.BrokenLibraryError:
+        return False
 
 
 def _lines():
@@ -33,7 +53,7 @@ class MESHFREE_PT_missing(bpy.types.Panel):
     def draw(self, context):
         column = self.layout.column(align=True)
         for line, icon in zip(_lines(), ("ERROR", "BLANK1", "BLANK1"), strict=True):
-            column.label(text=line, icon=icon)
+            draw_text(column, context, line, icon)
 
 
 CLASSES = (MESHFREE_PT_missing,)

@@ -1,7 +1,9 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
-from .formats import READABLE, SPLATS, WRITABLE, read_points, reading, write_points
-from .frames import numbered_files, order_frames
+from .digits import Digits, join_digits, split_digits
+from .formats import READABLE, SCANS, SPLATS, TEXTS, WRITABLE, read_points, reading, write_points
+from .frames import frame_number, numbered_files, order_frames
+from .las_choices import LasChoices, parse_classes
 from .lines import brief
 from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse

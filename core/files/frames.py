@@ -70,3 +70,8 @@ def order_frames(paths) -> list:
         if int(match[2]) == int(following[2]):
             raise PointCloudError(f"{path.name} and {other.name} have the same number. Remove one of them.")
     return [path for path, _ in frames]
+
+
+def frame_number(path) -> int:
+    """Return the last number in the name of a file, by which `order_frames` goes."""
+    return int(_NUMBERED.fullmatch(path.stem)[2])

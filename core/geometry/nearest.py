@@ -13,6 +13,7 @@ COUNT = 41  # the point itself and 40 others
 ROUNDS = 9  # of averaging over neighbours, after which what is left is of the place and not of single points
 ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
+_MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,12 @@ def find_nearest(points):
     return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance))
 
 
+def changed_rows(nearest, before):
+    """Return which of the same points have moved, or have neighbours that did or that are others than before, (k,)."""
+    moved = (nearest.points != before.points).any(axis=1)
+    return np.flatnonzero(moved | moved[nearest.index].any(axis=1) | (nearest.index != before.index).any(axis=1))
+
+
 def spacing_of(distance):
     """Return the spacing of an even sample as dense as the nearest twelve neighbours, by their distances (n, k)."""
     last = min(12, distance.shape[1] - 1)
@@ -94,3 +101,25 @@ def fading_weights(distance):
     tied = weights[:, 1:].sum(axis=1) < 1.0
     weights[tied] = 1.0
     return weights
+
+
+def typical_distance(positions):
+    """Return the typical distance between neighbouring points of a surface, (n, 3); 0 if unknown.
+
+    The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8. Of very many
+    points some are measured, chosen at random, each of which takes as much more as they are fewer.
+    """
+    positions = positions[np.isfinite(positions).all(axis=1)]
+    if len(positions) < 9:
+        return 0.0
+    few = positions
+    if len(positions) > _MEASURED:
+        few = positions[np.random.default_rng(0).choice(len(positions), _MEASURED, replace=False)]
+    sample = few[:: 1 + len(few) // 10_000]
+    distance = np.median(cKDTree(few).query(sample, k=9)[0][:, 8])
+    return float(distance * np.sqrt(np.pi / 8.0 * len(few) / len(positions)))
+
+
+def nearest_rows(points, places):
+    """Return which of the points, (n, 3), is nearest to each of some places, (k, 3)."""
+    return cKDTree(points).query(places)[1]

@@ -9,6 +9,10 @@ from ..errors import InvalidPointsError, NotASurfaceError
 from ..kernel import kernel
 
 NEIGHBORS = 12
+_BULGING = (
+    0.4  # mean height over the middle, along the normals, against the mean distance from it: 0.87 of half a sphere
+)
+_UPRIGHT = 0.5  # of a sheet's area as seen from above, what is left after what faces the other way is taken off
 
 
 def unit_normals(normals, count):
@@ -93,15 +97,46 @@ def orient_outwards(nearest, normals):
     Returns
     -------
     ndarray, (m, 3)
-        The same normals with consistent signs. Every component points away from its own centroid on the whole.
+        The same normals with consistent signs, each component as `outer_signs` has it.
     """
-    points = nearest.points
     normals, tree = propagate_signs(nearest, normals)
-    count, component = connected_components(tree, directed=False)
-    size = np.bincount(component, minlength=count)
-    centroid = np.column_stack([np.bincount(component, points[:, axis], count) for axis in range(3)]) / size[:, None]
-    outward = np.bincount(component, np.einsum("ij,ij->i", points - centroid[component], normals), count)
-    return normals * np.where(outward < 0.0, -1.0, 1.0)[component, None]
+    component = connected_components(tree, directed=False)[1]
+    return normals * outer_signs(nearest.points, normals, component)[component, None]
+
+
+def outer_signs(points, normals, part, weight=None):
+    """Choose a sign for each part of a surface: away from its middle, or up where it is a sheet that hardly bulges.
+
+    A body, a bowl, or what a scanner sees of a body bulges to its outer side. Terrain does not: its hills and pits are
+    low against its width. It hardly overhangs, though, so that nearly all of it faces up or down, and up is outside.
+
+    Parameters
+    ----------
+    points, normals : ndarray, (m, 3)
+        Normals that agree within each part.
+    part : ndarray, (m,) int
+        Number of the part that each point belongs to.
+    weight : ndarray, (m,), optional
+        Areas, up to a factor; alike where not given.
+
+    Returns
+    -------
+    ndarray, (parts,)
+        1 or -1.
+    """
+    weight = np.ones(len(points)) if weight is None else weight
+
+    def total(values):
+        return np.bincount(part, weight * values)
+
+    size = total(1.0) + np.finfo(float).tiny
+    middle = np.column_stack([total(points[:, axis]) for axis in range(3)]) / size[:, None]
+    offset = points - middle[part]
+    outward = total(np.einsum("ij,ij->i", offset, normals))
+    upward = total(normals[:, 2])
+    distance = np.sqrt(size * total(np.einsum("ij,ij->i", offset, offset)))
+    sheet = (np.abs(outward) < _BULGING * distance) & (np.abs(upward) > _UPRIGHT * total(np.abs(normals[:, 2])))
+    return np.where(np.where(sheet, upward, outward) < 0.0, -1.0, 1.0)
 
 
 def propagate_signs(nearest, normals):

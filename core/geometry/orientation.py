@@ -10,7 +10,7 @@ from ..errors import InvalidPointsError
 from ..options import LaplacianOptions
 from .cloud import read_surface
 from .nearest import find_nearest
-from .normals import NEIGHBORS, orient_outwards, propagate_signs, unit_normals
+from .normals import NEIGHBORS, orient_outwards, outer_signs, propagate_signs, unit_normals
 from .points import check_points
 
 METHODS = ("outside", "viewpoint", "winding")
@@ -35,10 +35,11 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
     normals : array_like, (n, 3)
         Of any length and sign.
     method : {"winding", "outside", "viewpoint"}
-        'outside' lets neighbours agree and each connected part point away from its middle; 'viewpoint' lets patches
-        look to where they were seen from, of one place by the points that are not hidden from it; 'winding' decides
-        patch by patch so that the winding number is as close to constant off the surface as it can be, which holds in
-        noise and where parts of the surface are missing.
+        'outside' lets neighbours agree and each connected part point away from its middle, or up along z where it is a
+        sheet that hardly bulges nor overhangs, such as terrain; 'viewpoint' lets patches look to where they were seen
+        from, of one place by the points that are not hidden from it; 'winding' decides patch by patch so that the
+        winding number is as close to constant off the surface as it can be, which holds in noise and where parts of
+        the surface are missing.
     viewpoint : array_like, (3,) or (n, 3), optional
         For 'viewpoint': one place, or the place of the scanner for each point [L].
     areas : array_like, (n,), optional
@@ -74,8 +75,9 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
     sides: the signs with the least integral are looked for, from the propagated ones by flipping patches one by one. To
     bound the work the dipoles of at most 4,000 clumps of points stand for the points, of at most 32,000 between clumps
     that are near, and r is smoothed by their size.
-    The volume that each part encloses tells outside from inside. At last, for 'viewpoint' too, single points flip as
-    long as that improves the energy among the nearest 40 of each: noise gave them a sign that others do not share.
+    The volume that each part encloses tells outside from inside; of a sheet that hardly bulges nor overhangs, up is
+    outside. At last, for 'viewpoint' too, single points flip as long as that improves the energy among the nearest 40
+    of each: noise gave them a sign that others do not share.
 
     References
     ----------
@@ -241,10 +243,7 @@ def _winding_signs(points, normals, weight, patch, part):
     signed = sparse.csr_array((sign, (np.arange(len(sign)), owner)), shape=(len(sign), count))
     area = np.bincount(part, weight, count) + np.finfo(float).tiny
     group = _grouped(signed.T @ energy @ signed, area)[part]
-    center = np.column_stack([np.bincount(group, weight * points[:, axis]) for axis in range(3)])
-    center /= (np.bincount(group, weight) + np.finfo(float).tiny)[:, None]
-    flux = weight * sign[patch] * np.einsum("ij,ij->i", points - center[group], normals)
-    outside = np.where(np.bincount(group, flux) < 0.0, -1.0, 1.0)
+    outside = outer_signs(points, sign[patch][:, None] * normals, group, weight)
     group_of_patch = np.empty(len(sign), dtype=int)
     group_of_patch[patch] = group
     return sign * outside[group_of_patch]

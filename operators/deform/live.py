@@ -19,7 +19,8 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import Cancelled, CoarseDeformer, Deformer, Splats
+from ... import core
+from ...core import Cancelled
 from ..objects.attributes import MOVED_DISC
 from ..objects.carried import discs_at_rest, local_gradients, moved_discs, moved_splats
 from ..objects.handlers import add_handlers, remove_handlers, tell
@@ -61,10 +62,10 @@ class Live:
     constraints: binding.Constraints
     rest: np.ndarray
     matrix: np.ndarray
-    follower: CoarseDeformer
+    follower: "core.CoarseDeformer"
     make_exact: Callable
-    exact: Deformer | CoarseDeformer | None
-    splats: Splats | None = None
+    exact: "core.Deformer | core.CoarseDeformer | None"
+    splats: "core.Splats | None" = None
     last: dict = field(default_factory=dict)
 
     def prepare(self, progress):
@@ -191,10 +192,10 @@ def plan_factors(obj, rest, matrix, constraints):
 
     def make(progress):
         known = constraints(operator(progress), progress) if callable(constraints) else constraints
-        follower = make_by(CoarseDeformer, known, progress)
+        follower = make_by(core.CoarseDeformer, known, progress)
         # Splats scatter about their surface: motions of some points that carry the others even that out.
         exact = follower if splats is not None else follower.exact
-        return Live(known, rest, matrix, follower, partial(make_by, Deformer, known), exact, splats)
+        return Live(known, rest, matrix, follower, partial(make_by, core.Deformer, known), exact, splats)
 
     return make
 

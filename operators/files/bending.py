@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ... import core
-from ...core import CoarseDeformer, PointCloudError, build_laplacian, read_splats, write_splats
+from ...core import PointCloudError
 from ...core.files import WRITABLE, PointTable, write_points
-from ...core.splats import floating_rows
 from .verbs import ONE_LINE, Verb
 
 _SHARES = (0.01, 0.5, 0.99)  # quantiles that are told
@@ -25,7 +24,7 @@ class SplatInfo(Verb):
     inputs = "files of splats"
 
     def run(self, path, arguments, output):
-        splats = read_splats(path)
+        splats = core.read_splats(path)
         axes = np.sort(splats.scales, axis=1)
 
         def quantiles(values):
@@ -74,16 +73,17 @@ class Deform(Verb):
         points = given.points if splats is None else splats.positions
         handles, goal = _moves(wanted, points)
         anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
-        out = floating_rows(splats) if splats is not None else ()
-        laplacian = build_laplacian(points, left_out=out)
-        deformer = CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
+        out = core.splats.floating_rows(splats) if splats is not None else ()
+        laplacian = core.build_laplacian(points, left_out=out)
+        deformer = core.CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
         moved = deformer.solve(goal)
+        written = []
         if splats is None:
-            write_points(output, replace(given, points=moved), double=not given.single)
+            written = write_points(output, replace(given, points=moved), double=not given.single)
         else:
-            write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
+            core.write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
         farthest = float(np.linalg.norm(moved - points, axis=1).max())
-        notices = [*given.notices, *deformer.notices]
+        notices = [*given.notices, *deformer.notices, *written]
         return {"points": len(points), "farthest": farthest, "left_out": len(out), "notices": notices}
 
 

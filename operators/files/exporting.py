@@ -7,7 +7,8 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ...core import PointCloudError, write_splats
+from ... import core
+from ...core import PointCloudError
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
 from ..objects.place import place_of
@@ -26,7 +27,7 @@ class ExportOperator(JobOperator, ExportHelper):
     """An operator that writes one file about the active object; an older file stays if that fails.
 
     A subclass has a method `plan`, which reads all that is needed and returns a function of a path and a progress
-    callback that writes the file, without touching Blender, and returns a line for the status bar.
+    callback that writes the file, without touching Blender, and returns a line for the status bar, or notices and it.
     """
 
     bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
@@ -52,7 +53,10 @@ class ExportOperator(JobOperator, ExportHelper):
 
     def finish(self, context, objects, results):
         """Tell what was written."""
-        self.report({"INFO"}, results)
+        *notices, line = [results] if isinstance(results, str) else results
+        for notice in notices:
+            self.warn(notice, context.object)
+        self.report({"INFO"}, line)
         return {"FINISHED"}
 
 
@@ -97,8 +101,8 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
 
         def write(path, progress):
             progress("Write", 0.0)
-            write_points(path, table, double=not table.single)
-            return f"{name}: {len(table.points):,} points written to {path.name}"
+            notices = write_points(path, table, double=not table.single)
+            return *table.notices, *notices, f"{name}: {len(table.points):,} points written to {path.name}"
 
         return write
 
@@ -134,11 +138,11 @@ class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
         else:
             objects, splats, name, hint = [obj], splats_to_write(obj), obj.name, _scale_hint(obj)
         for each in filter(lambda each: are_left_behind(each.data), objects):
-            self.report({"WARNING"}, f"{each.name}: {LEFT_BEHIND}")
+            self.warn(f"{each.name}: {LEFT_BEHIND}", each)
 
         def write(path, progress):
             progress("Write", 0.0)
-            write_splats(path, splats)
+            core.write_splats(path, splats)
             return f"{name}: {len(splats):,} splats written to {path.name}{hint}"
 
         return write

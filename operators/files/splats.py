@@ -8,7 +8,7 @@ import numpy as np
 from ... import core
 from ...core.files import choose_origin
 from ...core.files.table import split_columns
-from ..objects.attributes import PREFIX, STORABLE, read_attribute, write_attribute
+from ..objects.attributes import ONLY_DRAWN, PREFIX, STORABLE, read_attribute, write_attribute
 from ..objects.place import OFFSET, place_of
 from ..objects.splat_file import (
     OWN_OFFSET,
@@ -158,6 +158,6 @@ def with_results(splats, data):
     """Return splats to be written with the results that their points hold, as columns of the file beside its own."""
     columns = {} if splats.file is None else dict(splats.file.columns)
     for layer in data.attributes:
-        if layer.name.startswith(PREFIX) and layer.data_type in STORABLE:
+        if layer.name.startswith(PREFIX) and layer.name not in ONLY_DRAWN and layer.data_type in STORABLE:
             columns.update(split_columns(layer.name, read_attribute(data, layer.name)))
     return replace(splats, file=(splats.file or core.splats.SplatFile({}))._replace(columns=columns))

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from scipy.spatial import cKDTree
 
+from ... import core
 from ...core.files import MESHES, READABLE, read_points, write_mesh
 from ..objects.attributes import point_count
 from ..objects.groups import assign
@@ -46,7 +46,7 @@ class FromSources(Apply):
 
     def prepare(self, tool, obj, path, arguments):
         if arguments.at:
-            nearest = cKDTree(files.file_points(obj)).query(arguments.at)[1]
+            nearest = core.geometry.nearest_rows(files.file_points(obj), arguments.at)
             tool.group = _PLACES
             assign(obj, tool.group, np.isin(np.arange(point_count(obj.data)), nearest), "REPLACE", 1.0)
 
@@ -102,9 +102,9 @@ class Mesh(Apply):
         if output.suffix.lower() == ".blend":
             tool.conclude(bpy.context, [obj])
             opening.save_scene(output)
-        else:
-            table = files.point_table(bpy.context, made)
-            write_mesh(output, table, files.faces_of(made), double=not table.single)
+            return []
+        table = files.point_table(bpy.context, made)
+        return write_mesh(output, table, files.faces_of(made), double=not table.single)
 
     def figures(self, tool, result):
         ((_, name, opened),) = tool.made

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ...core import Discs
+from ... import core
 from .attributes import (
     DISC,
     MOVED_DISC,
@@ -77,7 +77,7 @@ def moved_discs(vectors, gradients):
     """Return discs, normals times radii, (n, 3), after a deformation with these gradients, (n, 3, 3)."""
     radii = np.linalg.norm(vectors, axis=1)
     known = radii > 0.0  # of points that were added since, nothing is known
-    moved = Discs(vectors[known] / radii[known, None], radii[known]).deformed(gradients[known])
+    moved = core.Discs(vectors[known] / radii[known, None], radii[known]).deformed(gradients[known])
     result = np.zeros(vectors.shape)
     result[known] = moved.normals * moved.radii[:, None]
     return result

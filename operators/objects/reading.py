@@ -1,23 +1,21 @@
 """From a Blender object to its points, in lengths of the world."""
 
 import zlib
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ...core import PointCloudError, Splats, check_points
-from ...core.geometry.boundary import FEWEST
+from ... import core
+from ...core import PointCloudError
 from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_attribute
 from .counting import members
+from .evaluated import evaluated_positions
 from .groups import chosen_members
 from .modifiers import is_own, is_sequence, modifier_settings
 from .splats import LEFT_BEHIND, are_left_behind, has_splats, read_splats
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
-_MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
 _CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
 
 
@@ -58,11 +56,16 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
             f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under'
             " Points and Groups"
         )
+    if any(map(is_sequence, obj.modifiers)):
+        return (
+            f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'
+            " collection in the Outliner, and select its objects"
+        )
     if not point_count(obj.data):
-        if any(map(is_sequence, obj.modifiers)):
+        if any(item.type == "NODES" and not is_own(item) for item in obj.modifiers):
             return (
-                f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'
-                " collection in the Outliner, and select its objects"
+                f'"{obj.name}" has no {kind} but those that its nodes make. Put the node Points to Vertices at the end'
+                " of the nodes, and apply them"
             )
         return f'"{obj.name}" has no {kind}. Add points, or select another object'
     return ""
@@ -93,7 +96,7 @@ class Reading:
     boundary: np.ndarray | None = None
     notices: list = field(default_factory=list)
     orientation: np.ndarray | None = None
-    splats: Splats | None = None
+    splats: "core.Splats | None" = None
 
     def local(self, vectors):
         """Turn points or shifts as they were read into local ones."""
@@ -143,7 +146,7 @@ def read_points(context, obj) -> Reading:
         notices.append(f"{obj.name}: {LEFT_BEHIND}.")
     judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)
     splats = read_splats(obj.data, with_harmonics=False) if judged else None
-    reading = Reading(check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)
+    reading = Reading(core.check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)
     sides = chosen_sides(obj)
     return reading if sides is None else replace(reading, orientation=reading.placed_normals(sides))
 
@@ -161,14 +164,14 @@ def seen_positions(context, obj):
     """Read the local positions of an object's points as `read_points` takes them, whatever they are, (n, 3) float32."""
     context.view_layer.update()  # a script may have moved the object a line ago
     if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
-        return _evaluated_positions(context, obj)
+        return evaluated_positions(context, obj)
     return own_positions(obj.data)
 
 
 def boundary_points(obj):
     """Read which points the boundary group of an object holds, (n,) bool; None if the settings name no group."""
     name = obj.meshfree.boundary_group
-    return chosen_members(obj, name, "Boundary Group", FEWEST) if name else None
+    return chosen_members(obj, name, "Boundary Group", core.geometry.FEWEST) if name else None
 
 
 def key_positions(key):
@@ -176,41 +179,6 @@ def key_positions(key):
     positions = np.empty((len(key.points), 3), np.float32)
     key.points.foreach_get("co", positions.reshape(-1))
     return positions
-
-
-def _evaluated_positions(context, obj):
-    """Positions after shape keys, and after the modifiers if the settings ask for them; never after our own."""
-    with _left_out([item for item in obj.modifiers if is_own(item) or not obj.meshfree.use_modifiers]):
-        evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
-        if not evaluated.is_evaluated:
-            raise PointCloudError(
-                f'"{obj.name}" is disabled in viewports, so its shape keys and modifiers are not computed.'
-                " Enable it in the Outliner (monitor icon)."
-            )
-        if obj.type == "MESH":
-            positions = own_positions(evaluated.to_mesh())
-            evaluated.to_mesh_clear()
-        else:
-            positions = own_positions(evaluated.data)
-    if len(positions) != point_count(obj.data):
-        raise PointCloudError(
-            f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {len(positions)},'
-            " instances not counted, so results have no place. Apply these modifiers, or turn off Use Modifiers."
-        )
-    return positions
-
-
-@contextmanager
-def _left_out(modifiers):
-    """Take modifiers out of the viewport's evaluation, and put them back."""
-    shown = [modifier for modifier in modifiers if modifier.show_viewport]
-    try:
-        for modifier in shown:
-            modifier.show_viewport = False
-        yield
-    finally:
-        for modifier in shown:
-            modifier.show_viewport = True
 
 
 def metric(obj):
@@ -261,27 +229,10 @@ def find_object(uid):
 
 def spacing(data) -> float:
     """Typical distance between neighbouring points of a mesh or a point cloud in local lengths; 0 if unknown."""
-    return typical_distance(own_positions(data))
+    return core.geometry.typical_distance(own_positions(data))
 
 
 def discs(normals, radii, points):
     """Discs as the display takes them, (n, 3): unit normals times radii in spacings."""
-    spacing = typical_distance(points) or np.median(radii)  # none where many points share a place
+    spacing = core.geometry.typical_distance(points) or np.median(radii)  # none where many points share a place
     return normals * (radii / spacing)[:, None]
-
-
-def typical_distance(positions) -> float:
-    """Typical distance between neighbouring points of a surface, (n, 3); 0 if unknown.
-
-    The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8. Of very many
-    points some are measured, chosen at random, each of which takes as much more as they are fewer.
-    """
-    positions = positions[np.isfinite(positions).all(axis=1)]
-    if len(positions) < 9:
-        return 0.0
-    few = positions
-    if len(positions) > _MEASURED:
-        few = positions[np.random.default_rng(0).choice(len(positions), _MEASURED, replace=False)]
-    sample = few[:: 1 + len(few) // 10_000]
-    distance = np.median(cKDTree(few).query(sample, k=9)[0][:, 8])
-    return float(distance * np.sqrt(np.pi / 8.0 * len(few) / len(positions)))

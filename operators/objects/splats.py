@@ -6,8 +6,7 @@ from itertools import count, takewhile
 import numpy as np
 
 from ... import core
-from ...core import PointCloudError, Splats
-from ...core.splats.harmonics import COUNTS
+from ...core import PointCloudError
 from .attributes import (
     DISPLACEMENT,
     REST,
@@ -45,10 +44,10 @@ def has_splats(data) -> bool:
 def harmonic_names(data) -> list:
     """Return the names of the attributes of the harmonics, in their order, of whole degrees."""
     names = list(takewhile(lambda name: name in data.attributes, (f"{HARMONIC}{number}" for number in count())))
-    return names[: max(known for known in COUNTS if known <= len(names))]
+    return names[: max(known for known in core.splats.COUNTS if known <= len(names))]
 
 
-def read_splats(data, with_harmonics=True) -> Splats:
+def read_splats(data, with_harmonics=True) -> "core.Splats":
     """Read the splats of a mesh or a point cloud, in local space, without harmonics as if they were of degree 0.
 
     Raises
@@ -65,7 +64,7 @@ def read_splats(data, with_harmonics=True) -> Splats:
     harmonics = np.empty((len(base), len(names), 3), np.float32)
     for number, name in enumerate(names):
         harmonics[:, number] = read_attribute(data, name)
-    return Splats(
+    return core.Splats(
         own_positions(data),
         read_attribute(data, SCALE),
         read_attribute(data, ROTATION),
@@ -97,7 +96,7 @@ def write_splats(data, splats):
     tag_changed(data)
 
 
-def shown_splats(obj) -> Splats:
+def shown_splats(obj) -> "core.Splats":
     """Return the splats of an object as its deformation shows them: in between those at rest and those carried."""
     data = obj.data
     splats = read_splats(data)

@@ -11,8 +11,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import Geodesics, LaplaceBeltrami, Spectrum, build_laplacian, mean_curvature, points_that_fit
-from ...core.splats import floating_rows
+from ... import core
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
 _FACTOR = 12  # bytes of each entry of sparse factors: a number and its row
@@ -25,7 +24,7 @@ _lock = Lock()  # computations run in threads
 class Built(NamedTuple):
     """An operator and the mean curvature computed by it."""
 
-    laplacian: LaplaceBeltrami
+    laplacian: "core.LaplaceBeltrami"
     mean_curvature: np.ndarray
 
 
@@ -48,10 +47,10 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
 
     def compute():
         fitting(len(points), options)
-        laplacian = build_laplacian(points, options=options, boundary=boundary, left_out=out, progress=progress)
+        laplacian = core.build_laplacian(points, options=options, boundary=boundary, left_out=out, progress=progress)
         progress("Curvature", 1.0)
         laplacian = replace(laplacian, notices=[*floating_notices(out), *laplacian.notices])
-        return Built(laplacian, mean_curvature(laplacian))
+        return Built(laplacian, core.mean_curvature(laplacian))
 
     out = floating(splats)
     key = content(points, options, boundary, out)
@@ -81,7 +80,7 @@ def floating(splats):
     if splats is None:
         return _NONE
     key = content("floaters", splats.positions, splats.scales, splats.rotations, splats.opacities)
-    return fetch(key, lambda: floating_rows(splats))
+    return fetch(key, lambda: core.splats.floating_rows(splats))
 
 
 def floating_notices(out):
@@ -99,14 +98,14 @@ def fitting(count: int, options, modes: int = 0):
 
     Where it is not enough for a count, what is kept is given back first.
     """
-    most = points_that_fit(options, modes)
+    most = core.points_that_fit(options, modes)
     if most is None or most >= count:
         return most
     clear()
-    return points_that_fit(options, modes)
+    return core.points_that_fit(options, modes)
 
 
-def lowest_modes(laplacian, count: int, progress, dirichlet=False, raw=False) -> Spectrum:
+def lowest_modes(laplacian, count: int, progress, dirichlet=False, raw=False) -> "core.Spectrum":
     """Return the lowest modes of an operator, computed only if there are not as many from before.
 
     Parameters
@@ -125,7 +124,7 @@ def lowest_modes(laplacian, count: int, progress, dirichlet=False, raw=False) ->
     if known is None or len(known.eigenvalues) < count:
         known = laplacian.eigenpairs(count, raw=True, dirichlet=dirichlet, progress=progress)
         _put(key, known)
-    lowest = Spectrum(known.eigenvalues[:count], known.eigenvectors[:, :count])
+    lowest = core.Spectrum(known.eigenvalues[:count], known.eigenvectors[:, :count])
     return lowest if raw else laplacian.corrected(lowest)
 
 
@@ -149,9 +148,9 @@ def result(laplacian, *settings, compute):
     return fetch(content(_sources[laplacian], *settings), compute, laplacian)
 
 
-def geodesics(laplacian, progress) -> Geodesics:
+def geodesics(laplacian, progress) -> "core.Geodesics":
     """Return what distances from any points have in common by an operator from `build`, computed only once."""
-    return result(laplacian, "geodesics", compute=lambda: Geodesics(laplacian, progress=progress))
+    return result(laplacian, "geodesics", compute=lambda: core.Geodesics(laplacian, progress=progress))
 
 
 def fetch(key, compute, laplacian=None):

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from ...core import surface_discs
-from ...core.geometry import toward
+from ... import core
 from ..objects.carried import discs_at_rest
 from ..objects.reading import discs
 from . import cache
@@ -22,8 +21,8 @@ def disc_finder(obj, reading):
         if rest is None:
             return None
         local = reading.local(full)
-        found = cache.fetch(cache.content("discs", local), lambda: surface_discs(local))
-        moved = discs(toward(found.normals, rest), found.radii, local)
+        found = cache.fetch(cache.content("discs", local), lambda: core.surface_discs(local))
+        moved = discs(core.geometry.toward(found.normals, rest), found.radii, local)
         steps = [np.linalg.norm(places - reading.points, axis=1) for places in (points, full)]
         share = np.divide(*steps, out=np.zeros(len(local)), where=steps[1] > 0.0)
         return rest + np.minimum(share, 1.0)[:, None] * (moved - rest)

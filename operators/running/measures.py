@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import LaplaceBeltrami, Prolongation, blue_noise_subset
+from ... import core
 from . import cache
 
 _ALL = np.arange(0)  # stands for all points
@@ -39,10 +39,10 @@ class Measured(NamedTuple):
         Splats that take no part.
     """
 
-    laplacian: LaplaceBeltrami
+    laplacian: "core.LaplaceBeltrami"
     subset: np.ndarray
     measures: Measures
-    prolongation: Prolongation | None
+    prolongation: "core.Prolongation | None"
     left_out: np.ndarray
 
     def carried(self, vectors):
@@ -84,7 +84,7 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
 
     def prolong():
         report = _within(progress, "All Points")
-        return Prolongation(points, subset, laplacian.normals, laplacian.component, progress=report)
+        return core.Prolongation(points, subset, laplacian.normals, laplacian.component, progress=report)
 
     progress("All Points", 0.9)
     prolongation = cache.result(laplacian, "prolongation", points, compute=prolong)
@@ -140,7 +140,7 @@ def _subset(points, options, boundary, splats, budget, modes, progress):
             return _ALL
         progress("Subset", 0.0)
         kept = np.delete(np.arange(count), cache.floating(splats))
-        return kept[blue_noise_subset(points[kept], most, progress=_within(progress, "Subset"))]
+        return kept[core.blue_noise_subset(points[kept], most, progress=_within(progress, "Subset"))]
 
     return cache.fetch(cache.content(points, options, boundary, cache.floating(splats), "subset", budget), choose)
 

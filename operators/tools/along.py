@@ -3,9 +3,9 @@
 import bpy
 import numpy as np
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
-from scipy.spatial import cKDTree
 
-from ...core import PointCloudError, Transport
+from ... import core
+from ...core import PointCloudError
 from ..objects.attributes import CELL, DIRECTION, SIGNED_DISTANCE, UV, tag_changed, write_attribute
 from ..objects.groups import SOURCE
 from ..objects.result import length_text
@@ -17,7 +17,7 @@ OUTSIDE = -1.0  # place in the texture of points that the map does not reach: be
 
 
 def _transport(laplacian, progress):
-    return cache.result(laplacian, "transport", compute=lambda: Transport(laplacian, progress=progress))
+    return cache.result(laplacian, "transport", compute=lambda: core.Transport(laplacian, progress=progress))
 
 
 class NearestSource(Tool):
@@ -69,6 +69,7 @@ class Unwrap(Tool):
     writes = (UV,)
     asks = ("group", "radius", "angle", "show")
     adjustable = ("radius", "angle", "show")
+    at_zero = {"radius": "All Points"}
 
     group: StringProperty(
         name="Middle",
@@ -207,7 +208,7 @@ class SignedDistance(Tool):
         def compute(progress):
             laplacian = operator(progress)
             known = np.flatnonzero(laplacian.component >= 0)
-            nearest = known[cKDTree(reading.points[known]).query(places)[1]]
+            nearest = known[core.geometry.nearest_rows(reading.points[known], places)]
             _, first = np.unique(nearest, return_index=True)
             way = nearest[np.sort(first)]
             if len(way) < 2:

@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ...core import LaplaceBeltrami, Spectrum, UnresolvedModesError
+from ... import core
+from ...core import UnresolvedModesError
 from ..objects.attributes import point_count
 from ..objects.options import laplacian_options, point_budget
 from ..objects.reading import read_points
@@ -23,10 +24,10 @@ WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each 
 class Analysis:
     """All that is computed for an object, in lengths of the world; normals in local space too."""
 
-    laplacian: LaplaceBeltrami  # of the subset, where there is one
+    laplacian: "core.LaplaceBeltrami"  # of the subset, where there is one
     measures: Measures
     local_normals: np.ndarray
-    spectrum: Spectrum | None
+    spectrum: "core.Spectrum | None"
     subset_count: int  # points that it was computed on; 0 for all
     seconds: dict
     notices: list
@@ -93,8 +94,6 @@ def resolved_modes(laplacian, modes, progress):
 class AnalysisOperator(ShownOperator):
     """What the operators that analyze objects have in common; `wanted` is how many modes one computes."""
 
-    adjustable = ("write_limit", "show")
-
     write_limit: IntProperty(
         name="Modes to Write",
         description="Write at most this many modes as attributes; the eigenvalues of all of them are kept",
@@ -108,6 +107,11 @@ class AnalysisOperator(ShownOperator):
         default=False,
         options={"SKIP_SAVE"},
     )
+
+    @property
+    def adjustable(self):
+        """Names of the settings: how many modes to write is no question where all are."""
+        return ("write_limit", "show") if self.wanted > WRITE_LIMIT else ("show",)
 
     @property
     def writes(self):

@@ -1,6 +1,7 @@
 """Turn meshes into point clouds and back, with all that this extension keeps on them."""
 
 import re
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -10,8 +11,9 @@ from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, write_attribute
 from ..objects.counting import renew_counts
+from ..objects.evaluated import POINTCLOUDS_SINCE, shown_as_own, shown_points
 from ..objects.groups import ROLES, group_weights, handle_names, has_group, role_group
-from ..objects.modifiers import get_input, is_display, set_input
+from ..objects.modifiers import inputs_of, is_display, put_inputs, set_input
 from ..objects.result import check_writable
 from ..running.application import chosen_objects
 from ..running.ready import ReadyOperator, reporting
@@ -25,7 +27,7 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.convert"
     bl_label = "Convert Points"
-    since = (4, 5)  # version of Blender
+    since = POINTCLOUDS_SINCE
 
     target: EnumProperty(
         name="To",
@@ -59,8 +61,8 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
                 left = self._convert_all(context, kept)
             bpy.data.batch_remove([*kept.values(), *left])
         finally:
-            for name in chosen:
-                shown[name].select_set(True)
+            for obj in shown:
+                obj.select_set(obj.name in chosen)
             shown.active = shown[active] if active else None
         return {"FINISHED"}
 
@@ -72,8 +74,10 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
                 if obj.meshfree.make_single_user and obj.data.users > 2:  # one of them is the copy
                     obj.data = obj.data.copy()
                 left.add(obj.data)
-                _convert(context, obj, self.target)
-                self.report({"INFO"}, f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now")
+                made = _convert(context, obj, self.target)
+                self.report(
+                    {"INFO"}, f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now{made}"
+                )
             used = {obj.data for obj in bpy.data.objects if obj not in kept.values()}
             return [data for data in left if data not in used and not data.use_fake_user]
         except BaseException:
@@ -95,7 +99,13 @@ def _check(obj):
 
 
 def _convert(context, obj, target):
-    """Convert an object by Blender's own operator, which takes selected ones, and keep what that loses."""
+    """Convert an object by Blender's own operator, which takes selected ones, and keep what that loses.
+
+    Returns
+    -------
+    str
+        Which points these are, where its nodes make them.
+    """
     groups = {name: group_weights(obj, name) for name in _group_names(obj)}
     chosen, count = selection(obj), point_count(obj.data)
     display = _take_display(obj)  # whose points Blender would not take for those of the object
@@ -103,7 +113,10 @@ def _convert(context, obj, target):
         other.select_set(False)
     obj.select_set(True)
     context.view_layer.objects.active = obj
-    bpy.ops.object.convert(target=target)
+    with _points_of_nodes(context, obj) as made:
+        bpy.ops.object.convert(target=target)
+    if not point_count(obj.data):
+        raise PointCloudError(f'The modifiers of "{obj.name}" show no points. Remove or change them, and convert then.')
     data, same = obj.data, point_count(obj.data) == count
     if same and target == "POINTCLOUD":
         write_attribute(data, SELECTION, chosen, "BOOLEAN")
@@ -118,6 +131,25 @@ def _convert(context, obj, target):
                 group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
     _put_display(obj, display)
     renew_counts(obj)
+    return made
+
+
+@contextmanager
+def _points_of_nodes(context, obj):
+    """Let points that nodes make be of the object's own kind, which Blender converts; say which there are.
+
+    Instances are taken where there is nothing else: beside points they are what is shown at these.
+    """
+    context.view_layer.update()
+    shown = shown_points(context, obj)
+    own = shown._replace(instances=0)
+    left = f"; {shown.instances:,} points of instances are left out" if sum(own) and shown.instances else ""
+    other = shown.points if obj.type == "MESH" else shown.vertices
+    if not other and (sum(own) or not shown.instances):
+        yield left
+        return
+    with shown_as_own(obj, with_instances=not sum(own)):
+        yield f": {own if sum(own) else shown}{left}"
 
 
 def _group_names(obj):
@@ -135,7 +167,7 @@ def _take_display(obj):
     modifier = next((item for item in obj.modifiers if is_display(item)), None)
     if modifier is None:
         return None
-    kept = modifier.name, modifier.node_group, {name: get_input(modifier, name) for name in ("Radius", "Material")}
+    kept = modifier.name, modifier.node_group, inputs_of(modifier)
     set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
     obj.modifiers.remove(modifier)
     return kept
@@ -148,8 +180,7 @@ def _put_display(obj, display):
     modifier = obj.modifiers.new(name, "NODES")
     modifier.node_group = group
     modifier.use_pin_to_last = True
-    for key, value in inputs.items():
-        set_input(modifier, key, value)
+    put_inputs(modifier, inputs)
 
 
 CLASSES = (MESHFREE_OT_convert,)

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty
 
-from ...core import principal_curvatures, roughness
+from ... import core
 from ..objects.attributes import (
     CURVATURE_1,
     CURVATURE_2,
@@ -66,7 +66,7 @@ class Curvatures(Tool):
         def compute(progress):
             laplacian = operator(progress)
             progress("Curvature", 0.9)
-            found = cache.result(laplacian, "principal", compute=lambda: principal_curvatures(laplacian))
+            found = cache.result(laplacian, "principal", compute=lambda: core.principal_curvatures(laplacian))
             return found, reading.local_directions(found.direction)
 
         return compute
@@ -92,6 +92,7 @@ class Roughness(Tool):
 
     writes = (ROUGHNESS,)
     asks = ("wavelength", "show")
+    at_zero = {"wavelength": "Automatic"}
 
     wavelength: FloatProperty(
         name="Wavelength",
@@ -114,7 +115,7 @@ class Roughness(Tool):
                 laplacian,
                 "roughness",
                 wavelength,
-                compute=lambda: roughness(laplacian, wavelength, progress=progress),
+                compute=lambda: core.roughness(laplacian, wavelength, progress=progress),
             )
 
         return compute

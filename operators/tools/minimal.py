@@ -3,8 +3,8 @@
 import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
-from ...core import Cancelled, PointCloudError, deformation_gradients
-from ...core.applications import minimal_surface
+from ... import core
+from ...core import Cancelled, PointCloudError
 from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen
 from ..objects.options import laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
@@ -65,7 +65,7 @@ class MinimalSurface(Tool):
             gradients = None
             if carries:
                 laplacian = build_operator(reading, options, progress).laplacian
-                gradients = deformation_gradients(laplacian, film.points)
+                gradients = core.deformation_gradients(laplacian, film.points)
             return reading, film, gradients, find_discs(film.points, film.points)
 
         return compute
@@ -98,7 +98,7 @@ def _shrink(points, boundary, tolerance, steps, options, progress):
     def report(stage, fraction):
         progress("Steps", min(1.0, (count + fraction) / steps))
 
-    film = minimal_surface(
+    film = core.minimal_surface(
         points,
         boundary,
         epsilon=tolerance,

@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ...core import PointCloudError, orient_normals
+from ... import core
+from ...core import PointCloudError
 from ..objects.attributes import NORMAL, ORIENTATION, RESULTS, read_attribute
 from ..objects.reading import read_points
 from ..objects.result import write_result
@@ -26,7 +27,11 @@ class OrientNormals(Tool):
         description="How the side is found",
         items=[
             ("WINDING", "Winding Number", "As closed as the surface can be, through gaps and in noise"),
-            ("OUTSIDE", "Outside", "Neighbors agree, each component points away from its middle: as analyzed at first"),
+            (
+                "OUTSIDE",
+                "Outside",
+                "Neighbors agree, each component points away from its middle, terrain up: as analyzed at first",
+            ),
             ("VIEWPOINT", "Viewpoint", "To where an object is, such as the camera"),
             ("ATTRIBUTE", "Attribute", "By a vector of each point, such as the place of the scanner"),
             ("KEEP", "As They Are", "The side that they have, to flip it"),
@@ -61,7 +66,7 @@ class OrientNormals(Tool):
             progress("Orientation", 0.9)
 
             def compute():
-                return orient_normals(reading.points, normals, method=way, viewpoint=viewpoint, areas=areas)
+                return core.orient_normals(reading.points, normals, method=way, viewpoint=viewpoint, areas=areas)
 
             return sign * cache.result(measured.laplacian, "sides", reading.points, way, viewpoint, compute=compute)
 

@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
-from ...core import PointCloudError, heat_kernel_signature, modes_needed, nodal_domains, segment, wave_kernel_signature
+from ... import core
+from ...core import PointCloudError
 from ..objects.attributes import (
     HEAT_SIGNATURE,
     SEGMENT,
@@ -88,15 +89,15 @@ def _by_mode(laplacian, mode, progress):
     """Divide the points by the signs of a mode."""
     vector = cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1]
     progress("Regions", 0.5)
-    return nodal_domains(vector, laplacian)
+    return core.nodal_domains(vector, laplacian)
 
 
 def _by_shape(laplacian, parts, progress):
     """Divide the points into parts, by modes from before if there are enough."""
-    count, spectrum = modes_needed(laplacian, parts), None
+    count, spectrum = core.modes_needed(laplacian, parts), None
     if cache.known_modes(laplacian) >= count:
         spectrum = resolved_modes(laplacian, count, progress)[0]
-    return segment(laplacian, parts, spectrum=spectrum, progress=progress)
+    return core.segment(laplacian, parts, spectrum=spectrum, progress=progress)
 
 
 def _is_numbered(name):
@@ -232,7 +233,7 @@ class Signature(Tool):
 
     def plan(self, context, obj):
         _, operator = operator_reader(context, obj)
-        signature = heat_kernel_signature if self.kind == "HEAT" else wave_kernel_signature
+        signature = core.heat_kernel_signature if self.kind == "HEAT" else core.wave_kernel_signature
         count, modes = self.count, self.modes
         return lambda progress: signature(cache.lowest_modes(operator(progress), modes, progress), count=count)
 

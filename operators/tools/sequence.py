@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ...core import PointCloudError, match_modes
+from ... import core
+from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import MEAN_CURVATURE, eigenvector_name
 from ..objects.handlers import tell
@@ -58,7 +59,7 @@ def continue_modes(analysis, points, earlier):
     count = spectrum.eigenvectors.shape[1]  # of a subset fewer may be carried to all points
     spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
     if earlier is not None:
-        matched = match_modes(spectrum, analysis.measures.areas, points, *earlier)
+        matched = core.match_modes(spectrum, analysis.measures.areas, points, *earlier)
         spectrum, overlaps = matched.spectrum, matched.overlaps
     return replace(analysis, spectrum=spectrum), overlaps, (spectrum, points)
 
@@ -69,6 +70,8 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
     bl_idname = "meshfree.analyze_sequence"
     bl_label = "Analyze Sequence"
     bl_options = {"REGISTER", "UNDO"}
+    asks = ("modes", "shown_mode", "show")
+    at_zero = {"shown_mode": "Mean Curvature"}
 
     modes: IntProperty(
         name="Modes", description="Compute this many vibration modes of each frame", default=0, min=0, soft_max=50
@@ -116,18 +119,29 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
                 write_result(obj, analysis, max(self.modes, WRITE_LIMIT))
             if self.show:
                 tell("sequence_written", objects, name)
-        for obj, (analysis, overlaps) in zip(objects, results, strict=True):
-            for notice in analysis.notices:
-                self.report({"WARNING"}, f"{obj.name}: {notice}")
-            lost = np.flatnonzero(overlaps < 0.5) + 1
-            if len(lost):
-                shown = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")
-                self.report({"WARNING"}, f"{obj.name}: modes {shown} do not continue those of the frame before")
+            self._tell(objects, results)
         areas = [analysis.total_area for analysis, _ in results]
         span = f"area {area_text(min(areas))} to {area_text(max(areas))}"
         modes = f", {self.modes} modes" if self.modes else ""
         self.report({"INFO"}, f"{len(objects)} frames, {span}{modes}")
         return {"FINISHED"}
+
+    def _tell(self, frames, results):
+        """Tell of what is in doubt, on frames and on what shows them, since nobody selects frames."""
+        sequences = [obj for obj in bpy.data.objects if frames_of(obj) == frames]
+        self.begin_notices([*sequences, *frames])
+        for obj, (analysis, overlaps) in zip(frames, results, strict=True):
+            for notice in [*analysis.notices, *_lost(overlaps)]:
+                self.warn(f"{obj.name}: {notice}", obj, *sequences)
+
+
+def _lost(overlaps):
+    """Say which modes have nothing to continue."""
+    lost = np.flatnonzero(overlaps < 0.5) + 1
+    if not len(lost):
+        return []
+    shown = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")
+    return [f"modes {shown} do not continue those of the frame before"]
 
 
 def _compute(plans, progress):

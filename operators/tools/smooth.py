@@ -3,19 +3,10 @@
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
-from bpy_extras import anim_utils
 
-from ...core import (
-    PointBlend,
-    PointCloudError,
-    boost,
-    deformation_gradients,
-    displace_by_mode,
-    exponential,
-    fair_points,
-    smooth_points,
-    smoothing_base,
-)
+from ... import core
+from ...core import PointCloudError
+from ..objects.animation import curves
 from ..objects.carried import carries
 from ..objects.groups import chosen_weights
 from ..objects.positions import check_movable, target_property, write_positions
@@ -32,6 +23,8 @@ _FINEST = 8.0  # details finer than this share of the wavelength count as noise,
 
 class Smooth(Tool):
     """The settings and the work of `meshfree.smooth`."""
+
+    at_zero = {"wavelength": "Automatic"}
 
     method: EnumProperty(
         name="Method",
@@ -103,7 +96,7 @@ class Smooth(Tool):
         def compute(progress):
             laplacian = operator(progress)
             points, full = smoothed(laplacian, progress)
-            gradients = deformation_gradients(laplacian, points) if splats else None
+            gradients = core.deformation_gradients(laplacian, points) if splats else None
             return reading, points, gradients, find_discs(full, points)
 
         def smoothed(laplacian, progress):
@@ -115,7 +108,7 @@ class Smooth(Tool):
                     " off Keep Boundary."
                 )
             check_wavelength(wavelength, reading.points, name)
-            blend = PointBlend(laplacian, dirichlet=dirichlet, **shared)
+            blend = core.PointBlend(laplacian, dirichlet=dirichlet, **shared)
             settings = (
                 method,
                 dirichlet,
@@ -160,20 +153,23 @@ class MESHFREE_OT_smooth(Smooth, ApplicationOperator, bpy.types.Operator):
 def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
     """Return the places of the points, (n, 3), that a method gives at full strength."""
     base = cache.result(
-        laplacian, "base", dirichlet, compute=lambda: smoothing_base(laplacian, dirichlet=dirichlet, progress=progress)
+        laplacian,
+        "base",
+        dirichlet,
+        compute=lambda: core.smoothing_base(laplacian, dirichlet=dirichlet, progress=progress),
     )
     settings = {"dirichlet": dirichlet, "progress": progress, "base": base}
     length = np.median(laplacian.smoothing_lengths)
     if method == "NOISE":
-        return fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None, **settings)
+        return core.fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None, **settings)
     if method == "MODES":
         spectrum = cache.lowest_modes(laplacian, modes, progress, dirichlet, raw=True)
-        return smooth_points(laplacian, modes, spectrum, **settings)
+        return core.smooth_points(laplacian, modes, spectrum, **settings)
     if method == "HEAT":
         squared = ((wavelength or _HEAT * length) / (2.0 * np.pi)) ** 2
-        return smooth_points(laplacian, exponential(np.log(2.0) * squared), **settings)
+        return core.smooth_points(laplacian, core.exponential(np.log(2.0) * squared), **settings)
     low = (2.0 * np.pi / (wavelength or _DETAIL * length)) ** 2
-    return smooth_points(laplacian, boost(gain, low, _FINEST**2 * low), **settings)
+    return core.smooth_points(laplacian, core.boost(gain, low, _FINEST**2 * low), **settings)
 
 
 def check_wavelength(wavelength, points, name):
@@ -189,6 +185,7 @@ class ModeShape(Tool):
     """The settings and the work of `meshfree.mode_shape`."""
 
     adjustable = ("mode", "amplitude", "phase", "animate", "period", "target")
+    at_zero = {"amplitude": "Automatic"}
 
     mode: IntProperty(
         name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
@@ -238,8 +235,8 @@ class ModeShape(Tool):
                 several = max(mode, min(_READY, len(reading.points) // 3))
                 cache.lowest_modes(laplacian, several, progress, raw=True)
             vector = cache.lowest_modes(laplacian, number, progress).eigenvectors[:, number - 1]
-            points = displace_by_mode(laplacian, vector, amplitude, phase=phase)
-            return reading, points, number, deformation_gradients(laplacian, points) if carried else None
+            points = core.displace_by_mode(laplacian, vector, amplitude, phase=phase)
+            return reading, points, number, core.deformation_gradients(laplacian, points) if carried else None
 
         return compute
 
@@ -262,12 +259,7 @@ class ModeShape(Tool):
 
 def _animated_value(key, frame):
     """Return the value that its keyframes give a shape key at a frame."""
-    animation = key.id_data.animation_data
-    if hasattr(animation, "action_slot"):  # Blender 4.4 on
-        curves = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot).fcurves
-    else:
-        curves = animation.action.fcurves
-    return curves.find(key.path_from_id("value")).evaluate(frame)
+    return curves(key.id_data).find(key.path_from_id("value")).evaluate(frame)
 
 
 class MESHFREE_OT_mode_shape(ModeShape, ApplicationOperator, bpy.types.Operator):

@@ -73,7 +73,7 @@ class MESHFREE_OT_apply_to_splats(SplatOperator, bpy.types.Operator):
         _check_placeable(obj, matrix)
         _check_single(obj)
         if are_left_behind(obj.data):
-            self.report({"WARNING"}, f"{obj.name}: {LEFT_BEHIND}")
+            self.warn(f"{obj.name}: {LEFT_BEHIND}", obj)
         splats = _placed(obj, matrix)
         with all_or_nothing([obj]):
             write_splats(obj.data, splats)
@@ -110,14 +110,14 @@ class MESHFREE_OT_join_splats(SplatOperator, bpy.types.Operator):
         parts = [_placed(other, matrix @ _apart(other, obj) @ np.array(other.matrix_world)) for other in others]
         _check_near(obj, others, parts)
         for each in filter(lambda each: are_left_behind(each.data), (obj, *others)):
-            self.report({"WARNING"}, f"{each.name}: {LEFT_BEHIND}")
+            self.warn(f"{each.name}: {LEFT_BEHIND}", obj)
         count = point_count(obj.data) + sum(map(len, parts))
         left_alone = len(context.selected_objects) - len(others) - obj.select_get()
         with all_or_nothing([obj]):
             _join(context, obj, others, parts)
             _remove(context, others)
         if left_alone:
-            self.report({"WARNING"}, f"{left_alone} selected objects hold no splats and were left alone")
+            self.warn(f"{left_alone} selected objects hold no splats and were left alone", obj)
         self.report({"INFO"}, f"{obj.name}: the splats of {len(parts) + 1} objects, {count:,} in all")
         return {"FINISHED"}
 

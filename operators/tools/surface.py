@@ -2,8 +2,7 @@
 
 import bpy
 
-from ...core import surface_discs
-from ...core.geometry import toward
+from ... import core
 from ..objects.attributes import DISC, tag_changed, write_attribute
 from ..objects.handlers import tell
 from ..objects.reading import chosen_sides, discs, read_points
@@ -24,8 +23,8 @@ class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
         sides = chosen_sides(obj)
 
         def compute(progress):
-            found = cache.fetch(cache.content("discs", local), lambda: surface_discs(local, progress=progress))
-            normals = found.normals if sides is None else toward(found.normals, sides)
+            found = cache.fetch(cache.content("discs", local), lambda: core.surface_discs(local, progress=progress))
+            normals = found.normals if sides is None else core.geometry.toward(found.normals, sides)
             return discs(normals, found.radii, local)
 
         return compute

@@ -43,12 +43,15 @@ AGAIN = {
     "minimal_surface": ({"steps": 3}, {"steps": 3, "target": "IN_PLACE"}),
 }
 COSTLY = {  # where each is called from
-    "operators.running.cache": ("build_laplacian", "mean_curvature"),
-    "operators.tools.minimal": ("minimal_surface",),
-    "operators.tools.mesh": ("mesh_surface", "values_on_mesh"),
-    "operators.tools.orient": ("orient_normals",),
-    "operators.tools.surface": ("surface_discs",),
-    "operators.running.discs": ("surface_discs",),
+    "core": (
+        "build_laplacian",
+        "mean_curvature",
+        "mesh_surface",
+        "minimal_surface",
+        "orient_normals",
+        "surface_discs",
+        "values_on_mesh",
+    ),
     "core.operator.laplacian": ("build_laplacian",),
     "core.operator.cholesky": ("dpotrf",),
     "core.operator.solvers": ("conjugate_gradients",),

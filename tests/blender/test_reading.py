@@ -123,13 +123,6 @@ def test_spacing_of_a_grid_is_its_step(reading, count):
     assert spacing == 0.0 if count == 1 else 0.05 < spacing < 0.2
 
 
-def test_spacing_of_very_many_points_is_that_of_few(reading):
-    """Of a plane whose area is 1: each of n points has the n-th part of it."""
-    points = np.random.default_rng(0).random((400_000, 3)) * (1.0, 1.0, 0.0)
-    for count in (20_000, 400_000):
-        assert_allclose(reading.typical_distance(points[:count]), count**-0.5, rtol=0.05)
-
-
 def test_result_is_written_in_order_of_vertices(core):
     points = sphere_points()
     first = add_object(points)

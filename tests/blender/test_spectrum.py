@@ -58,12 +58,12 @@ def test_fewer_modes_remove_the_surplus(obj):
     assert len(obj["lb_eigenvalues"]) == 2
 
 
-def test_repeating_re_uses_the_operator(extension, obj, monkeypatch):
+def test_repeating_re_uses_the_operator(extension, core, obj, monkeypatch):
     cache = importlib.import_module(f"{extension.__name__}.operators.running.cache")
     built, curved = [], []
-    build, curve = cache.build_laplacian, cache.mean_curvature
-    monkeypatch.setattr(cache, "build_laplacian", lambda *args, **rest: built.append(1) or build(*args, **rest))
-    monkeypatch.setattr(cache, "mean_curvature", lambda laplacian: curved.append(1) or curve(laplacian))
+    build, curve = core.build_laplacian, core.mean_curvature
+    monkeypatch.setattr(core, "build_laplacian", lambda *args, **rest: built.append(1) or build(*args, **rest))
+    monkeypatch.setattr(core, "mean_curvature", lambda laplacian: curved.append(1) or curve(laplacian))
     cache.clear()
     bpy.ops.meshfree.analyze()
     bpy.ops.meshfree.spectrum(count=2)

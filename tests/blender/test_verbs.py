@@ -133,15 +133,14 @@ class TestCompare:
         assert_allclose(table.attributes["lb_deviation"], 0.1, atol=3e-3)
         assert (table.attributes["lb_compared"] == 1).all()
 
-    def test_the_reference_is_analyzed_once_for_all(self, extension, run, tmp_path, monkeypatch):  # noqa: F811
-        cache = importlib.import_module(f"{extension.__name__}.operators.running.cache")
-        build, built = cache.build_laplacian, []
+    def test_the_reference_is_analyzed_once_for_all(self, extension, core, run, tmp_path, monkeypatch):  # noqa: F811
+        build, built = core.build_laplacian, []
 
         def counted(points, **settings):
             built.append(len(points))
             return build(points, **settings)
 
-        monkeypatch.setattr(cache, "build_laplacian", counted)
+        monkeypatch.setattr(core, "build_laplacian", counted)
         write(tmp_path / "plan.csv", sphere_points(1400))
         inputs = [write(tmp_path / f"{name}.csv", sphere_points(count)) for name, count in (("a", 1100), ("b", 1200))]
         code, lines = run("compare", *inputs, "--reference", tmp_path / "plan.csv", "--out-dir", tmp_path / "out")

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import core
+
 ROOT = Path(__file__).parents[2]
 PUBLIC = [
     "LaplacianOptions",
@@ -27,6 +29,15 @@ def imported(path):
         elif isinstance(node, ast.ImportFrom):
             stem = "." * node.level + (node.module or "")
             yield from (f"{stem}{'' if stem.endswith('.') else '.'}{alias.name}" for alias in node.names)
+
+
+def taken(path):
+    """Names that a file of Blender's side takes from core as ``core.name``, annotations in quotes included."""
+    return re.findall(r"(?<![.\w])core((?:\.\w+)+)", path.read_text(encoding="utf-8"))
+
+
+BLENDER_SIDE = sorted(path for package in ("operators", "ui") for path in (ROOT / package).rglob("*.py"))
+LIGHT = ("errors", "files", "memory", "options")  # modules and packages of core without scipy
 
 
 @pytest.mark.parametrize(("package", "forbidden"), [("core", {"bpy", "operators", "ui"}), ("operators", {"ui"})])
@@ -58,9 +69,37 @@ def test_wings_of_operators_point_one_way(wing):
     assert {(file, name) for file, name in found if not name.lstrip(".").startswith(allowed)} == set()
 
 
-@pytest.mark.parametrize("call", [r"\blayout\b", r"\bdef draw", r"\bbpy\.ops\.meshfree\.(?!escape\b)"])
+def test_nothing_heavy_is_imported_before_it_is_needed():
+    """Blender imports all of operators and ui as it starts: they take what needs scipy as ``core.name``, when they run.
+
+    But for the panel that tells which scipy there is.
+    """
+    light = {name for home in LIGHT for name in core._NAMES.get(home, ())}
+    files = [path for path in BLENDER_SIDE if path.name != "missing.py"]
+    names = [(path.name, name.lstrip(".").split(".")) for path in files for name in imported(path)]
+    heavy = [
+        (file, *parts)
+        for file, parts in names
+        if parts[0] == "scipy" or (parts[0] == "core" and len(parts) > 1 and parts[1] not in (*LIGHT, *light))
+    ]
+    assert heavy == []
+
+
+def test_light_parts_of_core_import_no_scipy():
+    code = f"import sys, core; {'; '.join(f'core.{name}' for name in LIGHT)}; assert 'scipy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def test_what_is_taken_from_core_is_public_or_in_the_face_of_a_package():
+    names = {name[1:] for path in BLENDER_SIDE for name in taken(path)}
+    assert len(names) > 40
+    faces = {wing: {name.split(".")[-1] for name in imported(ROOT / "core" / wing / "__init__.py")} for wing in BELOW}
+    assert names <= {*core.__all__, *(f"{wing}.{name}" for wing, face in faces.items() for name in face)}
+
+
+@pytest.mark.parametrize("call", [r"\blayout\b", r"\bdef draw", r"\bbpy\.ops\.meshfree\."])
 def test_operators_draw_nothing_and_call_no_operator(call):
-    """What they have to say goes to those that listen, see operators/objects/handlers.py; `escape` is of their own."""
+    """What they have to say goes to those that listen, see operators/objects/handlers.py."""
     files = sorted((ROOT / "operators").rglob("*.py"))
     assert [file.name for file in files if re.search(call, file.read_text(encoding="utf-8"))] == []
 
@@ -85,6 +124,7 @@ SIDEWAYS = {  # applications that build on others
     ("minimal_surface", "boundary_curve"),
     ("segmentation", "graph"),
     ("selection", "graph"),
+    ("slopes", "gradients"),
     ("smoothing", "filters"),
     ("smoothing", "sizes"),
 }
@@ -123,12 +163,13 @@ def test_applications_use_each_other_only_where_they_build_on_them():
 
 
 def test_a_wing_lists_only_what_others_use():
-    """The names in a wing's face are those that another wing, or the public calls, take from it."""
+    """The names in a wing's face are those that another wing, the public calls, or Blender's side take from it."""
     for wing in ("geometry", "operator"):
         listed = {name.rpartition(".")[2] for name in imported(ROOT / "core" / wing / "__init__.py")}
-        above = [ROOT / "core" / "__init__.py", *(path for other in BELOW for path in modules_of(other))]
+        above = [path for other in BELOW for path in modules_of(other)]
         used = {name.rpartition(".")[2] for path in above for name in imported(path) if f".{wing}." in name}
-        assert listed == used
+        outside = {name.removeprefix(f".{wing}.") for path in BLENDER_SIDE for name in taken(path)}
+        assert listed == used | {*core._NAMES[wing]} | (outside & listed)
 
 
 def test_core_needs_numpy_and_scipy_only():
@@ -142,6 +183,62 @@ def test_core_needs_numpy_and_scipy_only():
         if not name.startswith(".") and name.split(".")[0] not in allowed and (file.name, name) not in las
     ]
     assert wrong == []
+
+
+def test_public_names_are_what_their_modules_hold():
+    assert core.__all__ == sorted(set(core.__all__))
+    assert set(core.__all__) <= set(dir(core))
+    for name in core.__all__:
+        assert getattr(core, name).__module__.startswith("core."), name
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        core.nothing  # noqa: B018
+
+
+TOGETHER = """
+import threading, core
+found, start = [], threading.Barrier(8)
+def take(name):
+    start.wait()
+    found.append(getattr(core, name))
+names = ["segment", "Splats", "check_stability", "surface_discs", "build_laplacian", "floaters", "Deformer", "paper"]
+threads = [threading.Thread(target=take, args=[name]) for name in names]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+assert len(found) == len(names)
+"""
+
+
+def test_threads_may_be_the_first_to_take_something():
+    subprocess.run([sys.executable, "-c", TOGETHER], cwd=ROOT, check=True)
+
+
+@pytest.mark.parametrize("first", ["build_laplacian", "estimate_areas", "smooth_points"])
+def test_the_areas_of_the_paper_are_known_whatever_is_imported_first(first):
+    code = f"import core; core.{first}; from core.operator import SOLVERS; assert 'constrained' in SOLVERS"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+BROKEN = """
+import sys
+class Broken:
+    def find_spec(self, name, path=None, target=None):
+        if name == "scipy.spatial":
+            raise ImportError("undefined symbol", name=name)
+sys.meta_path.insert(0, Broken())
+import core
+core.LaplacianOptions()
+try:
+    core.build_laplacian
+except core.PointCloudError as error:
+    print(error)
+"""
+
+
+def test_a_scipy_that_does_not_load_is_told_where_it_is_needed():
+    done = subprocess.run([sys.executable, "-c", BROKEN], cwd=ROOT, check=True, capture_output=True, text=True)
+    assert "scipy of this Python does not serve: undefined symbol. In Blender, disable the extension" in done.stdout
 
 
 def test_core_is_usable_from_the_repository_root_without_blender():

@@ -7,7 +7,7 @@ from benchmarks.samplings import random_sphere, uneven_sphere
 from core.geometry import patches
 from core.geometry.bandwidth import smoothing_lengths
 from core.geometry.cloud import read_cloud
-from core.geometry.nearest import find_nearest
+from core.geometry.nearest import find_nearest, nearest_rows, typical_distance
 from core.geometry.pairs import Pairs, find_pairs
 from core.options import LaplacianOptions
 
@@ -93,3 +93,16 @@ def test_scaled_coordinates_are_free_of_units():
     np.testing.assert_allclose(moved.pairs.lengths, plain.pairs.lengths, rtol=1e-9)
     assert moved.scaled.scale == pytest.approx(1e3 * plain.scaled.scale, rel=1e-9)
     assert np.sqrt(np.mean(np.sum(plain.scaled.points**2, axis=1))) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_distance_of_very_many_points_is_that_of_few():
+    """Of a plane whose area is 1: each of n points has the n-th part of it."""
+    points = np.random.default_rng(0).random((400_000, 3)) * (1.0, 1.0, 0.0)
+    for count in (20_000, 400_000):
+        np.testing.assert_allclose(typical_distance(points[:count]), count**-0.5, rtol=0.05)
+
+
+def test_nearest_rows_are_those_of_the_nearest_points():
+    points = random_sphere(300)
+    rows = np.random.default_rng(0).permutation(300)[:20]
+    assert np.array_equal(nearest_rows(points, 1.02 * points[rows]), rows)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import random_sphere, torus_points
+from benchmarks.samplings import hemisphere_random, random_sphere, torus_points
 
 
 def torus_normals(points, major=1.0):
@@ -48,8 +48,54 @@ def test_orientation_of_two_spheres():
     assert np.all(np.einsum("ij,ij->i", normals, np.concatenate([sphere, sphere])) > 0.9)
 
 
-def test_orientation_of_an_open_sheet_is_consistent():
-    rng = np.random.default_rng(0)
-    u, v = rng.random((2, 3000))
-    normals = core.estimate_normals(np.column_stack([u, v, 0.2 * np.sin(4.0 * u)]), core.LaplacianOptions(orient=True))
-    assert np.all(normals[:, 2] > 0.0) or np.all(normals[:, 2] < 0.0)
+SHEETS = {  # heights over the unit square, of terrain whose normals must point up
+    "plain": lambda u, v: 0.0 * u,
+    "slope": lambda u, v: 1.5 * u - 0.7 * v,
+    "waves": lambda u, v: 0.2 * np.sin(4.0 * u),
+    "pit": lambda u, v: -0.15 * np.exp(-10.0 * ((u - 0.5) ** 2 + (v - 0.5) ** 2)),
+    "valley": lambda u, v: 0.3 * np.abs(u - 0.5),
+    "quarry": lambda u, v: np.clip(2.0 * np.hypot(u - 0.5, v - 0.5) - 0.9, -0.2, 0.0),
+}
+
+
+@pytest.mark.parametrize("sheet", SHEETS)
+@pytest.mark.parametrize("over", [1.0, -1.0])
+@pytest.mark.parametrize("way", ["operator", "discs", "outside", "winding"])
+def test_terrain_faces_up(sheet, over, way):
+    """Also one that is turned over by half a turn, whose hills are pits then."""
+    u, v = np.random.default_rng(0).random((2, 1500))
+    points = np.column_stack([u, over * v, over * SHEETS[sheet](u, v)])
+    normals = core.estimate_normals(points, core.LaplacianOptions(orient=True))
+    if way == "discs":
+        normals = core.surface_discs(points).normals
+    elif way != "operator":
+        signs = np.random.default_rng(1).choice([-1.0, 1.0], (len(points), 1))
+        normals = core.orient_normals(points, signs * normals, method=way)
+    assert np.all(normals[:, 2] > 0.0)
+
+
+def test_terrain_with_what_overhangs_faces_up():
+    """A tenth of it are balls that lie on the ground."""
+    u, v = np.random.default_rng(0).random((2, 3000))
+    ball = 0.03 * random_sphere(100) + [0.0, 0.0, 0.03]
+    places = [[0.2, 0.3, 0.0], [0.7, 0.6, 0.0], [0.4, 0.8, 0.0]]
+    ground = np.column_stack([u, v, 0.05 * np.sin(6.0 * u)])
+    normals = core.surface_discs(np.concatenate([ground, *(ball + place for place in places)])).normals
+    assert np.mean(normals[: len(ground), 2] > 0.0) > 0.98
+
+
+@pytest.mark.parametrize("turn", [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [1.0, 0.0, 0.0]])
+def test_bowls_and_bodies_face_outwards_whichever_way_they_are_turned(turn):
+    """Half a sphere, open above, below or at a side, is what a scanner sees of a body: its outer side is told."""
+    points = hemisphere_random(1500)
+    points = points[:, [2, 0, 1]] if turn[1] == 0.0 else points * turn
+    normals = core.estimate_normals(points, core.LaplacianOptions(orient=True))
+    assert np.all(np.einsum("ij,ij->i", normals, points) > 0.5)
+
+
+def test_a_wall_keeps_one_side():
+    """It faces neither up nor down."""
+    u, v = np.random.default_rng(0).random((2, 3000))
+    points = np.column_stack([u, 0.05 * np.sin(6.0 * u) * np.sin(5.0 * v), v])
+    normals = core.estimate_normals(points, core.LaplacianOptions(orient=True))
+    assert np.all(normals[:, 1] > 0.0) or np.all(normals[:, 1] < 0.0)
