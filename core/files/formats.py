@@ -72,6 +72,8 @@ def read_points(path, columns="", las=LasChoices()) -> PointTable:
         file does not have.
     """
     suffix = path.suffix.lower()
+    if suffix in SPLATS:
+        raise PointCloudError(f"{path} is a file of Gaussian splats. Read it as such, by read_splats.")
     if suffix not in _READERS:
         known = ", ".join((*READABLE, *SPLATS))
         raise PointCloudError(f"{path} is not a file with points. Give one of {known}.")

@@ -111,16 +111,25 @@ class Splats:
                 f"{bad} of {len(self)} splats get positions or gradients that are not finite (NaN or infinity). Give a"
                 " place and a map for each."
             )
-        scales, rotations = (np.array(part, dtype=np.float64) for part in (self.scales, self.rotations))
-        harmonics = np.array(self.harmonics)
-        rows = np.flatnonzero((maps != np.eye(3)).any(axis=(1, 2)))  # others keep every bit
-        if len(rows):
-            part = slice(None) if len(rows) == len(self) else rows
-            scales[part], rotations[part] = mapped(scales[part], rotations[part], maps[part])
-            if harmonics.shape[1]:
-                harmonics[part] = turned(harmonics[part], orthogonal_parts(maps[part]))
+        shapes = self.scales, self.rotations, self.harmonics
+        rows = np.flatnonzero((maps != np.eye(3)).any(axis=(1, 2)))
+        if len(rows) == len(self):
+            shapes = _mapped(*shapes, maps)
+        elif len(rows):  # the others keep every bit
+            moved = _mapped(*(part[rows] for part in shapes), maps[rows])
+            shapes = [part.copy() for part in shapes]
+            for part, new in zip(shapes, moved, strict=True):
+                part[rows] = new
+        scales, rotations, harmonics = shapes
         file = self.file and self.file.scaled(np.cbrt(np.abs(np.linalg.det(maps))))
         return replace(self, positions=places, scales=scales, rotations=rotations, harmonics=harmonics, file=file)
+
+
+def _mapped(scales, rotations, harmonics, maps):
+    """Return half axes, rotations and harmonics after linear maps, (n, 3, 3)."""
+    if harmonics.shape[1]:
+        harmonics = turned(harmonics, orthogonal_parts(maps))
+    return *mapped(scales, rotations, maps), harmonics
 
 
 def orthogonal_parts(gradients):

@@ -196,10 +196,12 @@ def _join(context, obj, others, parts):
     georeferenced = next((each for each in (obj, *others) if OFFSET in each), obj)
     if OFFSET not in obj and georeferenced != obj:
         obj[OFFSET] = offset_of(georeferenced).tolist()
+    taken = [copy.data for copy in copies]
     context.view_layer.update()
     with context.temp_override(active_object=obj, selected_objects=everyone, selected_editable_objects=everyone):
         bpy.ops.object.join()
-    # Blender has moved them by a matrix of single precision, from where they were already right.
+    bpy.data.batch_remove(taken)  # which Blender leaves without an object
+    # It has moved splats by a matrix of single precision, from where they were already right.
     write_places(obj.data, read_attribute(obj.data, PLACE).astype(np.float64) + read_attribute(obj.data, DIGITS))
 
 
@@ -226,7 +228,7 @@ def _keep_places(data, places):
 def _remove(context, objects):
     """Remove objects with their data; children stay where they are."""
     children = [(child, child.matrix_world.copy()) for obj in objects for child in obj.children]
-    blocks = [obj.data for obj in objects if not sharing_objects(obj)]
+    blocks = {obj.data for obj in objects if set(sharing_objects(obj)) <= set(objects)}
     for child, place in children:
         child.parent = None
         child.matrix_world = place

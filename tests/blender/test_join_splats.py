@@ -93,6 +93,7 @@ class TestJoin:
         found = splats_of(core, one.data)
         close(part(found, slice(-960, None)), seen(bar_splats(core), PLACED))
         assert len(found) == 3 * 960
+        assert (bpy.data.pointclouds if one.type == "POINTCLOUD" else bpy.data.meshes).keys() == [one.data.name]
 
     def test_what_is_no_splats_is_left_alone(self, core, capfd):
         one, *_ = pair(core)

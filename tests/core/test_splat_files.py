@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import core
-from core.files import SPLATS, PointTable
+from core.files import SPLATS, PointTable, numbered_files, read_points
 from core.splats import holds_splats, read_file
 from core.splats.harmonics import COUNTS
 from tests import splat_files
@@ -315,5 +315,13 @@ def read_or_refuse(path):
         return str(error), None
 
 
-def test_the_kinds_that_hold_splats_alone():
-    assert SPLATS == (".splat", ".spz")
+@pytest.mark.parametrize("suffix", SPLATS)
+def test_what_reads_points_says_what_reads_splats(tmp_path, suffix):
+    with pytest.raises(core.PointCloudError, match="is a file of Gaussian splats. Read it as such, by read_splats"):
+        read_points(tmp_path / f"a{suffix}")
+
+
+def test_splats_of_a_folder_are_frames(tmp_path):
+    for number in (2, 10):
+        (tmp_path / f"a_{number}.spz").write_bytes(SPZ)
+    assert [path.name for path in numbered_files(tmp_path)] == ["a_2.spz", "a_10.spz"]
