@@ -15,6 +15,7 @@ RESULTS = [
     "lb_normal",
     "lb_trust",
 ]
+CORNERS, FACES = 8, 12  # of a disc that the display draws: two cones with a common rim
 _KEYS = {
     "FLOAT_VECTOR": ("vector", 3, np.float32),
     "FLOAT2": ("vector", 2, np.float32),

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, attribute, grid_points, sphere_points
+from tests.blender.clouds import FACES, add_object, attribute, grid_points, sphere_points
 
 
 @pytest.fixture
@@ -110,10 +110,10 @@ def test_a_limited_viewport_draws_dots_from_half_its_limit_on_and_renders_draw_d
     modifiers.set_input(display.find_display(obj), "Viewport Points", most)
     obj.meshfree.point_size = obj.meshfree.point_size  # tells of it
     faces = len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons)
-    assert (faces, len(display_points(obj))) == ((8000, 0) if kind == "discs" else (0, 1))
+    assert (faces, len(display_points(obj))) == ((1000 * FACES, 0) if kind == "discs" else (0, 1))
     modifier = display.find_display(obj)
     assert modifier.show_in_editmode == (kind == "discs")
-    assert rendered_faces(obj) == 8000
+    assert rendered_faces(obj) == 1000 * FACES
 
 
 def test_dots_in_place_of_discs_are_as_large_as_these(display, modifiers, obj):

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.clouds import CORNERS, FACES, add_object, attribute, sphere_points
 from tests.blender.splats import add_splats, bar_splats
 from tests.blender.test_panel import draw
 
@@ -268,7 +268,7 @@ class TestSolid:
             obj.data.update()
             mesh = self.evaluated(obj)
             assert mesh.color_attributes.active_color_name == name
-            assert (len(mesh.vertices), len(mesh.polygons)) == (9 * 800, 8 * 800)
+            assert (len(mesh.vertices), len(mesh.polygons)) == (CORNERS * 800, FACES * 800)
 
     @POINT_CLOUDS
     def test_point_clouds_have_whole_discs_all_the_same(self, imported):
@@ -279,7 +279,7 @@ class TestSolid:
             for item in graph.object_instances
             if item.object.type == "MESH" and item.parent == obj.evaluated_get(graph)
         ]
-        assert counts == [(9 * 800, 8 * 800)]
+        assert counts == [(CORNERS * 800, FACES * 800)]
 
 
 class TestMesh:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.clouds import CORNERS, add_object, attribute, sphere_points
 from tests.blender.test_display import rendered
 
 SLOPES = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
@@ -63,9 +63,9 @@ def rise(obj):
 def test_each_corner_holds_the_value_of_its_place(obj):
     show(obj, "height")
     places, rises = corners(obj)
-    assert len(places) == 9 * 2000
-    shown = np.repeat(attribute(obj, "height"), 9) + rises[:, 0]
-    flat = np.repeat(attribute(obj, "height"), 9)
+    assert len(places) == CORNERS * 2000
+    shown = np.repeat(attribute(obj, "height"), CORNERS) + rises[:, 0]
+    flat = np.repeat(attribute(obj, "height"), CORNERS)
     assert np.abs(flat - places[:, 2]).max() > 0.05
     off = np.abs(shown - places[:, 2])  # corners lie below the tangent plane of the sphere by a quarter of the radius
     assert np.median(off) < 0.02
@@ -77,7 +77,7 @@ def test_both_texture_coordinates_rise(obj):
     add_values(obj, "lb_uv", attribute(obj, "position")[:, :2], "FLOAT2")
     show(obj, "lb_uv")
     places, rises = corners(obj)
-    wanted = places[:, :2] - np.repeat(attribute(obj, "position")[:, :2], 9, axis=0)
+    wanted = places[:, :2] - np.repeat(attribute(obj, "position")[:, :2], CORNERS, axis=0)
     assert np.median(np.abs(rises[:, :2] - wanted)) < 0.3 * np.median(np.abs(wanted))
     assert not rises[:, 2].any()
 
@@ -139,15 +139,15 @@ def test_of_values_that_changed_since_no_slopes_are_drawn(obj, kind):
     obj.meshfree.component = "Y"
     add_values(obj, "values", places[:, :width], kind)
     show(obj, "values")
-    assert (np.abs(rise(obj)).max(axis=1).reshape(-1, 9).max(axis=1) > 0.0).mean() > 0.99
+    assert (np.abs(rise(obj)).max(axis=1).reshape(-1, CORNERS).max(axis=1) > 0.0).mean() > 0.99
     changed = places[:, 0] > 0.0
     places[changed] *= 1.01
     add_values(obj, "values", places[:, :width], kind)
     obj.data.update()
-    moving = np.abs(rise(obj)).max(axis=1).reshape(-1, 9).max(axis=1) > 0.0
+    moving = np.abs(rise(obj)).max(axis=1).reshape(-1, CORNERS).max(axis=1) > 0.0
     assert (moving == ~changed).mean() > 0.99
     show(obj, "values")
-    assert (np.abs(rise(obj)).max(axis=1).reshape(-1, 9).max(axis=1) > 0.0).mean() > 0.99
+    assert (np.abs(rise(obj)).max(axis=1).reshape(-1, CORNERS).max(axis=1) > 0.0).mean() > 0.99
 
 
 def test_slopes_follow_the_values_and_the_points(obj):
@@ -257,8 +257,10 @@ def test_displays_of_an_earlier_version_become_smooth_and_keep_what_was_set(exte
     modifier = obj.modifiers["Mesh-Free Display"]
     group = modifier.node_group
     kept = dict(group["meshfree_inputs"])
-    group.interface.remove(next(item for item in group.interface.items_tree if item.name == "Smooth"))
-    group["meshfree_inputs"] = {name: value for name, value in kept.items() if name != "Smooth"}
+    new = "Smooth", "Solid Colors"
+    for item in [item for item in group.interface.items_tree if item.name in new]:
+        group.interface.remove(item)
+    group["meshfree_inputs"] = {name: value for name, value in kept.items() if name not in new}
     modifiers.set_input(modifier, "Stroke Length", 2.5)
     assert rise(obj) is None
     show(obj, "height")

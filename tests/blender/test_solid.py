@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from .clouds import add_object, attribute, sphere_points
+from tests.blender.clouds import CORNERS, add_object, attribute, sphere_points
 
 SOLID = ".lb_color"
 
@@ -105,4 +105,4 @@ def test_solid_shades_a_disc_by_the_normal_of_its_point(shown):
     mesh.vertices.foreach_get("normal", normals.reshape(-1))
     discs = attribute(shown, "lb_disc")
     wanted = discs / np.linalg.norm(discs, axis=1, keepdims=True)
-    np.testing.assert_allclose(normals.reshape(1500, -1, 3), np.repeat(wanted[:, None], 8, axis=1), atol=2e-3)
+    np.testing.assert_allclose(normals.reshape(1500, -1, 3), np.repeat(wanted[:, None], CORNERS, axis=1), atol=2e-3)
