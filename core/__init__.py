@@ -138,11 +138,11 @@ def __dir__():
 
 
 def _import(name):
-    """Import a module or package of core; tell what a scipy that does not load means."""
+    """Import a module or package of core; tell what it means where scipy, or what that asks of numpy, does not load."""
     try:
         return importlib.import_module(f".{name}", __name__)
     except ImportError as error:
-        if (error.name or "").partition(".")[0] != "scipy":
+        if (error.name or "").startswith(__name__):
             raise
         raise BrokenLibraryError(
             f"The scipy of this Python does not serve: {error}. In Blender, disable the extension that brings another"

@@ -8,7 +8,7 @@ from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
 from ..operators.objects.colors import own_material
 from ..operators.running.ready import ReadyOperator, reporting
 from .display import find_display, is_colored
-from .show import show_attribute, show_in_solid, show_own_material, use_material_preview
+from .show import look_at, show_attribute, show_in_solid, show_own_material, use_material_preview
 
 
 class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
@@ -54,7 +54,7 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
             if self.switch_shading and is_colored(obj):
                 show_in_solid(obj)
             elif self.switch_shading:
-                use_material_preview(context)
+                look_at([obj])
         return {"FINISHED"}
 
 

@@ -10,6 +10,7 @@ from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, h
 from ..operators.running.application import ApplicationOperator
 from ..operators.tools.select import MESHFREE_OT_select_grow, selection
 from ..operators.tools.sequence import MESHFREE_OT_analyze_sequence
+from .wrapping import draw_text
 
 _OPTIONAL = LOW, HIGH, VALUE  # one or two of them do
 
@@ -40,7 +41,7 @@ def search_group(layout, settings, name: str, obj):
     awaited = group in ROLES and not has_group(obj, group)
     layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
     if awaited and group not in _OPTIONAL:
-        layout.label(text=_instead(obj, group), icon="INFO")
+        draw_text(layout, bpy.context, _instead(obj, group), "INFO")
 
 
 def _instead(obj, group):

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..operators.objects.attributes import DISPLACEMENT, DISTANCE, point_count, read_attribute
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, is_display
-from .nodes import ATTRIBUTE, COLORS, DISC_COST, DISCS, MOST, RANGE, shows_own
+from .nodes import ATTRIBUTE, COLORS, DISC_COST, DISCS, MOST, RANGE, SOLID_NAME, shows_own
 from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"
@@ -25,6 +25,13 @@ def find_material(obj):
 def is_colored(obj) -> bool:
     """Whether an object shows colors that its points have of their own."""
     return bool(shown_attribute(obj)) and shows_own(find_material(obj))
+
+
+def is_in_solid(obj) -> bool:
+    """Whether viewports in Solid can show the result that an object shows."""
+    modifier = find_display(obj)
+    known = modifier is not None and has_input(modifier.node_group, SOLID_NAME)
+    return known and get_input(modifier, SOLID_NAME) != ""
 
 
 def draws_faces(obj) -> bool:

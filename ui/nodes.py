@@ -5,7 +5,7 @@ from functools import partial
 
 import bpy
 
-from ..operators.objects.attributes import CORNER, DISC, RISE, SLOPE, SLOPE_2, SLOPE_OF
+from ..operators.objects.attributes import CORNER, DISC, RISE, SLOPE, SLOPE_2, SLOPE_OF, SOLID, TILT
 from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, has_input, is_intact, new_group
 from ..operators.objects.splats import BASE, HARMONIC, ROTATION, SCALE
 from . import colormaps
@@ -17,6 +17,7 @@ STROKES = "Strokes"  # another: the attribute that has them
 FILLED = "Filled"  # another: whether dots are as large as discs
 SPLATS = "Splats"  # another: whether it draws their ellipsoids
 SMOOTH = "Smooth"  # another: the attribute that changes within discs
+SOLID_NAME = "Solid Colors"  # another: the color attribute that viewports in Solid look at
 LENGTH, INK = "Stroke Length", "Stroke Material"  # others: what they look like
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
@@ -24,7 +25,7 @@ BACK = "Back Side"  # another: how dark what is seen from behind is
 EVEN = "Even Lines"  # another: how wide a line is by the slope
 LIT = "Unlit"  # another: how much of the color is flat
 DISC_COST = 2  # dots that take as long to draw without a graphics card as one disc
-_SIDES = 8  # of a disc
+_SIDES = 6  # of a disc
 _SLOPE = 0.25  # by which discs fall off from their points, so that each place shows the point nearest to it
 _SHARE = 1.0 / 40.0  # length of strokes in the diagonal of the object, so that they are seen where all of it is
 _LEAST = 2.0  # that length in radii of the points at least
@@ -38,7 +39,7 @@ _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _ROUNDING = 1e-5  # share by which values may differ that are the same
 _BROADEST = 0.3  # of that, half of it, where steps are narrow
-_BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
+BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
 _DIM = 0.85  # how dark the back side becomes where it is dimmed
 _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but groups
 _COLORED = "COLOR"  # where points have colors of their own
@@ -53,7 +54,7 @@ _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 def display_group():
     """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
-        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, SMOOTH):
+        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, SOLID_NAME):
             return group
     group = new_group("Mesh-Free Display", DISPLAY_TAG)
     radius = add_input(group, "Radius", "Float", "Size of the points")
@@ -73,6 +74,9 @@ def display_group():
         SMOOTH,
         "String",
         "Attribute that changes within discs, by its slopes along the surface; empty for none",
+    )
+    add_input(
+        group, SOLID_NAME, "String", "Color attribute that gets the colors of what is shown, for Solid; empty for none"
     )
     add_input(
         group, STROKES, "String", "Attribute with directions along the surface, which strokes show; empty for none"
@@ -119,7 +123,7 @@ def display_group():
         (loose.outputs["Result"], faces.inputs["Selection"]),
         (parts.outputs["Mesh"], faces.inputs["Geometry"]),
         (faces.outputs["Geometry"], joined.inputs["Geometry"]),
-        (joined.outputs["Geometry"], colored.inputs["Geometry"]),
+        (_in_solid(group, given, joined.outputs["Geometry"]), colored.inputs["Geometry"]),
         (given.outputs["Material"], colored.inputs["Material"]),
         (colored.outputs["Geometry"], drawn_over.inputs["Geometry"]),
         (_stroked(group, given, every.outputs["Geometry"]), drawn_over.inputs["Geometry"]),
@@ -159,17 +163,7 @@ def _thinned(group, given, parts):
 
 
 def _shaped(group, given, disc_of, points, size, many):
-    """Add the nodes that make points into discs where that is asked for and they are not many; return what is drawn.
-
-    Flat discs stick out of each other where the surface bends outwards, like scales; cones as flat as these do not.
-    """
-    cone = add_node(group, "GeometryNodeMeshCone", 5, -700, fill_type="NONE")
-    cone.inputs["Vertices"].default_value = _SIDES
-    cone.inputs["Radius Top"].default_value = 0.0
-    cone.inputs["Radius Bottom"].default_value = 1.0 / math.cos(math.pi / _SIDES)  # no less than a disc
-    cone.inputs["Depth"].default_value = _SLOPE
-    lowered = add_node(group, "GeometryNodeTransform", 6, -700)
-    lowered.inputs["Translation"].default_value = 0.0, 0.0, -_SLOPE
+    """Add the nodes that make points into discs where that is asked for and they are not many; return what is drawn."""
     disc = add_node(group, "GeometryNodeInputNamedAttribute", 5, -500, data_type="FLOAT_VECTOR")
     disc.inputs["Name"].default_value = DISC
     turned = add_node(group, "FunctionNodeAlignRotationToVector", 6, -500, axis="Z")
@@ -188,8 +182,7 @@ def _shaped(group, given, disc_of, points, size, many):
         (disc.outputs["Attribute"], turned.inputs["Vector"]),
         (disc.outputs["Attribute"], length.inputs[0]),
         (_with_middles(group, given, points), placed.inputs["Points"]),
-        (cone.outputs["Mesh"], lowered.inputs["Geometry"]),
-        (disc_of(lowered.outputs["Geometry"]), placed.inputs["Instance"]),
+        (disc_of(_disc(group)), placed.inputs["Instance"]),
         (turned.outputs["Rotation"], placed.inputs["Rotation"]),
         (scale, placed.inputs["Scale"]),
         (given.outputs[DISCS], discs.inputs[0]),
@@ -207,6 +200,37 @@ def _shaped(group, given, disc_of, points, size, many):
     ):
         group.links.new(source, target)
     return splats.outputs["Output"]
+
+
+def _disc(group):
+    """Add the nodes that make a disc of radius 1 in the plane z = 0; return it.
+
+    Flat discs stick out of each other where the surface bends outwards, like scales; cones as flat as these do not. A
+    second cone that hangs from the rim of the first lets all normals be that of the disc, by which Solid shades.
+    """
+    cones = []
+    for row, (top, bottom, low) in enumerate(((0.0, 1.0, -_SLOPE), (1.0, 0.0, -2.0 * _SLOPE))):
+        cone = add_node(group, "GeometryNodeMeshCone", 4, -700 - 300 * row, fill_type="NONE")
+        cone.inputs["Vertices"].default_value, cone.inputs["Depth"].default_value = _SIDES, _SLOPE
+        for name, radius in (("Radius Top", top), ("Radius Bottom", bottom)):
+            cone.inputs[name].default_value = radius / math.cos(math.pi / _SIDES)  # no less than a disc
+        lowered = add_node(group, "GeometryNodeTransform", 5, -700 - 300 * row)
+        lowered.inputs["Translation"].default_value = 0.0, 0.0, low
+        group.links.new(cone.outputs["Mesh"], lowered.inputs["Geometry"])
+        cones.append(lowered.outputs["Geometry"])
+    upwards = add_node(group, "GeometryNodeFlipFaces", 6, -1000)
+    joined = add_node(group, "GeometryNodeJoinGeometry", 6, -700)
+    merged = add_node(group, "GeometryNodeMergeByDistance", 7, -700)
+    smooth = add_node(group, "GeometryNodeSetShadeSmooth", 8, -700)
+    for source, target in (
+        (cones[1], upwards.inputs[0]),
+        (cones[0], joined.inputs[0]),
+        (upwards.outputs[0], joined.inputs[0]),
+        (joined.outputs[0], merged.inputs["Geometry"]),
+        (merged.outputs[0], smooth.inputs[0]),
+    ):
+        group.links.new(source, target)
+    return smooth.outputs[0]
 
 
 def _with_active_color(group, mesh, loose, disc):
@@ -249,7 +273,7 @@ def _with_middles(group, given, points):
     stored, value = _stored(group, 6, -2300, RISE, "FLOAT_VECTOR")
     group.links.new(points, stored.inputs["Geometry"])
     group.links.new(place.outputs["Position"], value)
-    return _where_smooth(group, given, 7, -2300, points, stored.outputs["Geometry"])
+    return _where_named(group, given, SMOOTH, 7, -2300, points, stored.outputs["Geometry"])
 
 
 def _rising(group, given, corners):
@@ -289,7 +313,7 @@ def _rising(group, given, corners):
         (valid.outputs[0], value),
     ):
         group.links.new(source, target)
-    return _where_smooth(group, given, 15, -2300, corners, stored.outputs["Geometry"])
+    return _where_named(group, given, SMOOTH, 15, -2300, corners, stored.outputs["Geometry"])
 
 
 def _unchanged(group, given):
@@ -302,15 +326,40 @@ def _unchanged(group, given):
     return _math(group, 12, -3100, "MULTIPLY", same, then.outputs["Exists"])
 
 
-def _where_smooth(group, given, column, y, plain, smooth):
-    """Add nodes that take the smooth geometry where that is asked for; else it costs no time."""
+def _in_solid(group, given, geometry):
+    """Add the nodes that put the colors of what is shown where viewports in Solid look for colors; return the geometry.
+
+    Along a disc they change as fast as between its middle and its edge.
+    """
+    color = _named(group, 9, 300, SOLID, "FLOAT_COLOR")
+    tilt, rise = _named(group, 9, 500, TILT), _named(group, 9, 700, RISE)
+    parts = add_node(group, "ShaderNodeSeparateXYZ", 10, 700)
+    change = add_node(group, "ShaderNodeVectorMath", 11, 500, operation="SCALE")
+    shown = add_node(group, "ShaderNodeVectorMath", 12, 300, operation="ADD")
+    stored, value = _stored(group, 13, 300, "", "FLOAT_COLOR")
+    for source, target in (
+        (rise.outputs["Attribute"], parts.inputs[0]),
+        (tilt.outputs["Attribute"], change.inputs[0]),
+        (parts.outputs["X"], change.inputs["Scale"]),
+        (color.outputs["Attribute"], shown.inputs[0]),
+        (change.outputs[0], shown.inputs[1]),
+        (given.outputs[SOLID_NAME], stored.inputs["Name"]),
+        (geometry, stored.inputs["Geometry"]),
+        (shown.outputs[0], value),
+    ):
+        group.links.new(source, target)
+    return _where_named(group, given, SOLID_NAME, 14, 300, geometry, stored.outputs["Geometry"])
+
+
+def _where_named(group, given, name, column, y, plain, other):
+    """Add nodes that take the other geometry where an input of the display names something; else it costs no time."""
     asked = add_node(group, "FunctionNodeCompare", column, y - 200, data_type="STRING", operation="NOT_EQUAL")
     chosen = add_node(group, "GeometryNodeSwitch", column, y, input_type="GEOMETRY")
     for source, target in (
-        (given.outputs[SMOOTH], next(item for item in asked.inputs if item.name == "A" and item.type == "STRING")),
+        (given.outputs[name], next(item for item in asked.inputs if item.name == "A" and item.type == "STRING")),
         (asked.outputs["Result"], chosen.inputs["Switch"]),
         (plain, chosen.inputs["False"]),
-        (smooth, chosen.inputs["True"]),
+        (other, chosen.inputs["True"]),
     ):
         group.links.new(source, target)
     return chosen.outputs["Output"]
@@ -327,7 +376,7 @@ def _stored(group, column, y, name, data_type):
     """Add a node that keeps an attribute; return it, and its input for the values."""
     node = add_node(group, "GeometryNodeStoreNamedAttribute", column, y, data_type=data_type)
     node.inputs["Name"].default_value = name
-    kind = {"FLOAT_VECTOR": "VECTOR"}.get(data_type, data_type)
+    kind = {"FLOAT_VECTOR": "VECTOR", "FLOAT_COLOR": "RGBA"}.get(data_type, data_type)
     return node, next(socket for socket in node.inputs if socket.name == "Value" and socket.type == kind)
 
 
@@ -675,7 +724,7 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
     if hiding:
         _shine(tree, color, groups, hidden=beyond)
     else:
-        _shine(tree, _mix(tree, 8, _math(tree, 6, -600, "MULTIPLY", beyond, name=GRAY), color, _BEYOND), groups)
+        _shine(tree, _mix(tree, 8, _math(tree, 6, -600, "MULTIPLY", beyond, name=GRAY), color, BEYOND), groups)
 
 
 def _shine(tree, color, groups, hidden=None):
@@ -693,7 +742,7 @@ def _shine(tree, color, groups, hidden=None):
     column += 2 if groups else 0
     seen = add_node(tree, "ShaderNodeNewGeometry", column, -900)
     behind = _math(tree, column + 1, -900, "MULTIPLY", seen.outputs["Backfacing"], name=BACK)
-    color = _mix(tree, column + 2, behind, color, _BEYOND)
+    color = _mix(tree, column + 2, behind, color, BEYOND)
     column += 3
     diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", column, 100)
     _light_discs(tree, column - 3, diffuse)
@@ -787,7 +836,7 @@ def _direction_color(tree, vector):
 
 
 def direction_color(direction):
-    """Colour of a unit vector as linear (r, g, b, 1)."""
+    """Colour of a unit vector, or of the three columns of such, as linear (r, g, b, 1)."""
     return (*((0.5 * value + 0.5) ** _GAMMA for value in direction), 1.0)
 
 

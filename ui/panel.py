@@ -196,7 +196,7 @@ def _draw_summary(layout, context, obj):
     modifiers = [modifier for modifier in obj.modifiers if not is_own(modifier)]
     if modifiers:
         what = "used" if obj.meshfree.use_modifiers else "left out"
-        column.label(text=f"Modifiers {what}: {len(modifiers)}", icon="MODIFIER")
+        draw_text(column, context, f"Modifiers {what}: {len(modifiers)}", "MODIFIER")
         column.prop(obj.meshfree, "use_modifiers")
     if sharing_objects(obj):
         draw_text(column, context, "Other objects share this mesh", "INFO")

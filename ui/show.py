@@ -35,7 +35,7 @@ from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
-from . import colormaps, legend, smooth
+from . import colormaps, legend, smooth, solid
 from .display import (
     NAME,
     component,
@@ -45,6 +45,7 @@ from .display import (
     find_material,
     is_colored,
     is_distance,
+    is_in_solid,
     is_texture,
     numbers,
     shown_attribute,
@@ -58,6 +59,7 @@ from .nodes import (
     LENGTH,
     MOST,
     SMOOTH,
+    SOLID_NAME,
     SPLATS,
     STROKES,
     color_by_checker,
@@ -127,7 +129,7 @@ def _add_display(obj):
         modifier = obj.modifiers.new(NAME, "NODES")
         modifier.node_group = display_group()
         set_input(modifier, MOST, viewport_points())
-    elif not has_input(modifier.node_group, SMOOTH):  # of an earlier version
+    elif not has_input(modifier.node_group, SOLID_NAME):  # of an earlier version
         names = [name for name in ("Radius", "Material", MOST, LENGTH, INK) if has_input(modifier.node_group, name)]
         kept = {name: get_input(modifier, name) for name in names}
         modifier.node_group = display_group()
@@ -140,8 +142,12 @@ def _add_display(obj):
 
 def viewport_points() -> int:
     """How many points the viewport is to draw at most, so that it can be turned; 0 for all."""
-    without_card = not bpy.app.background and gpu.platform.device_type_get() == "SOFTWARE"
-    return _MOST_WITHOUT_CARD if without_card else 0
+    return _MOST_WITHOUT_CARD if _without_card() else 0
+
+
+def _without_card() -> bool:
+    """Whether the processor draws: it compiles what Material Preview needs for half a minute, and Solid at once."""
+    return not bpy.app.background and gpu.platform.device_type_get() == "SOFTWARE"
 
 
 def recolor(obj):
@@ -149,8 +155,11 @@ def recolor(obj):
     name = shown_attribute(obj)
     if not name or name not in obj.data.attributes:
         return
+    in_solid = is_in_solid(obj)
     _color(obj, name, _read(obj.data, name))
     reshape(obj)
+    if in_solid and not is_in_solid(obj):  # iso lines, for instance, are no colors of points
+        use_material_preview(bpy.context)
 
 
 def show_groups(obj):
@@ -198,7 +207,7 @@ def _keep_groups(*_):
 def show_result(obj, name):
     """Show an attribute that was written just now; without a name what is on show, or the mean curvature."""
     show_attribute(obj, MEAN_CURVATURE if not name and is_colored(obj) else name)
-    use_material_preview(bpy.context)
+    look_at([obj])
 
 
 def show_sequence(objects, name):
@@ -212,7 +221,7 @@ def show_sequence(objects, name):
         settings.color_map, settings.range_mode = color_map, "LOCKED"
         settings.range_low, settings.range_high = low, high
         show_attribute(obj, name)
-    use_material_preview(bpy.context)
+    look_at(objects)
 
 
 def show_surface(obj):
@@ -297,6 +306,15 @@ def show_in_solid(obj):
                 shading.type = "MATERIAL"
 
 
+def look_at(objects):
+    """Let the viewport that somebody works in show what was put on show: without a card in Solid, where that can."""
+    if _without_card() and all(is_in_solid(obj) for obj in objects):
+        for obj in objects:
+            show_in_solid(obj)
+    else:
+        use_material_preview(bpy.context)
+
+
 def use_material_preview(context):
     """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
     space = context.space_data
@@ -347,6 +365,8 @@ def reshape(obj):
         if has_input(group, SMOOTH):  # slopes do not turn
             sloping_now = turned and deform is None and obj.meshfree.slopes_of != ""
             set_input(modifier, SMOOTH, shown_attribute(obj) if sloping_now else "")
+        if has_input(group, SOLID_NAME) and not shown_attribute(obj):
+            set_input(modifier, SOLID_NAME, "")
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
         dots, bound = not (turned and draws_discs(obj)), deform is not None
@@ -378,13 +398,14 @@ def _color(obj, name, values):
     _measure(obj)
     settings, material, groups = obj.meshfree, _display_material(obj), _group_colors(obj)
     part = component(name, settings)
-    shown, stepped = None if values is None else numbers(values, part), False
+    shown, stepped, colors_of = None if values is None else numbers(values, part), False, None
     if values is None:
         color_by_own(material, name, groups)
     elif is_texture(values):
         color_by_checker(material, name, groups)
     elif shown is None:
         color_by_direction(material, name, groups)
+        colors_of = solid.direction_colors
     else:
         locked = settings.range_low, settings.range_high
         chosen = [settings.color_map, settings.range_mode]
@@ -399,15 +420,27 @@ def _color(obj, name, values):
         component_shown, stepped = part if values.ndim > 1 else "", color_map in STEPPED
         width = _LINE_WIDTH * settings.spacing * math.sqrt(point_count(obj.data))
         color_by_number(material, name, component_shown, color_map, low, high, settings, groups, width)
+        if settings.outside != "HIDE" and (stepped or not settings.iso_lines):  # else Solid shows less
+            colors_of = solid.number_colors(color_map, low, high, settings)
     dim_back(material, settings.dim_back)
     shade(material, settings.shaded)
     columns = [] if values is None or stepped or not settings.smooth else sloping(name, values, part)
     smooth.follow(obj, name, part, columns, settings.spacing)
+    _follow_in_solid(obj, values if shown is None else shown, None if groups else colors_of)
     for other in sharing_objects(obj):  # which may show something else
+        if shown_attribute(other) != name and is_in_solid(other):
+            set_input(find_display(other), SOLID_NAME, "")
         reshape(other)
     obj.update_tag()
     legend.renew(obj)
     redraw_views()
+
+
+def _follow_in_solid(obj, values, colors_of):
+    """Let viewports in Solid show the colors of values, which a function gives; those of the mesh without one."""
+    modifier = find_display(obj)
+    name = solid.follow(obj, values, colors_of if draws_faces(obj) else None, get_input(modifier, "Radius"))
+    set_input(modifier, SOLID_NAME, name)
 
 
 def _remove_unused(material):

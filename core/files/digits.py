@@ -29,12 +29,15 @@ class Digits(NamedTuple):
         What a second part holds: the upper 32 bits of whole numbers, or what single precision left of others.
     unsigned : bool
         Whether whole numbers of 64 bits have no sign.
+    step : int
+        By what whole numbers less the offset were divided: times in nanoseconds may all be multiples of a microsecond.
     """
 
     offset: int | float | list
     decimals: int | None = None
     part: str = ""
     unsigned: bool = False
+    step: int = 1
 
 
 def split_digits(values, known=None):
@@ -69,7 +72,7 @@ def join_digits(parts, digits):
         bits = parts[1].astype(np.int64).view(np.uint64) << np.uint64(32) | first.view(np.uint32).astype(np.uint64)
         return bits if digits.unsigned else bits.view(np.int64)
     if first.dtype.kind == "i":
-        return _plus(first, digits.offset)
+        return _put_together(first, digits)
     values = first.astype(np.float64) + (parts[1].astype(np.float64) if len(parts) == 2 else 0.0)
     values += digits.offset
     if digits.decimals is None:
@@ -100,10 +103,10 @@ def _split_whole(values, known):
     if _fit(low, high):
         return [values.astype(np.int32)], None
     bits = values.astype(np.int64).view(np.uint64) if values.dtype.kind == "i" else values.astype(np.uint64)
-    for offset in _whole_offsets(low, high, known):
-        if _fit(low - offset, high - offset):
-            less = (bits - np.uint64(offset % 2**64)).view(np.int64)
-            return [less.astype(np.int32)], Digits(offset)
+    for offset, step in _whole_offsets(bits, low, high, known):
+        less = (bits - np.uint64(offset % 2**64)).view(np.int64)
+        if _fit((low - offset) // step, (high - offset) // step) and not (less % step).any():
+            return [(less // step).astype(np.int32)], Digits(offset, step=step)
     lower = (bits & np.uint64(2**32 - 1)).astype(np.uint32).view(np.int32)
     upper = (bits >> np.uint64(32)).astype(np.uint32).view(np.int32)
     return [lower, upper], Digits(0, part="high", unsigned=high >= 2**63)
@@ -114,20 +117,24 @@ def _fit(low, high):
     return low >= -_WHOLE and high < _WHOLE
 
 
-def _whole_offsets(low, high, known):
-    """Yield what may be subtracted from whole numbers: what others are kept less, a round number, or the middle."""
+def _whole_offsets(bits, low, high, known):
+    """Yield what may be subtracted from whole numbers, and what divides the rest.
+
+    That is what serves others, a round number, or the middle; and at last what all differences are multiples of.
+    """
     if known is not None and isinstance(known.offset, int) and not known.part:
-        yield known.offset
+        yield known.offset, known.step
     grid = 10 ** len(str(high - low))
-    yield low // grid * grid
-    yield low
-    yield low + _WHOLE
+    for offset in (low // grid * grid, low, low + _WHOLE):
+        yield offset, 1
+    if high - low < 2**63:
+        yield low, int(np.gcd.reduce(bits - np.uint64(low % 2**64)))
 
 
-def _plus(whole, offset):
-    """Return whole numbers of 32 bits plus another, of 64 bits, without a sign where they are too large for one."""
-    bits = whole.astype(np.int64).view(np.uint64) + np.uint64(offset % 2**64)
-    return bits if int(whole.max(initial=0)) + offset >= 2**63 else bits.view(np.int64)
+def _put_together(whole, digits):
+    """Return whole numbers of 32 bits times a step and plus an offset, of 64 bits; all of them go round at 2**64."""
+    bits = whole.astype(np.int64).view(np.uint64) * np.uint64(digits.step) + np.uint64(digits.offset % 2**64)
+    return bits if int(whole.max(initial=0)) * digits.step + digits.offset >= 2**63 else bits.view(np.int64)
 
 
 def _is_kept(values):

@@ -16,6 +16,7 @@ _CODES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
 _NAMES = dict(zip(_CODES, ("char", "uchar", "short", "ushort", "int", "uint", "float", "double"), strict=True))
 _TYPES = {name: code for code, name in _NAMES.items()}
 _TYPES |= {np.dtype(code).name: code for code in (*_CODES, "i8", "u8")}  # int8, ..., float64; some write 64 bits
+_TYPES["bool"] = "u1"
 _ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
 _LONGEST = 1000  # characters of a line of the header, and lines
 _MOST_DIGITS = 15  # of a count

@@ -30,7 +30,7 @@ _SCAN_NAMES = {  # of the columns of PTS files
 def read_columns(path, columns="") -> PointTable:
     """Read a text file with a point a line.
 
-    Columns are separated by semicolons, tabs, white space or commas; beside commas as separators, numbers have decimal
+    Columns are separated by semicolons, tabs, bars, white space or commas; beside commas, numbers have decimal
     points, otherwise points or commas. A line before the first point, marked as a comment or not, may name the columns;
     without names the first three are x y z, and others colors or normals if they look like them. A PTX file by another
     name is read as such.

@@ -70,4 +70,5 @@ def _told(name, digits, second):
     offset = digits.offset if isinstance(digits.offset, list) else [digits.offset]
     parts = f" in two parts, {name} and {second}" if second else ""
     less = f" less {', '.join(f'{value:,.15g}' for value in offset)}" if any(offset) else ""
-    return f"{name} has more digits than Blender keeps and is stored{parts}{less}; exports write it as it was"
+    steps = f" in steps of {digits.step:,}" if digits.step > 1 else ""
+    return f"{name} has more digits than Blender keeps and is stored{parts}{less}{steps}; exports write it as it was"

@@ -43,6 +43,8 @@ CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
 # Slopes of what is shown, or of both texture coordinates, and the values, by their means. Blender hides such names.
 SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
+# What viewports in Solid show instead: colors, linear, and how these change with what is shown.
+SOLID, TILT = ".lb_color", ".lb_tilt"
 RISE = "lb_rise"  # by how much what is shown rises in discs that the display draws
 CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
@@ -70,7 +72,7 @@ APPLICATIONS = (
 )
 _TYPES = {  # all others are FLOAT
     **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DIRECTION), "FLOAT_VECTOR"),
-    **dict.fromkeys((DISC, MOVED_DISC, DISPLACEMENT, REST, SLOPE, SLOPE_2), "FLOAT_VECTOR"),
+    **dict.fromkeys((DISC, MOVED_DISC, DISPLACEMENT, REST, SLOPE, SLOPE_2, TILT), "FLOAT_VECTOR"),
     **dict.fromkeys((COMPONENT, SEGMENT, CELL), "INT"),
     **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
     UV: "FLOAT2",

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from ... import core
-from .attributes import read_attribute
+from .attributes import SOLID, read_attribute
 from .modifiers import DISPLAY_TAG, get_input, is_display
 from .splats import BASE, has_splats
 
@@ -14,9 +14,9 @@ _GAMMA = 2.2  # splats are trained in sRGB
 
 
 def is_color(data, name: str) -> bool:
-    """Whether an attribute of a mesh or a point cloud holds colors of its points."""
+    """Whether an attribute of a mesh or a point cloud holds colors of its points, and not those of a result."""
     attribute = data.attributes.get(name)
-    return attribute is not None and attribute.domain == "POINT" and attribute.data_type in COLORS
+    return name != SOLID and attribute is not None and attribute.domain == "POINT" and attribute.data_type in COLORS
 
 
 def own_colors(data) -> str:

@@ -95,8 +95,8 @@ class ApplicationOperator(Tool, JobOperator):
         sharing = [other for obj in objects for other in sharing_objects(obj)]
         with all_or_nothing([*objects, *sharing]):
             texts = self.write_all(context, objects, results)
-            self.conclude(context, objects)
             self.begin_notices(objects)
+            self.conclude(context, objects)
             for reason in self._left_out:
                 self.warn(f"Left out: {reason}.", objects[0])
             for obj, (*notices, line) in zip(objects, texts, strict=True):
@@ -131,10 +131,10 @@ class ShownOperator(ApplicationOperator):
             for obj in objects:
                 _write_discs(context, obj)
             for obj in filter(shows_own_material, [*objects, *sharing]):
-                self.report(
-                    {"WARNING"},
+                self.warn(
                     f'{obj.name}: colors take the place of the material "{own_material(obj).name}". Own Material under'
                     " Display brings it back.",
+                    obj,
                 )
             for obj in [*objects, *sharing]:
                 tell("result_written", obj, self.shown if self.shown in obj.data.attributes else "")

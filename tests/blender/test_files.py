@@ -68,14 +68,19 @@ def write_e57(path, points):
     path.write_bytes(e57_files.seal(e57_files.make_e57((fields, len(points), e57_files.pose((0, 1, 0, 0), low)))))
 
 
+def ptx_head(columns, rows, turn, place):
+    """Return the lines before the points of a scan, whose axes are the rows of `turn`."""
+    place = " ".join(f"{value:.0f}" for value in place)
+    axes = [" ".join(f"{value:g}" for value in axis) for axis in turn]
+    return [str(columns), str(rows), place, *axes, *(f"{axis} 0" for axis in axes), f"{place} 1"]
+
+
 def write_ptx(path, points):
     """From a scanner whose axes are turned by a quarter, with as many rays that hit nothing."""
     low = np.floor(points.min(axis=0))
     turned = (points - low)[:, [1, 0, 2]] * (1.0, -1.0, 1.0)
-    place = " ".join(f"{value:.0f}" for value in low)
-    head = [len(points), 2, place, "0 1 0", "-1 0 0", "0 0 1", "0 1 0 0", "-1 0 0 0", "0 0 1 0", f"{place} 1"]
     rows = [f"{x:.3f} {y:.3f} {z:.3f} 0.25\n0 0 0 0.5" for x, y, z in turned]
-    path.write_text("\n".join(map(str, [*head, *rows])))
+    path.write_text("\n".join([*ptx_head(len(points), 2, ((0, 1, 0), (-1, 0, 0), (0, 0, 1)), low), *rows]))
 
 
 WRITERS = {
@@ -610,15 +615,20 @@ class TestPlacesOfScanners:
         expected = (places - obj["lb_offset"])[:, [1, 0, 2]] * (-1.0, 1.0, 1.0) + (1000.0, 0.0, 0.0) + obj["lb_offset"]
         assert_allclose(read_file(tmp_path / "a.ply").attributes["scanner"], expected, rtol=0.0, atol=1e-3)
 
-    def test_normals_are_oriented_by_them(self, tmp_path):
+    @pytest.mark.parametrize("name", ["a.e57", "a.ptx"])
+    def test_normals_are_oriented_by_them(self, tmp_path, name):
         """Half of a plane is seen from above, the other half from below."""
         x, y = (values.ravel() for values in np.meshgrid(np.arange(40.0), np.arange(20.0)))
-        scans = []
+        scans, lines = [], []
         for side, place in ((0.0, (20.0, 10.0, 50.0)), (100.0, (120.0, 10.0, -50.0))):
-            points = np.stack([x + side, y, np.zeros(x.size)], axis=1)
-            scans.append((e57_files.points(points - place), x.size, e57_files.pose((1, 0, 0, 0), place)))
-        (tmp_path / "a.e57").write_bytes(e57_files.seal(e57_files.make_e57(*scans)))
-        obj = run_import(tmp_path / "a.e57")
+            points = np.stack([x + side, y, np.zeros(x.size)], axis=1) - place
+            scans.append((e57_files.points(points), x.size, e57_files.pose((1, 0, 0, 0), place)))
+            lines += [*ptx_head(x.size, 1, np.eye(3), place), *("{:g} {:g} {:g} 0".format(*point) for point in points)]
+        if name == "a.ptx":
+            (tmp_path / name).write_text("\n".join(lines))
+        else:
+            (tmp_path / name).write_bytes(e57_files.seal(e57_files.make_e57(*scans)))
+        obj = run_import(tmp_path / name)
         bpy.ops.meshfree.orient_normals(method="ATTRIBUTE", source="scanner", holds="POSITIONS")
         assert_allclose(attribute(obj, "lb_normal")[:, 2], np.repeat([1.0, -1.0], x.size), atol=1e-3)
 

@@ -81,6 +81,17 @@ def test_another_tool_leaves_notices_and_says_nothing_twice():
     assert FACES in texts(obj)
 
 
+def test_what_is_told_while_colors_are_put_on_show_is_kept_too():
+    obj = sphere_with_a_face()
+    obj.data.materials.append(bpy.data.materials.new("Mine"))
+    bpy.ops.meshfree.show_surface()
+    bpy.ops.meshfree.analyze()
+    told = [text for text in texts(obj) if '"Mine"' in text]
+    assert len(told) == 1
+    assert "Own Material" in told[0]
+    assert FACES in texts(obj)
+
+
 def test_many_notices_are_not_all_drawn_at_once():
     obj = add_object(sphere_points())
     for number in range(40):

@@ -351,6 +351,31 @@ def test_an_older_scipy_of_another_extension_does_not_matter(archive, tmp_path):
     assert "MESHFREE_PT_missing" not in line
 
 
+BROKEN_SCIPY = """
+import sys
+import bpy
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+for path in sys.argv[1:]:
+    bpy.ops.extensions.package_install_files(filepath=path, repo="user_default", enable_on_install=True)
+bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+try:
+    bpy.ops.meshfree.analyze()
+except RuntimeError as error:
+    print("RESULT", error)
+"""
+
+
+def test_a_scipy_that_only_looks_fit_is_told_by_the_tool(archive, tmp_path):
+    """It has the version of ours, and is not tried when Blender starts."""
+    other = other_extension(tmp_path / "other.zip", "1.15.99", {"scipy/__init__.py": "__version__ = '1.15.99'\n"})
+    lines = run_apart(tmp_path, BROKEN_SCIPY, other, archive)
+    (line,) = [line for line in lines if line.startswith("RESULT")]
+    assert "The scipy of this Python does not serve: No module named 'scipy.s" in line
+    assert "disable the extension that brings another one, or install this one again; then restart." in line
+    assert not [line for line in lines if "Traceback" in line]
+
+
 LIFE = """
 import sys
 from pathlib import Path

@@ -71,6 +71,7 @@ def test_smoothing_again_goes_on_from_what_is_seen():
     once = shown_points(obj)
     bpy.ops.meshfree.smooth()
     assert [block.name for block in obj.data.shape_keys.key_blocks] == ["Basis", "Smooth", "Smooth.001"]
+    assert obj.active_shape_key.name == "Smooth.001"  # which Edit Mode shows, and its slider is at hand
     assert off_sphere(shown_points(obj)) < off_sphere(once)
 
 

@@ -18,6 +18,8 @@ WHOLE = {
     "hashes": RANDOM.integers(0, 2**64 - 1, COUNT, dtype=np.uint64),
     "hashes with a sign": RANDOM.integers(-(2**63), 2**63 - 1, COUNT),
     "a mark for none": np.array([0, 1, 2, 2**64 - 1], np.uint64),
+    "nanoseconds since 1970": 1_700_000_000_123_456_789 + 100_000_000 * STEPS,
+    "microseconds in nanoseconds": (3_000 * RANDOM.integers(0, 2**30, COUNT) + 17).astype(np.uint64),
     "whole doubles": 2.0**40 + STEPS,
     "bytes": STEPS.astype(np.uint8),
 }
