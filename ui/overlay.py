@@ -11,7 +11,7 @@ from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import mode_number
 from ..operators.objects.result import read_eigenvalues
 from . import canvas, plots
-from .display import find_display, range_node, shown_attribute, shown_values, without_unreached
+from .display import find_display, is_in_solid, range_node, shown_attribute, shown_values, without_unreached
 from .scale import shown_scale
 from .units import EIGENVALUE_POWER, unit
 from .value_range import histogram
@@ -119,7 +119,9 @@ def shows_colors(obj, shading) -> bool:
     modifier = find_display(obj)
     if modifier is None or not modifier.show_viewport or (obj.mode == "EDIT" and not modifier.show_in_editmode):
         return False
-    return shading.type in {"MATERIAL", "RENDERED"} or (shading.type == "SOLID" and shading.color_type == "VERTEX")
+    return shading.type in {"MATERIAL", "RENDERED"} or (
+        shading.type == "SOLID" and shading.color_type == "VERTEX" and is_in_solid(obj)
+    )
 
 
 def drawn_object(context):

@@ -1,11 +1,14 @@
 """Texts in panels of any width: Blender cuts the middle out of a line that does not fit."""
 
+import re
+
 import blf
 
 _FONT = 0  # Blender's own
 _MARGIN = 38.0  # around what is in a panel, in units of the user interface
 _TABS = 20.0  # of a sidebar
 _ICON = 20.0
+_WORD = re.compile(r"\S*\d (?:%|[a-zµ]{0,2}m[²³]?)(?!\w)\S*|\S+")  # a number stays with its unit
 _PADDING = 12.0  # of a button beside its text
 _SPLIT = 210.0  # room from which on names stand before settings
 
@@ -37,7 +40,7 @@ def split_properties(layout, context):
 def wrapped(text: str, room: float, measure) -> list:
     """Break a text between words into lines that fit into some room, by a function that measures a line."""
     lines = []
-    for word in text.split():
+    for word in _WORD.findall(text):
         if lines and measure(f"{lines[-1]} {word}") <= room:
             lines[-1] = f"{lines[-1]} {word}"
         else:

@@ -244,3 +244,12 @@ def test_texts_are_wrapped_by_the_width_of_the_region(extension):
         assert max(blf.dimensions(0, line)[0] for line in lines[width]) < width - 60
         assert " ".join(lines[width]).endswith(obj.meshfree.notices[0].text)
     assert len(lines[180]) > len(lines[260]) > len(lines[600])
+
+
+def test_a_number_stays_with_its_unit(extension):
+    wrapping = importlib.import_module(f"{extension.__name__}.ui.wrapping")
+    text = "Scan: 2.01 cm from Plan on average, 95 % within 1.5 mm, 12.6 m² of 13 miles at most (0.07 %)."
+    lines = wrapping.wrapped(text, 1, len)
+    assert {"2.01 cm", "95 %", "1.5 mm,", "12.6 m²", "13", "miles", "(0.07 %)."} <= set(lines)
+    assert " ".join(lines) == text
+    assert " ".join(wrapping.wrapped(text, 20, len)) == text
