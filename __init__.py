@@ -12,7 +12,7 @@ def _modules():
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
-    from .operators.objects import counting, earlier, settings
+    from .operators.objects import counting, earlier, notices, settings
     from .operators.running import cache, job
     from .operators.tools import (
         along,
@@ -32,11 +32,27 @@ def _modules():
         surface,
     )
     from .operators.tools import select as selecting
-    from .ui import applications, colormap, legend, menus, overlay, panel, points, presets, range_selection, show
+    from .ui import (
+        applications,
+        colormap,
+        drag,
+        iso_lines,
+        keys,
+        legend,
+        menus,
+        overlay,
+        panel,
+        points,
+        preferences,
+        presets,
+        range_selection,
+        show,
+    )
     from .ui import deform as deform_panel
 
     return (
         settings,
+        notices,
         earlier,
         cache,
         counting,
@@ -67,13 +83,17 @@ def _modules():
         colormap,
         legend,
         range_selection,
+        iso_lines,
         presets,
         panel,
         points,
         applications,
         deform_panel,
         menus,
+        keys,
         overlay,
+        drag,
+        preferences,
     )
 
 

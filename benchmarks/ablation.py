@@ -209,7 +209,7 @@ def corrections_off(names):
         "balance of the weights": [(weights, "_ROUNDS", 0)],
         "width of the weights": [(stiffness, "_widths", lambda pairs, *_: pairs.lengths)],
         "outliers": [(cloud, "find_outliers", lambda nearest: np.zeros(len(nearest.points), dtype=bool))],
-        "noise": [(cloud, "noise_level", lambda nearest, misfit: np.zeros(len(misfit)))],
+        "noise": [(cloud, "noise_level", lambda nearest, *misfits: np.zeros(len(nearest.points)))],
         "sheets apart": [(cloud, "separate_sheets", lambda pairs, *_: pairs)],
     }
     for label, changed in corrections.items():

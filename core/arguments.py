@@ -73,10 +73,11 @@ def check_positions(positions, count, name, singular):
             f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers."
             f" Give x, y, z for each {singular}."
         )
+    given = as_doubles(given)  # in single precision the limit would be infinite
     bad = int(np.count_nonzero(~(np.abs(given) < _HUGE).all(axis=1)))
     if bad:
         raise InvalidPointsError(
             f"{bad} of {count} {name} are not finite (NaN or infinity), or beyond {_HUGE:g}. Give a place for"
             f" each {singular}."
         )
-    return given.astype(np.float64)
+    return given

@@ -54,14 +54,26 @@ def demonstrate(scan, up):
     print(f"eigenvalues  {', '.join(f'{value:.4g}' for value in values[:8])}, ...")
 
     began = perf_counter()
-    blend, picture = OUTPUT / "demo.blend", OUTPUT / "demo.png"
+    blend, picture, photograph = (OUTPUT / name for name in ("demo.blend", "demo.png", "scan.png"))
+    photograph.unlink(missing_ok=True)
     with studio.silence():
         studio.set_up(bpy.context.scene, obj)
         studio.picture(bpy.context.scene, obj, f"lb_eigenvector_{SHOWN:03}", picture)
+        picture_of_colors(bpy.context.scene, obj, photograph)
         bpy.ops.wm.save_as_mainfile(filepath=str(blend), compress=True)
-    print(f"picture      {perf_counter() - began:.2f} s, mode {SHOWN}")
-    for path in (blend, picture):
+    colors = ", and its own colors" if photograph.exists() else ""
+    print(f"picture      {perf_counter() - began:.2f} s, mode {SHOWN}{colors}")
+    for path in filter(Path.exists, (blend, picture, photograph)):
         print(f"written      {path.relative_to(package.ROOT)}")
+
+
+def picture_of_colors(scene, obj, path):
+    """Show a scan in colors of its own, if it has any, and render it."""
+    colors = studio.part("operators.objects.colors").own_colors(obj.data)
+    if colors:
+        studio.show(obj, colors)
+        studio.aim(scene, studio.world_points(obj), studio.VIEW, room=0.0)  # there is no legend
+        studio.render(scene, path)
 
 
 def main():

@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 
+import manual_pages
 import pythons
 from environments import ROOT, newest_blender, run
 
@@ -96,6 +97,7 @@ def stage(platforms):
             shutil.copy2(source, STAGE / name)
         else:
             sys.exit(f"{name} is missing, the package needs it")
+    manual_pages.write_pages(STAGE / "manual")
     for name in read_manifest()["platforms"]:
         for wheel in wheel_names(name):
             if name in platforms:

@@ -203,6 +203,22 @@ def distance(path):
     single(obj, "lb_distance", path)
 
 
+def iso_lines(path):
+    """Lines of equal height of a mode, shown on discs and as tubes of their own."""
+    shown, made = coral(), coral()
+    for obj in (shown, made):
+        studio.activate(obj)
+        bpy.ops.meshfree.analyze(modes=4)
+        obj.meshfree.iso_lines = LINES
+        studio.show(obj, "lb_eigenvector_004")
+    bpy.ops.meshfree.iso_lines_to_curves(thickness=0.3 * SPACING)
+    bpy.data.objects[f"{made.name} Iso Lines"].data.materials.append(studio.paint("Tubes", studio.CLAY))
+    studio.line_up([shown, made])
+    bpy.data.objects[f"{made.name} Iso Lines"].matrix_world = made.matrix_world
+    made.hide_render = True
+    studio.take(path, legend=shown)
+
+
 def signed_distance(path):
     """Distance from a circle around the shape, by sides."""
     obj = coral()
@@ -299,6 +315,7 @@ PICTURES = {
     "orient": orient,
     "signature": signature,
     "distance": distance,
+    "iso_lines": iso_lines,
     "signed_distance": signed_distance,
     "nearest_source": nearest_source,
     "unwrap": unwrap,

@@ -334,18 +334,33 @@ class Window:
         """Find the button of an operator, such as "meshfree.analyze", and leave the mouse on it.
 
         It is looked for from top to bottom at that share of the way from left to right. Of several buttons of an
-        operator one is found by its settings: "meshfree.group_from_selection(role='ANCHOR'".
+        operator one is found by its settings: "meshfree.group_from_selection(role='ANCHOR'". A setting is found by its
+        path, after a dot: ".meshfree.show_groups".
         """
-        wanted = f"bpy.ops.{operator}" if "(" in operator else f"bpy.ops.{operator}("
         x, top, width, height = self.region(region)
         seen = []
         for y in range(top + 8, top + height, 9):
             self.move(x + width * across, y)
             found = self.python(f"button_under_mouse({region!r})")
-            if found.startswith(wanted):
+            if found.startswith(_written(operator)):
                 return x + width * across, y
             seen += [found] if found and found not in seen else []
         raise WindowError(f"No button of {operator} is seen, only {seen}")
+
+    def open_panel(self, first):
+        """Open a closed panel of the sidebar by a click on its title; it is known by its first button or setting."""
+        x, top, width, height = self.region("UI")
+        for y in range(top + 8, top + height - 30, 9):
+            self.move(x + 0.35 * width, y)
+            if self.python("button_under_mouse()"):
+                continue
+            for _ in range(2):  # another panel is closed again
+                self.click(x + 0.35 * width, y)
+                for below in (22, 31):
+                    self.move(x + 0.65 * width, y + below)
+                    if self.python("button_under_mouse()").startswith(_written(first)):
+                        return
+        raise WindowError(f"No panel begins with {first}")
 
     def press(self, operator, region="UI", across=0.35):
         """Click on the button of an operator in the sidebar."""
@@ -382,6 +397,13 @@ class Window:
     def _grab(self, kind, crop):
         options = ["-crop", "{2}x{3}+{0}+{1}".format(*map(round, crop)), "+repage"] if crop else []
         return self.run("import", "-window", "root", *options, "-depth", "8", f"{kind}:-")
+
+
+def _written(button):
+    """Return how what `button_under_mouse` says of a button begins."""
+    if button.startswith("."):
+        return button[1:]
+    return f"bpy.ops.{button}" if "(" in button else f"bpy.ops.{button}("
 
 
 def _end(process):

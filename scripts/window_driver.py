@@ -58,14 +58,15 @@ def on_screen(point):
 
 
 def button_under_mouse(region_type="UI"):
-    """Python of the operator button that the mouse is on, or an empty text."""
+    """Python of the operator button that the mouse is on, or the path of the property, or an empty text."""
     area = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")
     region = next(region for region in area.regions if region.type == region_type)
     with bpy.context.temp_override(window=main_window(), area=area, region=region):
-        if not bpy.ops.ui.copy_python_command_button.poll():
-            return ""
-        bpy.ops.ui.copy_python_command_button()
-    return bpy.context.window_manager.clipboard
+        for copy in (bpy.ops.ui.copy_python_command_button, bpy.ops.ui.copy_data_path_button):
+            if copy.poll():
+                copy()
+                return bpy.context.window_manager.clipboard
+    return ""
 
 
 def open_panels(names):

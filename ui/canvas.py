@@ -25,6 +25,8 @@ class Text(NamedTuple):
 class Picture:
     """Shapes on a plate of some width and height, in units of the user interface, from its lower left corner."""
 
+    movable = False  # by the mouse
+
     def __init__(self, width, height):
         self.width, self.height = width, height
         self.places, self.colors, self.texts = [], [], []  # three places and colours make a triangle

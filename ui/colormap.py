@@ -1,16 +1,18 @@
-"""Shows an attribute of the active object as colours."""
+"""Shows an attribute of the active object as colours, or the object's own material."""
 
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..operators.objects.all_or_nothing import all_or_nothing
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
+from ..operators.objects.colors import own_material
 from ..operators.running.ready import ReadyOperator, reporting
-from .show import show_attribute, use_material_preview
+from .display import find_display, is_colored
+from .show import look_at, show_attribute, show_in_solid, show_own_material, use_material_preview
 
 
 class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
-    """Show an attribute as colors on round points"""
+    """Show an attribute as colors on the points: numbers, vectors, or colors that they have"""
 
     bl_idname = "meshfree.colormap"
     bl_label = "Show as Colors"
@@ -34,7 +36,8 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
     )
     switch_shading: BoolProperty(
         name="Switch to Material Preview",
-        description="Switch this viewport from Solid, where such points are gray, to Material Preview",
+        description="Switch this viewport from Solid, where such points are gray, to Material Preview; Solid may show"
+        " colors that points have of their own",
         default=True,
     )
 
@@ -48,9 +51,35 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
                     setattr(self, name, getattr(obj.meshfree, name))
                 elif getattr(self, name) != getattr(obj.meshfree, name):
                     setattr(obj.meshfree, name, getattr(self, name))  # which colors the points again
-            if self.switch_shading:
-                use_material_preview(context)
+            if self.switch_shading and is_colored(obj):
+                show_in_solid(obj)
+            elif self.switch_shading:
+                look_at([obj])
         return {"FINISHED"}
 
 
-CLASSES = (MESHFREE_OT_colormap,)
+class MESHFREE_OT_own_material(ReadyOperator, bpy.types.Operator):
+    """Show the points in the object's own material, that of its first slot, in place of colors"""
+
+    bl_idname = "meshfree.own_material"
+    bl_label = "Own Material"
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason:
+            return reason
+        name = context.object.name
+        if own_material(context.object) is None:
+            return f'"{name}" has no material in its first slot. Give it one in the Properties editor'
+        return "" if find_display(context.object) else f'"{name}" is seen in its own material already'
+
+    @reporting
+    def execute(self, context):
+        with all_or_nothing([context.object]):
+            show_own_material(context.object)
+            use_material_preview(context)
+        return {"FINISHED"}
+
+
+CLASSES = (MESHFREE_OT_colormap, MESHFREE_OT_own_material)

@@ -28,6 +28,8 @@ _GROUPS = {
     "Anchor": "0072b2",
     "Fixed": "009e73",
     "Source": "f0e442",
+    "Low": "332288",
+    "High": "e69f00",
     "Value": "cc79a7",
     "Boundary": "56b4e9",
 }

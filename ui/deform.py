@@ -10,8 +10,7 @@ from ..operators.objects.modifiers import input_property
 from ..operators.objects.reading import obstacle
 from .dialogs import search_group
 from .panel import SidebarPanel
-
-_WIDTH = 38  # letters in a line of the panel
+from .wrapping import draw_text, split_properties
 
 
 class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
@@ -28,16 +27,15 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, obj = self.layout, handled_object(context.object, context.scene)
         if obj != context.object:
-            layout.label(text=f"Moves handles of {obj.name}", icon="EMPTY_DATA")
+            draw_text(layout, context, f"Moves handles of {obj.name}", "EMPTY_DATA")
         settings = obj.meshfree.deform
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        split_properties(layout, context)
         column = layout.column(align=True)
         search_group(column, settings, "handles", obj)
         search_group(column, settings, "anchors", obj)
         names = handle_names(obj)
         if len(names) > 1:
-            column.label(text=f"{len(names)} groups of handles", icon="INFO")
+            draw_text(column, context, f"{len(names)} groups of handles", "INFO")
         if obj == context.object:  # whose points are selected
             layout.operator("meshfree.handle_add")
         column = layout.column(align=True)
@@ -53,14 +51,14 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         if not is_bound(obj):
             layout.operator("meshfree.deform_bind")
             return
-        _draw_state(layout, obj)
+        _draw_state(layout, context, obj)
         layout.operator("meshfree.deform_bind", text="Bind Again")
         modifier = find_deform(obj)
         if modifier is not None:
             layout.prop(*input_property(modifier, "Strength"), text="Strength", slider=True)
         if not context.scene.render.use_lock_interface:
             column = layout.column(align=True)
-            column.label(text="Blender may crash in renders", icon="ERROR")
+            draw_text(column, context, "Blender may crash in renders", "ERROR")
             column.prop(context.scene.render, "use_lock_interface")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for name in ("update", "reset", "apply", "to_shape_key", "bake", "free"):
@@ -69,7 +67,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         grid.operator("meshfree.deform_unbind")
 
 
-def _draw_state(layout, obj):
+def _draw_state(layout, context, obj):
     """Draw whether the points follow the handles, and what to do if not."""
     reason, working = stale_reason(obj, glance=True) or live.trouble(obj), live.preparing(obj)
     if reason:
@@ -84,20 +82,7 @@ def _draw_state(layout, obj):
         icon = "SORTTIME"
     else:
         text, icon = "Bound: follows its handles", "CHECKMARK"
-    column = layout.column(align=True)
-    for line in _wrapped(text):
-        column.label(text=line, icon=icon)
-        icon = "BLANK1"
-
-
-def _wrapped(text):
-    """Break a text into lines."""
-    lines = [""]
-    for word in text.split():
-        if len(lines[-1]) + len(word) > _WIDTH:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines
+    draw_text(layout, context, text, icon)
 
 
 CLASSES = (MESHFREE_PT_deform,)

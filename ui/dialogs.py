@@ -3,10 +3,16 @@
 import bpy
 
 from ..operators.deform.bake import MESHFREE_OT_deform_bake
-from ..operators.files.exporting import MESHFREE_OT_export_points
+from ..operators.deform.tools import MESHFREE_OT_deform_apply, keyed_empties
+from ..operators.files.exporting import MESHFREE_OT_export_points, MESHFREE_OT_export_splats
 from ..operators.files.importing import MESHFREE_OT_import_points
-from ..operators.objects.groups import ROLES, has_group
+from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, has_group
 from ..operators.running.application import ApplicationOperator
+from ..operators.tools.select import MESHFREE_OT_select_grow, selection
+from ..operators.tools.sequence import MESHFREE_OT_analyze_sequence
+from .wrapping import draw_text
+
+_OPTIONAL = LOW, HIGH, VALUE  # one or two of them do
 
 
 def draw_setting(layout, settings, name: str, obj):
@@ -17,18 +23,35 @@ def draw_setting(layout, settings, name: str, obj):
         layout.prop_search(settings, name, bpy.data, "objects")
     elif name == "source":
         layout.prop_search(settings, name, obj.data, "attributes")
+    elif name in getattr(settings, "at_zero", ()) and not getattr(settings, name):
+        row = layout.row(align=True)
+        row.prop(settings, name)
+        row.label(text=settings.at_zero[name])
     else:
         layout.prop(settings, name)
 
 
 def search_group(layout, settings, name: str, obj):
-    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned."""
+    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned.
+
+    Where one is missing, it says what counts instead.
+    """
     group = getattr(settings, name)
     owner, groups = (obj, "vertex_groups") if obj.type == "MESH" else (obj.data, "attributes")
     awaited = group in ROLES and not has_group(obj, group)
     layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
-    if awaited:
-        layout.label(text="No points assigned yet", icon="INFO")
+    if awaited and group not in _OPTIONAL:
+        draw_text(layout, bpy.context, _instead(obj, group), "INFO")
+
+
+def _instead(obj, group):
+    """Say what counts where a group is missing that is to be assigned."""
+    if group != SOURCE:
+        return "Uses the boundaries that are found" if group == FIXED else "No points assigned yet"
+    count = int(selection(obj).sum())
+    if count == 0:
+        return "Select a point in Edit Mode first"
+    return "Uses the selected point" if count == 1 else f"Uses the {count:,} selected points"
 
 
 def _draw_asked(operator, context):
@@ -39,6 +62,15 @@ def _draw_tool(operator, context):
     _draw(operator, context, operator.adjustable if operator.is_repeated(context) else operator.asks)
 
 
+def _draw_apply(operator, context):
+    if keyed_empties(operator.subject(context)):  # which it asks about; afterwards they are gone
+        column = operator.layout.column(align=True)
+        column.label(text=f"The shape of frame {context.scene.frame_current} will be at rest.", icon="INFO")
+        column.label(text="Keyframes of its handles would bend it once", icon="BLANK1")
+        column.label(text="more, so they are removed. Bake keeps motion.", icon="BLANK1")
+    operator.layout.prop(operator, "keep_keyframes")
+
+
 def _draw(operator, context, names):
     operator.layout.use_property_split = True
     for name in names:
@@ -47,5 +79,14 @@ def _draw(operator, context, names):
 
 # Here, and not when they are registered: it is then that Blender looks whether a class has a layout of its own.
 ApplicationOperator.draw = _draw_tool
-for kind in (MESHFREE_OT_export_points, MESHFREE_OT_import_points, MESHFREE_OT_deform_bake):
+_ASKING = (
+    MESHFREE_OT_export_points,
+    MESHFREE_OT_export_splats,
+    MESHFREE_OT_import_points,
+    MESHFREE_OT_deform_bake,
+    MESHFREE_OT_analyze_sequence,
+    MESHFREE_OT_select_grow,
+)
+for kind in _ASKING:
     kind.draw = _draw_asked
+MESHFREE_OT_deform_apply.draw = _draw_apply

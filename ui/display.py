@@ -4,7 +4,7 @@ import numpy as np
 
 from ..operators.objects.attributes import DISPLACEMENT, DISTANCE, point_count, read_attribute
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, is_display
-from .nodes import ATTRIBUTE, COLORS, DISC_COST, MOST, RANGE
+from .nodes import ATTRIBUTE, COLORS, DISC_COST, DISCS, MOST, RANGE, SOLID_NAME, shows_own
 from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"
@@ -20,6 +20,25 @@ def find_material(obj):
     modifier = find_display(obj)
     material = modifier and get_input(modifier, "Material")
     return material if material is not None and DISPLAY_TAG in material else None
+
+
+def is_colored(obj) -> bool:
+    """Whether an object shows colors that its points have of their own."""
+    return bool(shown_attribute(obj)) and shows_own(find_material(obj))
+
+
+def is_in_solid(obj) -> bool:
+    """Whether viewports in Solid can show the result that an object shows."""
+    modifier = find_display(obj)
+    known = modifier is not None and has_input(modifier.node_group, SOLID_NAME)
+    return known and get_input(modifier, SOLID_NAME) != ""
+
+
+def draws_faces(obj) -> bool:
+    """Whether viewports draw faces of an object, those of a mesh or discs, and no dots."""
+    modifier = find_display(obj)
+    discs = modifier is not None and get_input(modifier, DISCS) and draws_discs(obj)
+    return obj.type == "MESH" and bool(discs or obj.data.polygons)
 
 
 def draws_discs(obj) -> bool:
@@ -50,15 +69,28 @@ def shown_range(obj):
     node = range_node(obj)
     if node is None:
         return None
-    if color_node(obj).color_ramp.interpolation == "CONSTANT":
+    if is_stepped(obj) or shows_zeros(obj):
         return obj.meshfree.range_low, obj.meshfree.range_high
     return node.inputs["From Min"].default_value, node.inputs["From Max"].default_value
+
+
+def shows_zeros(obj) -> bool:
+    """Whether all numbers on show are zero, so that colours have no range."""
+    settings = obj.meshfree
+    if settings.range_mode == "LOCKED" or range_node(obj) is None or is_stepped(obj):
+        return False
+    return settings.range_low == settings.range_high == 0.0
+
+
+def is_stepped(obj) -> bool:
+    """Whether each whole number has a colour of its own, where numbers are shown."""
+    return color_node(obj).color_ramp.interpolation == "CONSTANT"
 
 
 def step_colors(obj) -> dict:
     """Return the colour of each whole number by its name, if each has one of its own; else nothing."""
     node = color_node(obj)
-    if node is None or node.color_ramp.interpolation != "CONSTANT":
+    if node is None or not is_stepped(obj):
         return {}
     colors = [tuple(element.color) for element in node.color_ramp.elements]
     if len(colors) == 2:
@@ -104,6 +136,11 @@ def numbers(values, part: str):
     return None if part == "DIRECTION" else values[:, "XYZ".index(part)]
 
 
+def is_distance(name: str, values, part: str) -> bool:
+    """Whether the numbers shown of an attribute are distances, or lengths of vectors."""
+    return name == DISTANCE or (values.ndim > 1 and part == "LENGTH")
+
+
 def is_texture(values) -> bool:
     """Whether an attribute's values are pairs, as texture coordinates are."""
     return values.ndim == 2 and values.shape[1] == 2
@@ -112,6 +149,19 @@ def is_texture(values) -> bool:
 def without_unreached(name: str, values):
     """Leave out the numbers that say that no source reaches a point, which do not count for the range."""
     return values[values >= 0.0] if name == DISTANCE else values
+
+
+def sloping(name: str, values, part: str) -> list:
+    """Return the numbers to show that change from point to point, (n,) each: two for texture coordinates.
+
+    Labels do not, nor truth values, and directions have colours of their own. Those that no source reaches are NaN.
+    """
+    shown = numbers(values, part)
+    if values.dtype.kind != "f" or (shown is None and not is_texture(values)):
+        return []
+    if shown is None:
+        return list(values.T)
+    return [np.where(shown >= 0.0, shown, np.nan) if name == DISTANCE else shown]
 
 
 def _find_node(obj, name):

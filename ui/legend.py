@@ -1,5 +1,7 @@
 """A legend for renders: the colours on show, their values and a title, fixed in front of a camera."""
 
+from pathlib import Path
+
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
@@ -9,13 +11,15 @@ from .canvas import PLATE_CORNERS
 from .colormaps import to_linear
 from .display import shown_attribute
 from .nodes import add_node, new_tree
-from .plots import legend_picture
+from .plots import HEIGHT, legend_picture
 from .scale import shown_scale
 
 NAME = "Mesh-Free Legend"  # of what is made; found by the marks below, whatever it is called since
 _OF = "meshfree_legend_of"  # custom property of the collection: the object whose colours it explains
 _TITLE = "meshfree_legend_title"  # another one: the name of the attribute, which is the title unless somebody wrote one
 _PART = "meshfree_legend_part"  # custom property of an object in it: what part of the legend it is
+_FONT = "meshfree_legend_font"  # custom property of the font of its texts
+_BUILT_IN = "<builtin>"  # place of the font that new texts have, whose 1 is an I
 _COLOR = "legend_color"  # attribute of the parts
 _HEIGHT, _GAP = 0.7, 0.03  # of the plate, and to the right edge, as shares of the picture's shorter side
 _WIDTH, _EDGE, _FONT_SIZE = 100.0, 6.0, 13.8  # of the plate, beside its texts, and of these, in its own units
@@ -63,8 +67,9 @@ def renew(obj):
         legend = find_legend(scene, obj)
         if legend is None:
             continue
+        legend.hide_viewport = legend.hide_render = shown_scale(obj, scene) is None  # such as for colors of its own
         camera = next((part.parent for part in legend.objects if part.parent is not None), scene.camera)
-        if camera is not None and camera.type == "CAMERA" and shown_attribute(obj):
+        if camera is not None and camera.type == "CAMERA" and not legend.hide_render:
             _fill(legend, scene, obj, camera, written_title(legend))
 
 
@@ -81,6 +86,9 @@ def remove_legend(scene, legend):
         return
     _remove(list(legend.objects))
     bpy.data.collections.remove(legend)
+    fonts = [font for font in bpy.data.fonts if _FONT in font]
+    used = bpy.data.user_map(subset=fonts)  # loaded ones count one user too many
+    bpy.data.batch_remove([font for font in fonts if not used[font]])
 
 
 class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
@@ -108,8 +116,9 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
                 return {"FINISHED"}
             if scene.camera is None:
                 raise PointCloudError("The scene has no camera to put a legend in front of. Add one with Add > Camera.")
-            if not shown_attribute(obj):
-                raise PointCloudError(f'"{obj.name}" shows no colors yet. Choose what to see under Display first.')
+            if shown_scale(obj, scene) is None:
+                what = "its own colors, which stand for no values" if shown_attribute(obj) else "no colors yet"
+                raise PointCloudError(f'"{obj.name}" shows {what}. Choose what to see under Display first.')
         except PointCloudError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -163,6 +172,8 @@ def _fill(collection, scene, obj, camera, title):
         room = picture.width - _EDGE - text.x
         size = min(_FONT_SIZE, room / (0.5 * len(text.text)))
         part.data.body, part.data.size, part.location = text.text, unit * size, place(text.x, text.y)
+        if part.data.font.filepath == _BUILT_IN:
+            part.data.font = _font() or part.data.font
 
 
 def _frame(scene, camera, picture):
@@ -176,7 +187,7 @@ def _frame(scene, camera, picture):
     right, top = (scale * max(corner[axis] for corner in corners) for axis in (0, 1))
     left, bottom = (scale * min(corner[axis] for corner in corners) for axis in (0, 1))
     side = min(right - left, top - bottom)
-    unit = _HEIGHT * side / picture.height
+    unit = _HEIGHT * side / max(picture.height, HEIGHT)
     first_x, first_y = right - _GAP * side - unit * picture.width, 0.5 * (bottom + top - unit * picture.height)
 
     def place(x, y, depth=1.0):
@@ -208,6 +219,18 @@ def _new_part(collection, part):
     obj.visible_shadow = obj.visible_diffuse = obj.visible_glossy = obj.visible_transmission = False
     collection.objects.link(obj)
     return obj
+
+
+def _font():
+    """Return the font of Blender's interface, kept in the file for other machines; None where Blender has it not."""
+    known = next((font for font in bpy.data.fonts if _FONT in font), None)
+    path = Path(bpy.utils.system_resource("DATAFILES", path="fonts")) / "Inter.woff2"
+    if known is not None or not path.is_file():
+        return known
+    font = bpy.data.fonts.load(str(path))
+    font.pack()
+    font[_FONT] = True
+    return font
 
 
 def _remove(parts):

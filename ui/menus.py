@@ -3,10 +3,12 @@
 import bpy
 
 from ..operators.files.importing import OWN
+from ..operators.objects.reading import TYPES
+from .panel import TASKS
 
 _TOOLS = (
-    ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "legend"),
-    ("mesh_surface", "compare"),
+    ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "own_material", "legend"),
+    ("mesh_surface", "iso_lines_to_curves", "compare", "compare_swap"),
     ("principal_curvatures", "roughness", "orient_normals"),
     ("smooth", "mode_shape"),
     ("segment", "separate_by_segment", "signature"),
@@ -14,9 +16,9 @@ _TOOLS = (
     ("signed_distance", "nearest_source", "unwrap", "extend_direction"),
     ("deform_bind", "deform_update", "deform_reset", "deform_apply", "deform_to_shape_key", "deform_unbind"),
     ("deform_bake", "deform_free"),
-    ("apply_to_splats",),
+    ("apply_to_splats", "join_splats"),
     ("minimal_surface",),
-    ("stop",),
+    ("dismiss", "stop"),
 )
 _SELECTING = (
     "select_grow",
@@ -26,6 +28,10 @@ _SELECTING = (
     "select_by_range",
     "select_floaters",
 )
+
+
+# What is done most with points, by right click.
+_QUICK_SELECTING = ("select_grow", "select_component", "select_front")
 
 
 class MESHFREE_MT_object(bpy.types.Menu):
@@ -51,8 +57,12 @@ class MESHFREE_MT_points(bpy.types.Menu):
         for name in _SELECTING:
             self.layout.operator(f"meshfree.{name}")
         self.layout.separator()
-        self.layout.operator_menu_enum("meshfree.group_from_selection", "role")
+        _draw_assign(self.layout)
         self.layout.operator("meshfree.handle_add")
+
+
+def _draw_assign(layout):
+    layout.operator_menu_enum("meshfree.group_from_selection", "role").action = "ADD"
 
 
 def _draw_object(menu, context):
@@ -65,8 +75,33 @@ def _draw_points(menu, context):
     menu.layout.menu(MESHFREE_MT_points.__name__)
 
 
+def _draw_object_quick(menu, context):
+    """Draw what is done most with a cloud, and the menu of all tools; of other meshes the menu alone."""
+    obj, layout = context.object, menu.layout
+    if obj is None or obj.type not in TYPES:
+        return
+    layout.separator()
+    if obj.type != "MESH" or not obj.data.polygons:
+        layout.operator("meshfree.analyze").modes = obj.meshfree.modes
+        for name, text in TASKS:
+            layout.operator(f"meshfree.{name}", text=text).at_once = True
+    layout.menu(MESHFREE_MT_object.__name__)
+
+
+def _draw_points_quick(menu, context):
+    layout = menu.layout
+    layout.separator()
+    if context.object.type != "MESH" or not context.object.data.polygons:
+        for name in _QUICK_SELECTING:
+            layout.operator(f"meshfree.{name}")
+        _draw_assign(layout)
+    layout.menu(MESHFREE_MT_points.__name__)
+
+
 def _draw_import(self, _context):
-    self.layout.operator("meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.csv/.npy)")
+    self.layout.operator(
+        "meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.ptx/.csv/.npy/.splat/.spz)"
+    )
 
 
 def _draw_export(self, _context):
@@ -90,12 +125,21 @@ class MESHFREE_FH_points(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
+_EDITING = {
+    "VIEW3D_MT_edit_mesh": _draw_points,
+    "VIEW3D_MT_edit_pointcloud": _draw_points,
+    "VIEW3D_MT_edit_mesh_context_menu": _draw_points_quick,
+    "VIEW3D_MT_edit_pointcloud_context_menu": _draw_points_quick,
+}
+
+
 def entries():
     """Menus and what is added to them; point clouds have an Edit Mode from Blender 4.5 on."""
     yield bpy.types.VIEW3D_MT_object, _draw_object
-    yield bpy.types.VIEW3D_MT_edit_mesh, _draw_points
-    if hasattr(bpy.types, "VIEW3D_MT_edit_pointcloud"):
-        yield bpy.types.VIEW3D_MT_edit_pointcloud, _draw_points
+    yield bpy.types.VIEW3D_MT_object_context_menu, _draw_object_quick
+    for menu, draw in _EDITING.items():
+        if hasattr(bpy.types, menu):
+            yield getattr(bpy.types, menu), draw
     yield bpy.types.TOPBAR_MT_file_import, _draw_import
     yield bpy.types.TOPBAR_MT_file_export, _draw_export
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 
 from .. import core
+from .wrapping import draw_text
 
 _OURS = "scipy-1.15.*.dist-info"  # what a wheel of the manifest leaves beside the package
 
@@ -52,7 +53,7 @@ class MESHFREE_PT_missing(bpy.types.Panel):
     def draw(self, context):
         column = self.layout.column(align=True)
         for line, icon in zip(_lines(), ("ERROR", "BLANK1", "BLANK1"), strict=True):
-            column.label(text=line, icon=icon)
+            draw_text(column, context, line, icon)
 
 
 CLASSES = (MESHFREE_PT_missing,)

@@ -1,10 +1,11 @@
 """The node trees that make values visible: round points or discs for vertices, strokes, and colours for values."""
 
 import math
+from functools import partial
 
 import bpy
 
-from ..operators.objects.attributes import CORNER, DISC
+from ..operators.objects.attributes import CORNER, DISC, RISE, SLOPE, SLOPE_2, SLOPE_OF, SOLID, TILT
 from ..operators.objects.modifiers import DISPLAY_TAG, add_input, add_node, has_input, is_intact, new_group
 from ..operators.objects.splats import BASE, HARMONIC, ROTATION, SCALE
 from . import colormaps
@@ -15,12 +16,16 @@ DISCS = "Discs"  # another: whether it draws discs
 STROKES = "Strokes"  # another: the attribute that has them
 FILLED = "Filled"  # another: whether dots are as large as discs
 SPLATS = "Splats"  # another: whether it draws their ellipsoids
+SMOOTH = "Smooth"  # another: the attribute that changes within discs
+SOLID_NAME = "Solid Colors"  # another: the color attribute that viewports in Solid look at
 LENGTH, INK = "Stroke Length", "Stroke Material"  # others: what they look like
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
 BACK = "Back Side"  # another: how dark what is seen from behind is
+EVEN = "Even Lines"  # another: how wide a line is by the slope
+LIT = "Unlit"  # another: how much of the color is flat
 DISC_COST = 2  # dots that take as long to draw without a graphics card as one disc
-_SIDES = 8  # of a disc
+_SIDES = 6  # of a disc
 _SLOPE = 0.25  # by which discs fall off from their points, so that each place shows the point nearest to it
 _SHARE = 1.0 / 40.0  # length of strokes in the diagonal of the object, so that they are seen where all of it is
 _LEAST = 2.0  # that length in radii of the points at least
@@ -32,13 +37,16 @@ _INK = (0.012, 0.012, 0.016, 1.0)  # color of strokes
 _INK_TAG = "meshfree_strokes"  # custom property of the material of strokes
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
-_BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
+_ROUNDING = 1e-5  # share by which values may differ that are the same
+_BROADEST = 0.3  # of that, half of it, where steps are narrow
+BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
 _DIM = 0.85  # how dark the back side becomes where it is dimmed
 _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but groups
+_COLORED = "COLOR"  # where points have colors of their own
 _CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
 CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
 _DEVIATIONS = 2.0  # standard deviations at which the ellipsoid of a splat ends
-_UNSEEN = f"{HARMONIC}*", "ply_*", "lb_*"  # attributes of splats that do not show
+_UNSEEN = f"{HARMONIC}*", "ply_*", ".splat_*", "lb_*"  # attributes of splats that do not show
 _SPLATTED, _CONSTANT = "SPLATS", 0.28209479  # the harmonic of degree 0
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
@@ -46,7 +54,7 @@ _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 def display_group():
     """Return the node group that all displays share: round points where there are no faces, and the material."""
     for group in bpy.data.node_groups:
-        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, SPLATS):
+        if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, SOLID_NAME):
             return group
     group = new_group("Mesh-Free Display", DISPLAY_TAG)
     radius = add_input(group, "Radius", "Float", "Size of the points")
@@ -62,6 +70,15 @@ def display_group():
     add_input(group, FILLED, "Bool", f"Draw dots as large as the discs of {DISC}, so that they leave no holes")
     add_input(group, SPLATS, "Bool", f"Draw ellipsoids, as the attributes {SCALE} and {ROTATION} say")
     add_input(
+        group,
+        SMOOTH,
+        "String",
+        "Attribute that changes within discs, by its slopes along the surface; empty for none",
+    )
+    add_input(
+        group, SOLID_NAME, "String", "Color attribute that gets the colors of what is shown, for Solid; empty for none"
+    )
+    add_input(
         group, STROKES, "String", "Attribute with directions along the surface, which strokes show; empty for none"
     )
     length = add_input(group, LENGTH, "Float", "Length of the strokes, 1 for a fortieth of the object")
@@ -73,6 +90,7 @@ def display_group():
     loose = add_node(group, "FunctionNodeCompare", 1, -200, data_type="INT", operation="EQUAL")
     parts = add_node(group, "GeometryNodeSeparateComponents", 1, 0)
     drawn, larger, many = _thinned(group, given, parts)
+    disc_of = partial(_with_active_color, group, parts.outputs["Mesh"], loose.outputs["Result"])
     chosen = add_node(group, "FunctionNodeBooleanMath", 2, -400, operation="AND")
     size = add_node(group, "ShaderNodeMath", 2, -600, operation="MULTIPLY")
     points = add_node(group, "GeometryNodeMeshToPoints", 3, -100)
@@ -101,11 +119,11 @@ def display_group():
         (given_drawn.outputs["Selection"], every.inputs["Geometry"]),
         (size.outputs[0], points.inputs["Radius"]),
         (points.outputs["Points"], every.inputs["Geometry"]),
-        (_shaped(group, given, every.outputs["Geometry"], size.outputs[0], many), joined.inputs["Geometry"]),
+        (_shaped(group, given, disc_of, every.outputs["Geometry"], size.outputs[0], many), joined.inputs["Geometry"]),
         (loose.outputs["Result"], faces.inputs["Selection"]),
         (parts.outputs["Mesh"], faces.inputs["Geometry"]),
         (faces.outputs["Geometry"], joined.inputs["Geometry"]),
-        (joined.outputs["Geometry"], colored.inputs["Geometry"]),
+        (_in_solid(group, given, joined.outputs["Geometry"]), colored.inputs["Geometry"]),
         (given.outputs["Material"], colored.inputs["Material"]),
         (colored.outputs["Geometry"], drawn_over.inputs["Geometry"]),
         (_stroked(group, given, every.outputs["Geometry"]), drawn_over.inputs["Geometry"]),
@@ -144,18 +162,8 @@ def _thinned(group, given, parts):
     return drawn, _math(group, 6, -600, "POWER", share, -0.5), _math(group, 6, -1400, "MULTIPLY", costly, limited)
 
 
-def _shaped(group, given, points, size, many):
-    """Add the nodes that make points into discs where that is asked for and they are not many; return what is drawn.
-
-    Flat discs stick out of each other where the surface bends outwards, like scales; cones as flat as these do not.
-    """
-    cone = add_node(group, "GeometryNodeMeshCone", 5, -700, fill_type="NONE")
-    cone.inputs["Vertices"].default_value = _SIDES
-    cone.inputs["Radius Top"].default_value = 0.0
-    cone.inputs["Radius Bottom"].default_value = 1.0 / math.cos(math.pi / _SIDES)  # no less than a disc
-    cone.inputs["Depth"].default_value = _SLOPE
-    lowered = add_node(group, "GeometryNodeTransform", 6, -700)
-    lowered.inputs["Translation"].default_value = 0.0, 0.0, -_SLOPE
+def _shaped(group, given, disc_of, points, size, many):
+    """Add the nodes that make points into discs where that is asked for and they are not many; return what is drawn."""
     disc = add_node(group, "GeometryNodeInputNamedAttribute", 5, -500, data_type="FLOAT_VECTOR")
     disc.inputs["Name"].default_value = DISC
     turned = add_node(group, "FunctionNodeAlignRotationToVector", 6, -500, axis="Z")
@@ -173,9 +181,8 @@ def _shaped(group, given, points, size, many):
     for source, target in (
         (disc.outputs["Attribute"], turned.inputs["Vector"]),
         (disc.outputs["Attribute"], length.inputs[0]),
-        (points, placed.inputs["Points"]),
-        (cone.outputs["Mesh"], lowered.inputs["Geometry"]),
-        (lowered.outputs["Geometry"], placed.inputs["Instance"]),
+        (_with_middles(group, given, points), placed.inputs["Points"]),
+        (disc_of(_disc(group)), placed.inputs["Instance"]),
         (turned.outputs["Rotation"], placed.inputs["Rotation"]),
         (scale, placed.inputs["Scale"]),
         (given.outputs[DISCS], discs.inputs[0]),
@@ -186,13 +193,191 @@ def _shaped(group, given, points, size, many):
         (points, dots.inputs["Points"]),
         (_math(group, 9, -700, "MULTIPLY", larger.outputs["Result"], size), dots.inputs["Radius"]),
         (dots.outputs["Points"], chosen.inputs["False"]),
-        (_corners(group, 8, -300, placed.outputs["Instances"]), chosen.inputs["True"]),
+        (_rising(group, given, _corners(group, 8, -300, placed.outputs["Instances"])), chosen.inputs["True"]),
         (given.outputs[SPLATS], splats.inputs["Switch"]),
         (chosen.outputs["Output"], splats.inputs["False"]),
         (_ellipsoids(group, points), splats.inputs["True"]),
     ):
         group.links.new(source, target)
     return splats.outputs["Output"]
+
+
+def _disc(group):
+    """Add the nodes that make a disc of radius 1 in the plane z = 0; return it.
+
+    Flat discs stick out of each other where the surface bends outwards, like scales; cones as flat as these do not. A
+    second cone that hangs from the rim of the first lets all normals be that of the disc, by which Solid shades.
+    """
+    cones = []
+    for row, (top, bottom, low) in enumerate(((0.0, 1.0, -_SLOPE), (1.0, 0.0, -2.0 * _SLOPE))):
+        cone = add_node(group, "GeometryNodeMeshCone", 4, -700 - 300 * row, fill_type="NONE")
+        cone.inputs["Vertices"].default_value, cone.inputs["Depth"].default_value = _SIDES, _SLOPE
+        for name, radius in (("Radius Top", top), ("Radius Bottom", bottom)):
+            cone.inputs[name].default_value = radius / math.cos(math.pi / _SIDES)  # no less than a disc
+        lowered = add_node(group, "GeometryNodeTransform", 5, -700 - 300 * row)
+        lowered.inputs["Translation"].default_value = 0.0, 0.0, low
+        group.links.new(cone.outputs["Mesh"], lowered.inputs["Geometry"])
+        cones.append(lowered.outputs["Geometry"])
+    upwards = add_node(group, "GeometryNodeFlipFaces", 6, -1000)
+    joined = add_node(group, "GeometryNodeJoinGeometry", 6, -700)
+    merged = add_node(group, "GeometryNodeMergeByDistance", 7, -700)
+    smooth = add_node(group, "GeometryNodeSetShadeSmooth", 8, -700)
+    for source, target in (
+        (cones[1], upwards.inputs[0]),
+        (cones[0], joined.inputs[0]),
+        (upwards.outputs[0], joined.inputs[0]),
+        (joined.outputs[0], merged.inputs["Geometry"]),
+        (merged.outputs[0], smooth.inputs[0]),
+    ):
+        group.links.new(source, target)
+    return smooth.outputs[0]
+
+
+def _with_active_color(group, mesh, loose, disc):
+    """Add the nodes that tell a disc which color attribute of a mesh is active, the one that Solid shows; return it.
+
+    The name comes along with the first of the meshes that are joined: here one vertex without any values, which goes.
+    """
+    place = add_node(group, "GeometryNodeInputIndex", 2, 400)
+    first = _math(group, 3, 400, "LESS_THAN", place.outputs[0], 0.5)
+    alone = add_node(group, "GeometryNodeSeparateGeometry", 4, 400)
+    joined = add_node(group, "GeometryNodeJoinGeometry", 6, 400)
+    left = add_node(group, "GeometryNodeDeleteGeometry", 7, 400)
+    for source, target in (
+        (mesh, alone.inputs["Geometry"]),
+        (first, alone.inputs["Selection"]),
+        (disc, joined.inputs[0]),
+        (_without(group, 5, 400, alone.outputs["Selection"], "*"), joined.inputs[0]),  # the later link is the first
+        (joined.outputs[0], left.inputs["Geometry"]),
+        (loose, left.inputs["Selection"]),
+    ):
+        group.links.new(source, target)
+    return left.outputs["Geometry"]
+
+
+def _without(group, column, y, geometry, names):
+    """Add a node that removes the attributes whose names fit; return what is left."""
+    removed = add_node(group, "GeometryNodeRemoveAttribute", column, y)
+    if "Pattern Mode" in removed.inputs:  # since Blender 5
+        removed.inputs["Pattern Mode"].default_value = "Wildcard"
+    else:
+        removed.pattern_mode = "WILDCARD"
+    removed.inputs["Name"].default_value = names
+    group.links.new(geometry, removed.inputs["Geometry"])
+    return removed.outputs["Geometry"]
+
+
+def _with_middles(group, given, points):
+    """Add the nodes that let points know their places, which the corners of their discs get too; return the points."""
+    place = add_node(group, "GeometryNodeInputPosition", 5, -2300)
+    stored, value = _stored(group, 6, -2300, RISE, "FLOAT_VECTOR")
+    group.links.new(points, stored.inputs["Geometry"])
+    group.links.new(place.outputs["Position"], value)
+    return _where_named(group, given, SMOOTH, 7, -2300, points, stored.outputs["Geometry"])
+
+
+def _rising(group, given, corners):
+    """Add the nodes that tell by how much what is shown rises from the middle of a disc to each corner.
+
+    That of texture coordinates is x and y; that of a number is x, with y how steep it is, and z to tell that it is
+    known. All is zero where values have changed since their slopes were found.
+    """
+    middle, first, second = (
+        _named(group, 8, -2300 - 200 * row, name) for row, name in enumerate((RISE, SLOPE, SLOPE_2))
+    )
+    place = add_node(group, "GeometryNodeInputPosition", 8, -2900)
+    step = add_node(group, "ShaderNodeVectorMath", 9, -2300, operation="SUBTRACT")
+    along, across = (
+        add_node(group, "ShaderNodeVectorMath", 10, -2300 - 200 * row, operation="DOT_PRODUCT") for row in range(2)
+    )
+    steep = add_node(group, "ShaderNodeVectorMath", 10, -2700, operation="LENGTH")
+    single = _math(group, 10, -2900, "SUBTRACT", 1.0, second.outputs["Exists"])
+    combined = add_node(group, "ShaderNodeCombineXYZ", 12, -2300)
+    valid = add_node(group, "ShaderNodeVectorMath", 13, -2500, operation="SCALE")
+    stored, value = _stored(group, 14, -2300, RISE, "FLOAT_VECTOR")
+    steep_or_none = _math(group, 11, -2700, "MULTIPLY", steep.outputs["Value"], single)
+    for source, target in (
+        (place.outputs["Position"], step.inputs[0]),
+        (middle.outputs["Attribute"], step.inputs[1]),
+        (step.outputs[0], along.inputs[0]),
+        (step.outputs[0], across.inputs[0]),
+        (first.outputs["Attribute"], along.inputs[1]),
+        (second.outputs["Attribute"], across.inputs[1]),
+        (first.outputs["Attribute"], steep.inputs[0]),
+        (along.outputs["Value"], combined.inputs["X"]),
+        (_math(group, 11, -2500, "ADD", across.outputs["Value"], steep_or_none), combined.inputs["Y"]),
+        (single, combined.inputs["Z"]),
+        (combined.outputs[0], valid.inputs[0]),
+        (_unchanged(group, given), valid.inputs["Scale"]),
+        (corners, stored.inputs["Geometry"]),
+        (valid.outputs[0], value),
+    ):
+        group.links.new(source, target)
+    return _where_named(group, given, SMOOTH, 15, -2300, corners, stored.outputs["Geometry"])
+
+
+def _unchanged(group, given):
+    """Add the nodes that tell whether an attribute has the values that slopes were found of; return that, 1 or 0."""
+    now, then = (_named(group, 9, -3100 - 200 * row, SLOPE_OF, "FLOAT") for row in range(2))
+    group.links.new(given.outputs[SMOOTH], now.inputs["Name"])
+    same = _math(group, 11, -3100, "COMPARE", now.outputs["Attribute"], then.outputs["Attribute"])
+    size = _math(group, 10, -3300, "ABSOLUTE", then.outputs["Attribute"])
+    group.links.new(_math(group, 10, -3500, "MULTIPLY", size, _ROUNDING), same.node.inputs[2])
+    return _math(group, 12, -3100, "MULTIPLY", same, then.outputs["Exists"])
+
+
+def _in_solid(group, given, geometry):
+    """Add the nodes that put the colors of what is shown where viewports in Solid look for colors; return the geometry.
+
+    Along a disc they change as fast as between its middle and its edge.
+    """
+    color = _named(group, 9, 300, SOLID, "FLOAT_COLOR")
+    tilt, rise = _named(group, 9, 500, TILT), _named(group, 9, 700, RISE)
+    parts = add_node(group, "ShaderNodeSeparateXYZ", 10, 700)
+    change = add_node(group, "ShaderNodeVectorMath", 11, 500, operation="SCALE")
+    shown = add_node(group, "ShaderNodeVectorMath", 12, 300, operation="ADD")
+    stored, value = _stored(group, 13, 300, "", "FLOAT_COLOR")
+    for source, target in (
+        (rise.outputs["Attribute"], parts.inputs[0]),
+        (tilt.outputs["Attribute"], change.inputs[0]),
+        (parts.outputs["X"], change.inputs["Scale"]),
+        (color.outputs["Attribute"], shown.inputs[0]),
+        (change.outputs[0], shown.inputs[1]),
+        (given.outputs[SOLID_NAME], stored.inputs["Name"]),
+        (geometry, stored.inputs["Geometry"]),
+        (shown.outputs[0], value),
+    ):
+        group.links.new(source, target)
+    return _where_named(group, given, SOLID_NAME, 14, 300, geometry, stored.outputs["Geometry"])
+
+
+def _where_named(group, given, name, column, y, plain, other):
+    """Add nodes that take the other geometry where an input of the display names something; else it costs no time."""
+    asked = add_node(group, "FunctionNodeCompare", column, y - 200, data_type="STRING", operation="NOT_EQUAL")
+    chosen = add_node(group, "GeometryNodeSwitch", column, y, input_type="GEOMETRY")
+    for source, target in (
+        (given.outputs[name], next(item for item in asked.inputs if item.name == "A" and item.type == "STRING")),
+        (asked.outputs["Result"], chosen.inputs["Switch"]),
+        (plain, chosen.inputs["False"]),
+        (other, chosen.inputs["True"]),
+    ):
+        group.links.new(source, target)
+    return chosen.outputs["Output"]
+
+
+def _named(group, column, y, name, data_type="FLOAT_VECTOR"):
+    """Add a node that reads an attribute; return it."""
+    node = add_node(group, "GeometryNodeInputNamedAttribute", column, y, data_type=data_type)
+    node.inputs["Name"].default_value = name
+    return node
+
+
+def _stored(group, column, y, name, data_type):
+    """Add a node that keeps an attribute; return it, and its input for the values."""
+    node = add_node(group, "GeometryNodeStoreNamedAttribute", column, y, data_type=data_type)
+    node.inputs["Name"].default_value = name
+    kind = {"FLOAT_VECTOR": "VECTOR", "FLOAT_COLOR": "RGBA"}.get(data_type, data_type)
+    return node, next(socket for socket in node.inputs if socket.name == "Value" and socket.type == kind)
 
 
 def _ellipsoids(group, points):
@@ -206,14 +391,7 @@ def _ellipsoids(group, points):
     rotation.inputs["Name"].default_value = ROTATION
     placed = add_node(group, "GeometryNodeInstanceOnPoints", 7, -1700)
     for row, names in enumerate(_UNSEEN):  # or each corner would get a copy
-        removed = add_node(group, "GeometryNodeRemoveAttribute", 4, -1500 - 200 * row)
-        if "Pattern Mode" in removed.inputs:  # since Blender 5
-            removed.inputs["Pattern Mode"].default_value = "Wildcard"
-        else:
-            removed.pattern_mode = "WILDCARD"
-        removed.inputs["Name"].default_value = names
-        group.links.new(points, removed.inputs["Geometry"])
-        points = removed.outputs["Geometry"]
+        points = _without(group, 4, -1500 - 200 * row, points, names)
     for source, target in (
         (ball.outputs["Mesh"], smooth.inputs[0]),
         (points, placed.inputs["Points"]),
@@ -228,9 +406,8 @@ def _ellipsoids(group, points):
 def _corners(group, column, y, instances):
     """Add the nodes that make instances real, and mark their corners, which are no points."""
     realized = add_node(group, "GeometryNodeRealizeInstances", column, y)
-    marked = add_node(group, "GeometryNodeStoreNamedAttribute", column, y - 200, data_type="BOOLEAN")
-    marked.inputs["Name"].default_value = CORNER
-    next(socket for socket in marked.inputs if socket.name == "Value" and socket.type == "BOOLEAN").default_value = True
+    marked, value = _stored(group, column, y - 200, CORNER, "BOOLEAN")
+    value.default_value = True
     group.links.new(instances, realized.inputs["Geometry"])
     group.links.new(realized.outputs["Geometry"], marked.inputs["Geometry"])
     return marked.outputs["Geometry"]
@@ -342,7 +519,11 @@ def stroke_material():
 def color_plain(material, groups):
     """Let a material show nothing but groups, see `color_by_number`."""
     kind = f"{_PLAIN} {groups}"
-    if material.get(_KIND) != kind or material.node_tree is None or BACK not in material.node_tree.nodes:
+    if (
+        material.get(_KIND) != kind
+        or material.node_tree is None
+        or not {BACK, LIT} <= set(material.node_tree.nodes.keys())
+    ):
         gray = add_node(new_tree(material), "ShaderNodeRGB", 0, 0)
         gray.outputs[0].default_value = _GRAY
         _shine(material.node_tree, gray.outputs[0], groups)
@@ -389,6 +570,11 @@ def color_splats(material):
     material[_KIND] = _SPLATTED
 
 
+def shade(material, lit):
+    """Let a material show how the surface is lit, from not at all at 0 to nothing but that at 1."""
+    material.node_tree.nodes[LIT].inputs[0].default_value = 1.0 - lit
+
+
 def dim_back(material, dimmed):
     """Let a material show what is seen from behind darker, such as the inside of an open scan, or alike."""
     material.node_tree.nodes[BACK].inputs[1].default_value = _DIM if dimmed else 0.0
@@ -416,9 +602,28 @@ def color_by_checker(material, name, groups):
         # Across the planes between checks rounding would decide.
         level = add_node(tree, "ShaderNodeVectorMath", 1, -300, operation="ADD")
         level.inputs[1].default_value = 0.0, 0.0, 0.5 / _CHECKS
-        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], level.inputs[0])
+        rising = add_node(tree, "ShaderNodeVectorMath", 1, -500, operation="ADD")
+        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], rising.inputs[0])
+        tree.links.new(_rise(tree).outputs["Vector"], rising.inputs[1])
+        tree.links.new(rising.outputs[0], level.inputs[0])
         tree.links.new(level.outputs[0], checker.inputs["Vector"])
         _shine(tree, checker.outputs["Color"], groups)
+
+
+def color_by_own(material, name, groups):
+    """Let a material show the colors that an attribute holds, and groups as in `color_by_number`."""
+    if _begin(material, name, f"{_COLORED} {groups}"):
+        _shine(material.node_tree, material.node_tree.nodes[ATTRIBUTE].outputs["Color"], groups)
+
+
+def shows_own(material) -> bool:
+    """Whether a material shows colors that points have of their own."""
+    return material.get(_KIND, "").startswith(_COLORED)
+
+
+def _rise(tree):
+    """Add the node that reads by how much what is shown rises within a disc; zero where nothing does."""
+    return add_node(tree, "ShaderNodeAttribute", 0, -500, attribute_name=RISE, name="Rise")
 
 
 def is_checkered(material) -> bool:
@@ -426,7 +631,7 @@ def is_checkered(material) -> bool:
     return material.get(_KIND, "").startswith(_CHECKERED)
 
 
-def color_by_number(material, name, component, color_map, low, high, settings, groups):
+def color_by_number(material, name, component, color_map, low, high, settings, groups, width=0.0):
     """Let a material show numbers as colours; only values of its nodes change where it did so before.
 
     Parameters
@@ -444,10 +649,12 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
         Reverse, iso lines, and what becomes of numbers beyond the range.
     groups : dict of str to tuple
         Names of groups, whose points have these colours instead; (r, g, b, 1), linear.
+    width : float
+        Of iso lines in local lengths, where slopes are known.
     """
     stepped = color_map in STEPPED
     repeated, hiding = color_map == "CATEGORICAL", settings.outside == "HIDE"
-    needed = (RANGE, COLORS, LINES, BELOW, ABOVE) if hiding else (RANGE, COLORS, LINES, BELOW, ABOVE, GRAY)
+    needed = (RANGE, COLORS, LINES, EVEN, BELOW, ABOVE, *(() if hiding else (GRAY,)))
     if _begin(material, name, f"{component} {repeated} {hiding} {groups}", needed):
         _build_number_tree(material.node_tree, component, repeated, hiding, groups)
     nodes = material.node_tree.nodes
@@ -459,6 +666,7 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
     ramp.interpolation = "CONSTANT" if stepped else "LINEAR"
     _set_colors(ramp.elements, colors, last=len(colors) if stepped else len(colors) - 1)
     nodes[LINES].inputs[1].default_value = 0 if stepped else settings.iso_lines
+    nodes[EVEN].inputs[1].default_value = 0 if stepped else 0.5 * width * settings.iso_lines / (high - low)
     nodes[BELOW].inputs[1].default_value = low - 0.5 if stepped else low
     nodes[ABOVE].inputs[1].default_value = high + 0.5 if stepped else high
     if not hiding:
@@ -470,7 +678,7 @@ def _begin(material, name, kind, needed=()):
 
     So it is where its nodes were of another kind, or somebody has deleted one that is needed.
     """
-    fits = material.get(_KIND) == kind and {ATTRIBUTE, BACK, *needed} <= set(material.node_tree.nodes.keys())
+    fits = material.get(_KIND) == kind and {ATTRIBUTE, BACK, LIT, *needed} <= set(material.node_tree.nodes.keys())
     if not fits:
         add_node(new_tree(material), "ShaderNodeAttribute", 0, 0, name=ATTRIBUTE)
         material[_KIND] = kind
@@ -491,7 +699,9 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
         separate = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0)
         tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], separate.inputs[0])
         number = separate.outputs[component]
-    place = number
+    rise = add_node(tree, "ShaderNodeSeparateXYZ", 1, -500)
+    tree.links.new(_rise(tree).outputs["Vector"], rise.inputs[0])
+    place = number = _math(tree, 2, 0, "ADD", number, rise.outputs["X"])
     if repeated:  # -1 and below have one colour, 0 and above repeat; on discs Cycles gives a little less than 7 for 7
         whole = _math(tree, 1, 400, "ROUND", number)
         place = _math(tree, 2, 200, "MODULO", _math(tree, 1, 200, "MAXIMUM", whole, -1.0), CLASSES)
@@ -501,8 +711,12 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
     tree.links.new(bounds.outputs["Result"], ramp.inputs[0])
     # Lines in the middle of so many even steps of the range, where values beyond it end.
     part = _math(tree, 5, -300, "FRACT", _math(tree, 4, -300, "MULTIPLY", bounds.outputs["Result"], name=LINES))
+    even = _math(tree, 3, -1000, "MULTIPLY", rise.outputs["Y"], name=EVEN)
+    even = _math(tree, 4, -1000, "MINIMUM", even, _BROADEST)
+    unknown = _math(tree, 3, -1200, "SUBTRACT", 1.0, rise.outputs["Z"])
+    share = _math(tree, 4, -1200, "MULTIPLY", unknown, 0.5 * _LINE)
     line = _math(tree, 6, -300, "COMPARE", part, 0.5)
-    line.node.inputs[2].default_value = 0.5 * _LINE
+    tree.links.new(_math(tree, 5, -1000, "ADD", even, share), line.node.inputs[2])
     color = _mix(tree, 7, line, ramp.outputs["Color"], _DARK)
     below = _math(tree, 4, -600, "LESS_THAN", number, name=BELOW)
     above = _math(tree, 4, -800, "GREATER_THAN", number, name=ABOVE)
@@ -510,14 +724,14 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
     if hiding:
         _shine(tree, color, groups, hidden=beyond)
     else:
-        _shine(tree, _mix(tree, 8, _math(tree, 6, -600, "MULTIPLY", beyond, name=GRAY), color, _BEYOND), groups)
+        _shine(tree, _mix(tree, 8, _math(tree, 6, -600, "MULTIPLY", beyond, name=GRAY), color, BEYOND), groups)
 
 
 def _shine(tree, color, groups, hidden=None):
     """Give the surface a colour, and points of groups theirs; nothing is seen where a number, if there is one, is 1.
 
-    Mostly emission, so that colours read as in the legend; some diffuse light, so that shapes show. For the back side
-    see `dim_back`.
+    By emission, so that colours read as in the legend, and by diffuse light, so that shapes show: see `shade` for their
+    shares, and `dim_back` for the back side.
     """
     column = 9
     for name, group_color in groups.items():
@@ -528,13 +742,12 @@ def _shine(tree, color, groups, hidden=None):
     column += 2 if groups else 0
     seen = add_node(tree, "ShaderNodeNewGeometry", column, -900)
     behind = _math(tree, column + 1, -900, "MULTIPLY", seen.outputs["Backfacing"], name=BACK)
-    color = _mix(tree, column + 2, behind, color, _BEYOND)
+    color = _mix(tree, column + 2, behind, color, BEYOND)
     column += 3
     diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", column, 100)
     _light_discs(tree, column - 3, diffuse)
     emission = add_node(tree, "ShaderNodeEmission", column, -100)
-    mixed = add_node(tree, "ShaderNodeMixShader", column + 1, 0)
-    mixed.inputs[0].default_value = 0.6
+    mixed = add_node(tree, "ShaderNodeMixShader", column + 1, 0, name=LIT)
     output = add_node(tree, "ShaderNodeOutputMaterial", column + 3, 0)
     tree.links.new(color, diffuse.inputs["Color"])
     tree.links.new(color, emission.inputs["Color"])
@@ -623,7 +836,7 @@ def _direction_color(tree, vector):
 
 
 def direction_color(direction):
-    """Colour of a unit vector as linear (r, g, b, 1)."""
+    """Colour of a unit vector, or of the three columns of such, as linear (r, g, b, 1)."""
     return (*((0.5 * value + 0.5) ** _GAMMA for value in direction), 1.0)
 
 

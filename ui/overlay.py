@@ -1,21 +1,24 @@
-"""Draws the legend, the histogram and the eigenvalues of the active object over the 3D view."""
+"""Draws the legend, the histogram and the eigenvalues of the active object, or of its handle's, over the 3D view."""
 
 import zlib
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 
 from ..core import PointCloudError
+from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import mode_number
 from ..operators.objects.result import read_eigenvalues
 from . import canvas, plots
-from .display import range_node, shown_attribute, shown_values, without_unreached
+from .display import find_display, is_in_solid, range_node, shown_attribute, shown_values, without_unreached
 from .scale import shown_scale
 from .units import EIGENVALUE_POWER, unit
 from .value_range import histogram
 
 _GAP = 10.0  # between pictures, and to the border
 _GIZMOS = 80.0  # width of the view's own controls, at the right edge above the lowest row
+_CORNER = (1.0, 0.0)  # where a legend lies that nobody has moved, beside the other pictures
 _handlers = []
 _counted = {}  # the last histogram, by what it is of
 
@@ -33,12 +36,11 @@ def detach():
     _counted.clear()
 
 
-def pictures(obj, scene) -> list:
-    """Return what is to be drawn for an object, the rightmost first."""
-    settings, found = obj.meshfree, []
-    scale = shown_scale(obj, scene)
-    if scale is not None and settings.legend:
-        found.append(plots.legend_picture(scale))
+def pictures(obj, scene, colored=True) -> list:
+    """Return what is to be drawn for an object whose colors are seen or not, the rightmost first."""
+    settings = obj.meshfree
+    scale = shown_scale(obj, scene) if colored else None
+    found = [plots.legend_picture(scale)] if scale is not None and settings.legend else []
     if scale is not None and settings.histogram and range_node(obj) is not None and obj.mode != "EDIT":
         counted = _histogram(obj, scale)
         if counted is not None:
@@ -112,19 +114,59 @@ def _free_room(area, region):
     return left, bottom, right, top
 
 
-def _draw():
-    context = bpy.context
-    obj = context.object
-    if obj is None or not context.space_data.overlay.show_overlays or not obj.visible_get():
-        return
-    found = pictures(obj, context.scene)
-    if not found:
-        return
+def shows_colors(obj, shading) -> bool:
+    """Whether a view with some shading shows the colors of an object's points."""
+    modifier = find_display(obj)
+    if modifier is None or not modifier.show_viewport or (obj.mode == "EDIT" and not modifier.show_in_editmode):
+        return False
+    return shading.type in {"MATERIAL", "RENDERED"} or (
+        shading.type == "SOLID" and shading.color_type == "VERTEX" and is_in_solid(obj)
+    )
+
+
+def drawn_object(context):
+    """Return the object that pictures are drawn of over the view of a context, or None."""
+    obj = handled_object(context.object, context.scene)
+    seen = obj is not None and context.space_data.overlay.show_overlays and obj.visible_get()
+    return obj if seen else None
+
+
+class Placed(NamedTuple):
+    """A legend over a view, in pixels of its region: the room that it may be in, and its size, both with a gap."""
+
+    room: tuple  # left, bottom, right, top
+    size: tuple
+
+    def corner(self, shares):
+        """Return the lower left corner by the shares of the way from left to right and from bottom to top."""
+        return tuple(self.room[axis] + share * self._way(axis) for axis, share in enumerate(shares))
+
+    def shares(self, corner):
+        """Return the shares of a lower left corner, from 0 to 1."""
+        return [min(max((corner[axis] - self.room[axis]) / self._way(axis), 0.0), 1.0) for axis in (0, 1)]
+
+    def _way(self, axis):
+        return max(self.room[axis + 2] - self.room[axis] - self.size[axis], 1.0)
+
+
+def in_view(context, obj):
+    """Return the pictures over a view with their lower left corners, None for no room, and how a legend is placed."""
+    found = pictures(obj, context.scene, shows_colors(obj, context.space_data.shading))
     scale = context.preferences.system.ui_scale
     gap = scale * _GAP
     left, bottom, right, top = _free_room(context.area, context.region)
+    room = left + gap, bottom + gap, right, top
     sizes = [(scale * picture.width + gap, scale * picture.height + gap) for picture in found]
-    places = arrange(sizes, left + gap, bottom + gap, right, top, indent=scale * _GIZMOS)
-    for picture, place in zip(found, places, strict=True):
-        if place is not None:
-            canvas.draw(picture, *place, scale)
+    shares = tuple(obj.meshfree.legend_place)
+    moved = found and found[0].movable and shares != _CORNER
+    corners = arrange(sizes[1:] if moved else sizes, *room, indent=scale * _GIZMOS)
+    placed = Placed(room, sizes[0]) if found and found[0].movable else None
+    return list(zip(found, [placed.corner(shares), *corners] if moved else corners, strict=True)), placed
+
+
+def _draw():
+    context = bpy.context
+    obj = drawn_object(context)
+    for picture, corner in in_view(context, obj)[0] if obj is not None else ():
+        if corner is not None:
+            canvas.draw(picture, *corner, context.preferences.system.ui_scale)

@@ -6,26 +6,40 @@ from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import (
     ALONG_SURFACE,
     APPLICATIONS,
+    DEVIATION,
     DISC,
     RESULTS,
     eigenvector_name,
     mode_number,
     point_count,
 )
+from ..operators.objects.colors import own_colors, own_material, shows_own_material
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
-from ..operators.objects.splats import has_splats
+from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..operators.running.job import running
 from .dialogs import draw_setting
-from .display import draws_discs, find_display, label, range_node, shown_attribute, step_colors
+from .display import (
+    draws_discs,
+    find_display,
+    label,
+    range_node,
+    shown_attribute,
+    shows_zeros,
+    step_colors,
+)
 from .legend import find_legend
 from .nodes import LENGTH, MOST
+from .scale import shown_scale
+from .wrapping import beside_or_below, draw_text, split_properties
 
 _LISTED = 20  # eigenvalues in the panel
+_NOTICES = 6  # there at a time
+_CROSS = 44.0  # width of the cross beside a notice, and of the box around it
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
-_TASKS = (  # that one click does, each with its defaults
+TASKS = (  # that one click does, each with its defaults
     ("smooth", "Clean"),
     ("segment", "Segment"),
     ("principal_curvatures", "Curvature"),
@@ -58,6 +72,15 @@ class ReadyPanel(SidebarPanel):
         return not obstacle(context.object)
 
 
+class PropertiesPanel:
+    """A panel in the tab of the object in the Properties editor, with what one in the sidebar has."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
+
+
 class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
     """The object, and the button that analyzes it"""
 
@@ -68,50 +91,81 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         obj = context.object
         job = running()
         if job is not None:
-            _draw_job(layout, job)
+            _draw_job(layout, context, job)
         reason = obstacle(obj)
         handled = handled_object(obj, context.scene)
         if reason and handled != obj:
             column = layout.column(align=True)
-            column.label(text=f'Handle of "{handled.name}"', icon="OUTLINER_OB_EMPTY")
-            column.label(text="G moves it, R turns it", icon="BLANK1")
+            draw_text(column, context, f'Handle of "{handled.name}"', "OUTLINER_OB_EMPTY")
+            draw_text(column, context, "G moves it, R turns it", "BLANK1")
             return  # the panel of the deformation tells more
         if reason:
             column = layout.column(align=True)
             for sentence in (reason if obstacle(obj, ("EDIT",)) else _EDITING).split(". "):
-                column.label(text=sentence)
+                draw_text(column, context, sentence)
+            _draw_notices(layout, context, obj)
             if obj is not None and any(map(is_sequence, obj.modifiers)):
                 layout.operator("meshfree.analyze_sequence", text="Analyze Sequence...", icon="SEQUENCE")
             elif context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
             return
-        _draw_summary(layout, obj)
+        _draw_summary(layout, context, obj)
+        _draw_notices(layout, context, obj)
         if has_splats(obj.data):
-            _draw_splats(layout, obj.meshfree)
+            _draw_splats(layout, context, obj)
         elif DISC not in obj.data.attributes:
             layout.operator("meshfree.show_surface")
-        row = layout.row(align=True)
+        row = beside_or_below(layout, context, "Analyze Points", "Modes 100")
         row.operator("meshfree.analyze").modes = obj.meshfree.modes
         row.prop(obj.meshfree, "modes")
         if is_analyzed(obj):
-            _draw_result(layout, obj.meshfree)
+            _draw_result(layout, context, obj.meshfree)
             if is_stale(obj, glance=True):
-                layout.label(text="Results are stale: analyze again", icon="ERROR")
+                draw_text(layout, context, "Results are stale: analyze again", "ERROR")
+        _draw_compared(layout, context, obj)
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        for name, text in _TASKS:
+        for name, text in TASKS:
             grid.operator(f"meshfree.{name}", text=text).at_once = True
 
 
-def _draw_job(layout, job):
+def _draw_job(layout, context, job):
     """Draw what is computed, how far it is, and how to stop it."""
     column = layout.column(align=True)
-    column.label(text=f"{job.label} (Esc to Stop)")
+    draw_text(column, context, f"{job.label} (Esc to Stop)")
     row = column.row(align=True)
     row.progress(text=f"{job.stage}: {job.fraction:.0%}", factor=job.fraction)
     row.operator("meshfree.stop", text="", icon="X")
 
 
-def _draw_result(layout, result):
+def _draw_compared(layout, context, obj):
+    """Draw what an object was compared with, and what turns that round."""
+    kept = obj.meshfree
+    if kept.compared_with is None or DEVIATION not in obj.data.attributes:
+        return
+    hidden = ", which is hidden" if kept.compared_with.hide_get() else ""
+    column = layout.column(align=True)
+    draw_text(column, context, f"{obj.name} compared with {kept.compared_with.name}{hidden}", "INFO")
+    column.operator("meshfree.compare_swap", text="Swap").greatest = kept.compared_within
+
+
+def _draw_notices(layout, context, obj):
+    """Draw what tools told of an object, each with a cross that dismisses it: the last lines of the status bar."""
+    notices = obj.meshfree.notices if obj is not None else ()
+    if not len(notices):
+        return
+    box = layout.box().column()
+    for index, told in list(enumerate(notices))[:_NOTICES]:
+        row = box.row(align=True)
+        icon = "ERROR" if told.level == "WARNING" else "INFO"
+        draw_text(row, context, f"{told.tool}: {told.text}", icon, taken=_CROSS)
+        row.operator("meshfree.dismiss", text="", icon="X").index = index
+    if len(notices) > _NOTICES:
+        draw_text(box, context, f"and {len(notices) - _NOTICES} more, seen when these are dismissed")
+    if len(notices) > 1:
+        box.operator("meshfree.dismiss", text="Dismiss All").index = -1
+
+
+def _draw_result(layout, context, result):
     """Draw the total area, and of components, boundaries and points left out what is worth telling."""
     lines = [("Total Area", area_text(result.total_area))]
     if result.subset_count:
@@ -124,48 +178,50 @@ def _draw_result(layout, result):
         lines.append(("Points Left Out", f"{result.left_out_count:,}"))
     column = layout.column(align=True)
     for name, value in lines:
-        row = column.row()
+        row = beside_or_below(column, context, name, value)
         row.label(text=name)
         row.label(text=value)
 
 
-def _draw_summary(layout, obj):
+def _draw_summary(layout, context, obj):
     mesh = obj.data
     column = layout.column(align=True)
-    column.label(text=f"{obj.name}: {point_count(mesh):,} points", icon=f"OUTLINER_OB_{obj.type}")
+    draw_text(column, context, f"{obj.name}: {point_count(mesh):,} points", f"OUTLINER_OB_{obj.type}")
     if obj.type == "MESH" and mesh.polygons:
-        column.label(text=f"Faces not used: {len(mesh.polygons):,}", icon="INFO")
+        draw_text(column, context, f"Faces not used: {len(mesh.polygons):,}", "INFO")
     scale = obj.matrix_world.to_scale()
     if max(abs(factor - 1.0) for factor in scale) > 1e-5:
         shown = ", ".join(f"{factor:.4g}" for factor in scale)
-        column.label(text=f"Object scale ({shown}) is applied", icon="INFO")
-        column.label(text="to lengths and areas", icon="BLANK1")
+        draw_text(column, context, f"Object scale ({shown}) is applied to lengths and areas", "INFO")
     modifiers = [modifier for modifier in obj.modifiers if not is_own(modifier)]
     if modifiers:
         what = "used" if obj.meshfree.use_modifiers else "left out"
-        column.label(text=f"Modifiers {what}: {len(modifiers)}", icon="MODIFIER")
+        draw_text(column, context, f"Modifiers {what}: {len(modifiers)}", "MODIFIER")
         column.prop(obj.meshfree, "use_modifiers")
     if sharing_objects(obj):
-        column.label(text="Other objects share this mesh", icon="INFO")
+        draw_text(column, context, "Other objects share this mesh", "INFO")
         column.prop(obj.meshfree, "make_single_user")
 
 
-def _draw_splats(layout, settings):
+def _draw_splats(layout, context, obj):
     """Draw what is there for Gaussian splats alone."""
+    if are_left_behind(obj.data, glance=True):
+        draw_text(layout, context, LEFT_BEHIND[0].upper() + LEFT_BEHIND[1:], "ERROR")
     column = layout.column(align=True)
     column.operator("meshfree.show_splats")
     column.operator("meshfree.select_floaters")
     column.operator("meshfree.apply_to_splats")
+    column.operator("meshfree.join_splats")
     column.operator("meshfree.export_splats", text="Export Splats...")
-    layout.prop(settings, "leave_out_floaters")
+    layout.prop(obj.meshfree, "leave_out_floaters")
 
 
-class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
-    """Settings that change results"""
+class Settings:
+    """What the panels with the settings have in common."""
 
-    bl_label = "Settings"
-    bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 3  # the last ones
+    @classmethod
+    def poll(cls, context):
+        return not obstacle(context.object)
 
     def draw(self, context):
         layout = self.layout
@@ -173,8 +229,7 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
         row.menu("MESHFREE_MT_presets", text=bpy.types.MESHFREE_MT_presets.bl_label)
         row.operator("meshfree.add_preset", text="", icon="ADD")
         row.operator("meshfree.add_preset", text="", icon="REMOVE").remove_active = True
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        split_properties(layout, context)
         obj = context.object
         for group in _SETTINGS:
             column = layout.column(align=True)
@@ -182,6 +237,20 @@ class MESHFREE_PT_settings(ReadyPanel, bpy.types.Panel):
                 row = column.row(align=True)
                 row.active = _counts(obj.meshfree, name)
                 draw_setting(row, obj.meshfree, name, obj)
+
+
+class MESHFREE_PT_settings(Settings, ReadyPanel, bpy.types.Panel):
+    """Settings that change results"""
+
+    bl_label = "Settings"
+    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 3  # the last ones
+
+
+class MESHFREE_PT_settings_properties(Settings, PropertiesPanel, bpy.types.Panel):
+    """Settings that change results, beside those of the object"""
+
+    bl_label = "Mesh-Free Settings"
 
 
 def _counts(settings, name):
@@ -216,21 +285,18 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for mode, eigenvalue in enumerate(eigenvalues[:_LISTED], start=1):
             shown_value = eigenvalue if eigenvalue > 1e-9 * eigenvalues[-1] else 0.0  # 0 up to rounding
-            text, name = f"{mode}:  {shown_value:.5g}", eigenvector_name(mode)
+            text, name = f"{mode}:  {shown_value:.4g}", eigenvector_name(mode)
             if name in obj.data.attributes:
                 grid.operator("meshfree.colormap", text=text, depress=name == shown).attribute = name
             else:
                 grid.label(text=text)
         if len(eigenvalues) > _LISTED:
-            more = f"and {len(eigenvalues) - _LISTED} more, up to {eigenvalues[-1]:.5g}"
-            layout.label(text=more)
+            more = f"and {len(eigenvalues) - _LISTED} more, up to {eigenvalues[-1]:.4g}"
+            draw_text(layout, context, more)
 
 
-class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
-    """What is shown as colors on the points"""
-
-    bl_label = "Display"
-    bl_order = 1  # open and long: below the tools, which are closed
+class Display:
+    """What the panels about colors have in common."""
 
     @classmethod
     def poll(cls, context):
@@ -242,6 +308,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
         shown = shown_attribute(obj)
         attributes = obj.data.attributes
         column = layout.column(align=True)
+        _draw_own_looks(column, obj, shown)
         for name in (*RESULTS, *(name for name in APPLICATIONS if name in attributes)):
             row = column.row(align=True)
             row.enabled = name in attributes
@@ -251,8 +318,7 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
             return
         if shown in attributes:
             layout.operator("meshfree.colormap", text="Update Colors")
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        split_properties(layout, context)
         if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
             layout.prop(obj.meshfree, "component")
             if shown in ALONG_SURFACE:
@@ -260,24 +326,54 @@ class MESHFREE_PT_display(ReadyPanel, bpy.types.Panel):
                 if has_input(find_display(obj).node_group, LENGTH):
                     layout.prop(*input_property(find_display(obj), LENGTH), text=LENGTH)
         if range_node(obj) is not None:
-            _draw_colors(layout, obj)
+            _draw_colors(layout, context, obj)
         if DISC in attributes:
             layout.prop(obj.meshfree, "point_shape")
+            layout.prop(obj.meshfree, "smooth")
             layout.prop(obj.meshfree, "dim_back")
+        layout.prop(obj.meshfree, "shaded", slider=True)
         layout.prop(obj.meshfree, "point_size")
         if not draws_discs(obj):
             layout.prop(*input_property(find_display(obj), MOST), text=MOST)
-        column = layout.column(align=True, heading="Show")
-        column.prop(obj.meshfree, "legend")
-        column.prop(obj.meshfree, "histogram")
-        shows_legend = find_legend(context.scene, obj) is not None
-        layout.operator("meshfree.legend", depress=shows_legend).show = not shows_legend
-        if context.scene.view_settings.view_transform not in _TRUE_COLORS:
-            layout.label(text="Colors differ from the legend:", icon="INFO")
-            layout.prop(context.scene.view_settings, "view_transform")
+        if shown_scale(obj, context.scene) is not None:
+            _draw_legend(layout, context, obj)
 
 
-def _draw_colors(layout, obj):
+class MESHFREE_PT_display(Display, ReadyPanel, bpy.types.Panel):
+    """What is shown as colors on the points"""
+
+    bl_label = "Display"
+    bl_order = 1  # open and long: below the tools, which are closed
+
+
+class MESHFREE_PT_display_properties(Display, PropertiesPanel, bpy.types.Panel):
+    """What is shown as colors on the points, beside the settings of the object"""
+
+    bl_label = "Mesh-Free Display"
+
+
+def _draw_legend(layout, context, obj):
+    """Draw what tells the values of the colors on show, and what makes them differ from it."""
+    column = layout.column(align=True, heading="Show")
+    column.prop(obj.meshfree, "legend")
+    column.prop(obj.meshfree, "histogram")
+    shows_legend = find_legend(context.scene, obj) is not None
+    layout.operator("meshfree.legend", depress=shows_legend).show = not shows_legend
+    if context.scene.view_settings.view_transform not in _TRUE_COLORS:
+        draw_text(layout, context, "Colors differ from the legend:", "INFO")
+        layout.prop(context.scene.view_settings, "view_transform")
+
+
+def _draw_own_looks(column, obj, shown):
+    """Draw buttons to what an object looks like without results: the colors of its points, and its material."""
+    colors, material = own_colors(obj.data), own_material(obj)
+    if colors:
+        column.operator("meshfree.colormap", text="Color", depress=colors == shown).attribute = colors
+    if material is not None and find_display(obj) is not None:
+        column.operator("meshfree.own_material", depress=shows_own_material(obj))
+
+
+def _draw_colors(layout, context, obj):
     """Draw the settings of colors for numbers."""
     settings = obj.meshfree
     column = layout.column(align=True)
@@ -287,7 +383,9 @@ def _draw_colors(layout, obj):
     column.prop(settings, "range_mode")
     if settings.range_mode in {"AUTO", "PERCENTILE", "SYMMETRIC"}:
         column.prop(settings, "coverage")
-    if settings.range_mode == "LOCKED" or not step_colors(obj):
+    if shows_zeros(obj):
+        draw_text(column, context, "All values are zero", "INFO")
+    elif settings.range_mode == "LOCKED" or not step_colors(obj):
         bounds = column.column(align=True)
         bounds.enabled = settings.range_mode == "LOCKED"  # in other modes they tell what the range came to
         bounds.prop(settings, "range_low")
@@ -296,6 +394,7 @@ def _draw_colors(layout, obj):
     column.prop(settings, "outside")
     if not step_colors(obj):
         column.prop(settings, "iso_lines")
+        column.operator("meshfree.iso_lines_to_curves")
     layout.operator("meshfree.select_by_range")
 
 
@@ -310,4 +409,11 @@ def _draw_mode_steps(layout, attributes, shown):
         column.operator("meshfree.colormap", text=text, icon=icon, depress=name == shown).attribute = name
 
 
-CLASSES = (MESHFREE_PT_main, MESHFREE_PT_settings, MESHFREE_PT_spectrum, MESHFREE_PT_display)
+CLASSES = (
+    MESHFREE_PT_main,
+    MESHFREE_PT_settings,
+    MESHFREE_PT_spectrum,
+    MESHFREE_PT_display,
+    MESHFREE_PT_display_properties,
+    MESHFREE_PT_settings_properties,
+)

@@ -6,26 +6,27 @@ from .canvas import DIM, WHITE, Picture
 from .colormaps import to_display
 from .ticks import round_ticks, tick_texts
 
-_HEIGHT = 230.0
+HEIGHT = 230.0
 _EDGE = 12.0  # between the plate's border and what is on it
 _LINE = 16.0  # height of a line of text
 _BEYOND = (0.45, 0.45, 0.45, 1.0)
 _MARK = (1.0, 0.75, 0.2, 1.0)
-_FEWEST = 6  # boxes that fill a legend
+_BOX = 18.0  # height of a box in a legend
+_NAMED = 6  # bins that have a name each, at most
 
 
 def legend_picture(scale, width: float = 150.0) -> Picture:
     """Draw the colours of a scale with their numbers, for the view and for renders."""
-    picture = Picture(width, _HEIGHT)
+    picture = Picture(width, _title_height(scale.unit) + len(scale.boxes) * _BOX + _EDGE if scale.boxes else HEIGHT)
+    picture.movable = True
     top = _title(picture, scale.title, scale.unit)
     left, right, bottom = _EDGE, _EDGE + 20.0, _EDGE
     if scale.boxes:
-        height = (top - bottom) / max(len(scale.boxes), _FEWEST)
         for index, (name, color) in enumerate(scale.boxes.items()):
-            y = top - (index + 1) * height
+            y = top - (index + 1) * _BOX
             if color[3]:
-                picture.rectangle(left, y + 0.1 * height, right, y + 0.9 * height, to_display(color))
-            picture.text(name, right + 8.0, y + 0.5 * height, part=f"box {index}")
+                picture.rectangle(left, y + 0.1 * _BOX, right, y + 0.9 * _BOX, to_display(color))
+            picture.text(name, right + 8.0, y + 0.5 * _BOX, part=f"box {index}")
         return picture
     bottom, top = bottom + 0.4 * _LINE, top - 0.4 * _LINE  # half a number stands out at each end
     colors = [to_display(color) for color in scale.colors]
@@ -41,7 +42,7 @@ def legend_picture(scale, width: float = 150.0) -> Picture:
 
 def histogram_picture(scale, edges, counts, beyond) -> Picture:
     """Draw a histogram in the colours of a scale, with the range marked."""
-    picture = Picture(260.0, _HEIGHT)
+    picture = Picture(260.0, HEIGHT)
     total = int(counts.sum())
     top = _title(picture, "Histogram", f"{scale.full_title}")
     left, right, bottom = _EDGE, picture.width - _EDGE, _EDGE + 2.0 * _LINE
@@ -70,7 +71,7 @@ def histogram_picture(scale, edges, counts, beyond) -> Picture:
         _write_axis(picture, scale.factor * edges[0], scale.factor * edges[-1], left, right, bottom - 0.7 * _LINE)
     elif total:
         names = list(scale.boxes)
-        for index in {0, len(counts) - 1} if len(counts) > _FEWEST else range(len(counts)):
+        for index in {0, len(counts) - 1} if len(counts) > _NAMED else range(len(counts)):
             x = across(0.5 * (edges[index] + edges[index + 1]))
             picture.text(
                 names[index] if len(names) == len(counts) else f"{low + 0.5 + index:.0f}",
@@ -100,7 +101,7 @@ def spectrum_picture(eigenvalues, shown_mode: int, unit: str, factor: float, are
     area : float
         Total area of the surface, for Weyl's law: about 4 pi k / area; 0 leaves it out.
     """
-    picture = Picture(300.0, _HEIGHT)
+    picture = Picture(300.0, HEIGHT)
     top = _title(picture, "Eigenvalues", unit) - 0.5 * _LINE
     numbers = factor * np.asarray(eigenvalues, dtype=np.float64)
     count = len(numbers)
@@ -141,9 +142,13 @@ def _title(picture, title, unit):
     y = picture.height - _EDGE - 0.3 * _LINE
     picture.text(title, _EDGE, y, part="title")
     if unit:
-        y -= _LINE
-        picture.text(unit, _EDGE, y, color=(1.0, 1.0, 1.0, 0.7), part="unit")
-    return y - 0.9 * _LINE
+        picture.text(unit, _EDGE, y - _LINE, color=(1.0, 1.0, 1.0, 0.7), part="unit")
+    return picture.height - _title_height(unit)
+
+
+def _title_height(unit):
+    """Height of a title with its unit, if there is one, and of the border above."""
+    return _EDGE + (2.2 if unit else 1.2) * _LINE
 
 
 def _color_at(scale, index, share):

@@ -8,6 +8,8 @@ from ..operators.objects.groups import (
     BOUNDARY_GROUP,
     FIXED,
     HANDLE,
+    HIGH,
+    LOW,
     ROLES,
     SOURCE,
     VALUE,
@@ -24,6 +26,8 @@ _TITLES = {
     ANCHOR: "Anchors",
     FIXED: "Fixed",
     SOURCE: "Sources",
+    LOW: "Low",
+    HIGH: "High",
     VALUE: "Values",
     BOUNDARY_GROUP: "Boundary",
 }
@@ -50,19 +54,26 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
         layout.prop(obj.meshfree, "show_groups")
         column = layout.column(align=True)
         for role, title in _TITLES.items():
-            row = column.split(factor=0.66, align=True)
-            icon = {"icon_value": _swatches[0][role].icon_id} if obj.meshfree.show_groups else {}
-            row.operator("meshfree.group_from_selection", text=f"Assign to {title}", **icon).role = role.upper()
-            group = role_group(obj, role)
-            found = members(obj, group, glance=True)
-            text = "..." if found is None else f"{found.count:,}"
-            selecting = row.row(align=True)
-            selecting.enabled = has_group(obj, group)
-            selecting.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = group
+            _draw_group(column.split(factor=0.6, align=True), obj, role, title)
         if bpy.app.version >= MESHFREE_OT_convert.since:
             to_mesh = obj.type != "MESH"
             text = "Convert to Mesh" if to_mesh else "Convert to Point Cloud"
             layout.operator("meshfree.convert", text=text).target = "MESH" if to_mesh else "POINTCLOUD"
+
+
+def _draw_group(row, obj, role, title):
+    """Draw what assigns the selected points to a group, tells and selects how many it holds, and removes them."""
+    icon = {"icon_value": _swatches[0][role].icon_id} if obj.meshfree.show_groups else {}
+    assign = row.operator("meshfree.group_from_selection", text=f"Assign to {title}", **icon)
+    assign.role, assign.action = role.upper(), "ADD"
+    group = role_group(obj, role)
+    found = members(obj, group, glance=True)
+    held = row.row(align=True)
+    held.enabled = has_group(obj, group)
+    text = "..." if found is None else f"{found.count:,}"
+    held.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = group
+    remove = held.operator("meshfree.group_from_selection", text="", icon="REMOVE")
+    remove.role, remove.action = role.upper(), "REMOVE"
 
 
 def attach():

@@ -2,7 +2,17 @@
 
 from typing import NamedTuple
 
-from .display import color_node, find_material, label, range_node, shown_attribute, shown_range, step_colors
+from .display import (
+    color_node,
+    find_material,
+    is_colored,
+    label,
+    range_node,
+    shown_attribute,
+    shown_range,
+    shows_zeros,
+    step_colors,
+)
 from .nodes import CHECKER, direction_color, is_checkered
 from .ticks import round_ticks, tick_texts
 from .units import attribute_power, unit
@@ -53,9 +63,9 @@ class Scale(NamedTuple):
 
 
 def shown_scale(obj, scene) -> Scale | None:
-    """Return the scale of what an object shows, in units of a scene; None if it shows nothing."""
+    """Return the scale of what an object shows, in units of a scene; None if it shows nothing, or colors of its own."""
     name = shown_attribute(obj)
-    if not name:
+    if not name or is_colored(obj):
         return None
     title = label(name)
     if range_node(obj) is None:
@@ -64,7 +74,7 @@ def shown_scale(obj, scene) -> Scale | None:
         boxes = {text: direction_color(direction) for text, direction in _DIRECTIONS.items()}
         return Scale(title, "", 1.0, None, [], boxes, [])
     low, high = shown_range(obj)
-    boxes = step_colors(obj)
+    boxes = {"All Zero": tuple(color_node(obj).color_ramp.evaluate(0.5))} if shows_zeros(obj) else step_colors(obj)
     if boxes:
         return Scale(title, "", 1.0, (low, high), [], _shortened(boxes), [])
     symbol, factor = unit(attribute_power(name), max(abs(low), abs(high)), scene.unit_settings)

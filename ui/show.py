@@ -5,9 +5,9 @@ import math
 import bpy
 import gpu
 import numpy as np
+from bpy.app.handlers import persistent
 
 from .. import core
-from ..operators.deform.binding import positions_now
 from ..operators.deform.nodes import find_deform, is_baked, show_live, turns_discs
 from ..operators.objects.attributes import (
     ALONG_SURFACE,
@@ -15,46 +15,73 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
+    point_count,
+    positions_now,
     read_attribute,
 )
-from ..operators.objects.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, ROLES, handle_names, role_group
+from ..operators.objects.colors import is_color, own_colors, own_material
+from ..operators.objects.groups import (
+    ANCHOR,
+    BOUNDARY_GROUP,
+    HANDLE,
+    HIGH,
+    LOW,
+    ROLES,
+    handle_names,
+    has_group,
+    role_group,
+)
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
-from ..operators.objects.reading import TYPES, fingerprint, spacing
+from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
-from . import colormaps, legend
+from . import colormaps, legend, smooth, solid
 from .display import (
     NAME,
     component,
     draws_discs,
+    draws_faces,
     find_display,
     find_material,
+    is_colored,
+    is_distance,
+    is_in_solid,
     is_texture,
     numbers,
     shown_attribute,
+    sloping,
     without_unreached,
 )
 from .nodes import (
     DISCS,
     FILLED,
     INK,
+    LENGTH,
     MOST,
+    SMOOTH,
+    SOLID_NAME,
     SPLATS,
     STROKES,
     color_by_checker,
     color_by_direction,
     color_by_number,
+    color_by_own,
     color_plain,
     color_splats,
     dim_back,
     display_group,
     is_plain,
+    shade,
     stroke_material,
 )
-from .value_range import fit_range
+from .value_range import STEPPED, all_zero, fit_range
 
 _MOST_HANDLES = 6  # that have colors
+_LATE = LOW, HIGH  # groups that came with a later version
+_MOST_GROUPS = 12  # attributes that a material reads for them: Blender's shaders take 15
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
+_LINE_WIDTH = 1.0 / 250.0  # of iso lines, in the root of the area
+_noted = {}  # Group Colors of objects in Edit Mode while something is undone, by session_uid
 _NO_SPACING = 0.01  # stands in where points are too few to have one
 
 
@@ -73,13 +100,13 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
     Raises
     ------
     PointCloudError
-        There is no such attribute, or it holds neither numbers nor vectors on points.
+        There is no such attribute, or it holds neither numbers nor vectors nor colors on points.
     """
     if not name:
         name = shown_attribute(obj)
         if name not in obj.data.attributes:
             name = MEAN_CURVATURE
-    values = read_attribute(obj.data, name)
+    values = _read(obj.data, name)
     modifier, new = _add_display(obj)
     if radius:
         set_input(modifier, "Radius", radius)
@@ -87,6 +114,11 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
         resize(obj)
     _color(obj, name, values)
     reshape(obj)
+
+
+def _read(data, name):
+    """Read the values of an attribute that is to be shown; None for colors, which the material takes as they are."""
+    return None if is_color(data, name) else read_attribute(data, name)
 
 
 def _add_display(obj):
@@ -97,8 +129,8 @@ def _add_display(obj):
         modifier = obj.modifiers.new(NAME, "NODES")
         modifier.node_group = display_group()
         set_input(modifier, MOST, viewport_points())
-    elif not has_input(modifier.node_group, SPLATS):  # of an earlier version
-        names = [name for name in ("Radius", "Material", MOST) if has_input(modifier.node_group, name)]
+    elif not has_input(modifier.node_group, SOLID_NAME):  # of an earlier version
+        names = [name for name in ("Radius", "Material", MOST, LENGTH, INK) if has_input(modifier.node_group, name)]
         kept = {name: get_input(modifier, name) for name in names}
         modifier.node_group = display_group()
         for name, value in kept.items():
@@ -110,8 +142,12 @@ def _add_display(obj):
 
 def viewport_points() -> int:
     """How many points the viewport is to draw at most, so that it can be turned; 0 for all."""
-    without_card = not bpy.app.background and gpu.platform.device_type_get() == "SOFTWARE"
-    return _MOST_WITHOUT_CARD if without_card else 0
+    return _MOST_WITHOUT_CARD if _without_card() else 0
+
+
+def _without_card() -> bool:
+    """Whether the processor draws: it compiles what Material Preview needs for half a minute, and Solid at once."""
+    return not bpy.app.background and gpu.platform.device_type_get() == "SOFTWARE"
 
 
 def recolor(obj):
@@ -119,8 +155,11 @@ def recolor(obj):
     name = shown_attribute(obj)
     if not name or name not in obj.data.attributes:
         return
-    _color(obj, name, read_attribute(obj.data, name))
+    in_solid = is_in_solid(obj)
+    _color(obj, name, _read(obj.data, name))
     reshape(obj)
+    if in_solid and not is_in_solid(obj):  # iso lines, for instance, are no colors of points
+        use_material_preview(bpy.context)
 
 
 def show_groups(obj):
@@ -133,26 +172,42 @@ def show_groups(obj):
         set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
         if DISC not in obj.data.attributes:  # else it shows the surface
             obj.modifiers.remove(modifier)
-        if not material.users - material.use_fake_user:
-            bpy.data.materials.remove(material)
+        _remove_unused(material)
         reshape(obj)
     elif obj.meshfree.show_groups and (modifier is None or get_input(modifier, "Material") is None):
         _add_display(obj)
         resize(obj)
         plain = True
     if plain and obj.meshfree.show_groups:
-        color_plain(_own_material(obj), _group_colors(obj))
-        dim_back(_own_material(obj), obj.meshfree.dim_back)
+        color_plain(_display_material(obj), _group_colors(obj))
+        dim_back(_display_material(obj), obj.meshfree.dim_back)
+        shade(_display_material(obj), obj.meshfree.shaded)
         obj.update_tag()
     recolor(obj)
     if obj.meshfree.show_groups:
         use_material_preview(bpy.context)
 
 
+@persistent
+def _note_groups(*_):
+    """Remember which objects in Edit Mode have their groups colored, before undo or redo."""
+    _noted.update({obj.session_uid: obj.meshfree.show_groups for obj in bpy.data.objects if obj.mode == "EDIT"})
+
+
+@persistent
+def _keep_groups(*_):
+    """Leave Group Colors as they were in Edit Mode: what is undone there are changes of the points."""
+    for obj in bpy.data.objects:
+        shown = _noted.get(obj.session_uid, obj.meshfree.show_groups)
+        if obj.meshfree.show_groups != shown:
+            obj.meshfree.show_groups = shown
+    _noted.clear()
+
+
 def show_result(obj, name):
-    """Show an attribute that was written just now; see `show_attribute`."""
-    show_attribute(obj, name)
-    use_material_preview(bpy.context)
+    """Show an attribute that was written just now; without a name what is on show, or the mean curvature."""
+    show_attribute(obj, MEAN_CURVATURE if not name and is_colored(obj) else name)
+    look_at([obj])
 
 
 def show_sequence(objects, name):
@@ -166,34 +221,105 @@ def show_sequence(objects, name):
         settings.color_map, settings.range_mode = color_map, "LOCKED"
         settings.range_low, settings.range_high = low, high
         show_attribute(obj, name)
-    use_material_preview(bpy.context)
+    look_at(objects)
 
 
 def show_surface(obj):
-    """Show the points of an object as discs, in the colors that they have."""
-    _add_display(obj)
+    """Show the points of an object as discs: in what they show, in their own material, or in their own colors."""
+    modifier, _ = _add_display(obj)
     resize(obj)
+    name = own_colors(obj.data)
+    if name and get_input(modifier, "Material") is None and own_material(obj) is None:
+        show_colors([obj])
+    follow_own_material(obj)
+
+
+def show_colors(objects):
+    """Show objects, such as the frames of a sequence, in the colors that their points have, by one material."""
+    first, *others = objects
+    show_attribute(first, own_colors(first.data))
+    for obj in others:
+        modifier, _ = _add_display(obj)
+        set_input(modifier, "Material", find_material(first))
+        resize(obj)
+    show_in_solid(first)
+
+
+def show_own_material(obj):
+    """Show an object in the material of its first slot, and go on so should that become another one."""
+    modifier, material, own = find_display(obj), find_material(obj), own_material(obj)
+    set_input(modifier, "Material", own)
+    obj.meshfree.own_material = own
+    if material is not None:
+        _remove_unused(material)
+    reshape(obj)
+    redraw_views()
+
+
+def follow_own_material(obj):
+    """Let a display that shows the material of the object's first slot take the one that is there now."""
+    modifier = find_display(obj)
+    if modifier is None or not obj.is_editable or get_input(modifier, "Material") != obj.meshfree.own_material:
+        return  # it shows something else, or what somebody has chosen for it
+    own = own_material(obj)
+    if own != obj.meshfree.own_material:
+        obj.meshfree.own_material = own
+        set_input(modifier, "Material", own)
+        obj.update_tag()
+
+
+@persistent
+def _slots_changed(_scene, depsgraph):
+    for update in depsgraph.updates:
+        if isinstance(update.id, bpy.types.Object) and update.id.type in TYPES:
+            follow_own_material(update.id.original)
 
 
 def show_splats(obj):
     """Show splats as ellipsoids in their own colors."""
     _add_display(obj)
-    color_splats(_own_material(obj))
+    color_splats(_display_material(obj))
     obj.meshfree.point_shape = "DISCS"
     resize(obj)
     use_material_preview(bpy.context)
 
 
 def show_alike(obj, made):
-    """Show on a mesh made of an object what that shows."""
-    name = shown_attribute(obj)
-    if name and name in made.data.attributes:
+    """Show on a mesh made of an object what that shows, or its own colors."""
+    name, own = shown_attribute(obj), own_material(obj)
+    if own is not None:
+        made.data.materials.append(own)
+    if name and name in made.data.attributes and not is_color(made.data, name):
         show_result(made, name)
+    elif own_colors(made.data) and (own is None or name):
+        show_colors([made])
+
+
+def show_in_solid(obj):
+    """Let viewports in Solid show the colors of an object's points: of dots they cannot, so that they change."""
+    for area in _views():
+        shading = area.spaces.active.shading
+        if shading.type == "SOLID":
+            if draws_faces(obj):
+                shading.color_type = "VERTEX"
+            else:
+                shading.type = "MATERIAL"
+
+
+def look_at(objects):
+    """Let the viewport that somebody works in show what was put on show: without a card in Solid, where that can."""
+    if _without_card() and all(is_in_solid(obj) for obj in objects):
+        for obj in objects:
+            show_in_solid(obj)
+    else:
+        use_material_preview(bpy.context)
 
 
 def use_material_preview(context):
     """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
     space = context.space_data
+    if context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
+        return
     if space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
         space.shading.type = "MATERIAL"
 
@@ -203,6 +329,13 @@ def resize(obj):
     modifier = find_display(obj)
     if modifier is None:
         return
+    _measure(obj)
+    set_input(modifier, "Radius", _radius(obj.meshfree))
+    reshape(obj)
+
+
+def _measure(obj):
+    """Measure the spacing of the points, if they have changed."""
     kept = obj.meshfree
     if obj.mode != "EDIT":
         points = fingerprint(obj, glance=True)
@@ -210,8 +343,6 @@ def resize(obj):
             kept.spacing_of, kept.spacing = points, spacing(obj.data)
     elif not kept.spacing:
         kept.spacing = core.geometry.typical_distance(positions_now(obj))
-    set_input(modifier, "Radius", _radius(kept))
-    reshape(obj)
 
 
 def reshape(obj):
@@ -231,6 +362,11 @@ def reshape(obj):
             set_input(modifier, DISCS, turned)
         if has_input(group, FILLED):
             set_input(modifier, FILLED, known and formed)
+        if has_input(group, SMOOTH):  # slopes do not turn
+            sloping_now = turned and deform is None and obj.meshfree.slopes_of != ""
+            set_input(modifier, SMOOTH, shown_attribute(obj) if sloping_now else "")
+        if has_input(group, SOLID_NAME) and not shown_attribute(obj):
+            set_input(modifier, SOLID_NAME, "")
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
         dots, bound = not (turned and draws_discs(obj)), deform is not None
@@ -259,13 +395,17 @@ def _sized_by_hand(obj):
 
 
 def _color(obj, name, values):
-    settings, material, groups = obj.meshfree, _own_material(obj), _group_colors(obj)
+    _measure(obj)
+    settings, material, groups = obj.meshfree, _display_material(obj), _group_colors(obj)
     part = component(name, settings)
-    shown = numbers(values, part)
-    if is_texture(values):
+    shown, stepped, colors_of = None if values is None else numbers(values, part), False, None
+    if values is None:
+        color_by_own(material, name, groups)
+    elif is_texture(values):
         color_by_checker(material, name, groups)
     elif shown is None:
         color_by_direction(material, name, groups)
+        colors_of = solid.direction_colors
     else:
         locked = settings.range_low, settings.range_high
         chosen = [settings.color_map, settings.range_mode]
@@ -273,18 +413,42 @@ def _color(obj, name, values):
             chosen = [
                 way if way != "AUTO" else zero for way, zero in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
             ]
-        color_map, low, high = fit_range(without_unreached(name, shown), *chosen, settings.coverage, locked)
+        counted = without_unreached(name, shown)
+        color_map, low, high = fit_range(counted, *chosen, settings.coverage, locked, is_distance(name, values, part))
         if settings.range_mode != "LOCKED":
-            settings.range_low, settings.range_high = low, high
-        component_shown = part if values.ndim > 1 else ""
-        color_by_number(material, name, component_shown, color_map, low, high, settings, groups)
+            settings.range_low, settings.range_high = (0.0, 0.0) if all_zero(counted) else (low, high)
+        component_shown, stepped = part if values.ndim > 1 else "", color_map in STEPPED
+        width = _LINE_WIDTH * settings.spacing * math.sqrt(point_count(obj.data))
+        color_by_number(material, name, component_shown, color_map, low, high, settings, groups, width)
+        if settings.outside != "HIDE" and (stepped or not settings.iso_lines):  # else Solid shows less
+            colors_of = solid.number_colors(color_map, low, high, settings)
     dim_back(material, settings.dim_back)
+    shade(material, settings.shaded)
+    columns = [] if values is None or stepped or not settings.smooth else sloping(name, values, part)
+    smooth.follow(obj, name, part, columns, settings.spacing)
+    _follow_in_solid(obj, values if shown is None else shown, None if groups else colors_of)
+    for other in sharing_objects(obj):  # which may show something else
+        if shown_attribute(other) != name and is_in_solid(other):
+            set_input(find_display(other), SOLID_NAME, "")
+        reshape(other)
     obj.update_tag()
     legend.renew(obj)
     redraw_views()
 
 
-def _own_material(obj):
+def _follow_in_solid(obj, values, colors_of):
+    """Let viewports in Solid show the colors of values, which a function gives; those of the mesh without one."""
+    modifier = find_display(obj)
+    name = solid.follow(obj, values, colors_of if draws_faces(obj) else None, get_input(modifier, "Radius"))
+    set_input(modifier, SOLID_NAME, name)
+
+
+def _remove_unused(material):
+    if not material.users - material.use_fake_user:
+        bpy.data.materials.remove(material)
+
+
+def _display_material(obj):
     """Return the material of an object's points; a new one if there is none, or if a duplicate shares it."""
     material = find_material(obj)
     if material is None or material.users - material.use_fake_user > 1:
@@ -295,20 +459,24 @@ def _own_material(obj):
 
 
 def _group_colors(obj) -> dict:
-    """Return the colours of groups by their names: none if they are not shown.
+    """Return the colours of groups by their names: none if they are not shown, and not all of very many.
 
-    Blender's shaders take 15 attributes at most, so not all of very many handles.
+    Groups that are still to come are among them, so that they are seen as soon as points are assigned, while there is
+    room; but for those that materials of earlier versions do not know.
     """
     settings = obj.meshfree
     if not settings.show_groups:
         return {}
-    names = {role_group(obj, role): role for role in ROLES}
+    there = [role for role in ROLES if role not in _LATE or has_group(obj, role)]
+    names = {role_group(obj, role): role for role in there}
     if settings.boundary_group:
         names[settings.boundary_group] = BOUNDARY_GROUP
     names[settings.deform.anchors or ANCHOR] = ANCHOR
     for name in handle_names(obj)[:_MOST_HANDLES]:
         names[name] = HANDLE
-    return {name: colormaps.group_color(role) for name, role in names.items()}
+    if len(names) > _MOST_GROUPS:
+        names = {name: role for name, role in names.items() if has_group(obj, name)}
+    return {name: colormaps.group_color(names[name]) for name in [*names][:_MOST_GROUPS]}
 
 
 def redraw_views():
@@ -334,12 +502,18 @@ _HANDLERS = {
     "shape_changed": reshape,
     "groups_changed": show_groups,
     "surface_found": show_surface,
+    "colors_found": show_colors,
     "splats_found": show_splats,
     "result_written": show_result,
     "mesh_made": show_alike,
     "sequence_written": show_sequence,
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,
+    "undo_pre": _note_groups,
+    "undo_post": _keep_groups,
+    "redo_pre": _note_groups,
+    "redo_post": _keep_groups,
+    "depsgraph_update_post": _slots_changed,
 }
 
 

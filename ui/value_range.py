@@ -7,7 +7,9 @@ STEPPED = ("TRUTH", "CATEGORICAL")  # maps with a colour for each whole number
 _BINS = 60
 
 
-def fit_range(values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 98.0, locked=(0.0, 1.0)):
+def fit_range(
+    values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 98.0, locked=(0.0, 1.0), from_zero=False
+):
     """Choose a colour map and its range for values.
 
     Parameters
@@ -26,6 +28,8 @@ def fit_range(values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 
         for whole numbers and truth values, and where it is not a number.
     locked : tuple of float
         Range to keep.
+    from_zero : bool
+        Whether AUTO lets the range of values above zero begin there, as that of distances does.
 
     Returns
     -------
@@ -52,6 +56,7 @@ def fit_range(values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 
     if mode == "AUTO":
         signed = name == "COOL_WARM" and share[0] < 0.0 < share[1]
         mode = "SYMMETRIC" if signed else "DATA" if name == "CYCLIC" else "PERCENTILE"
+        share = (min(share[0], 0.0), share[1]) if from_zero else share
     if mode == "LOCKED":
         low, high = min(locked), max(locked)
     elif mode == "SYMMETRIC":
@@ -65,6 +70,11 @@ def fit_range(values, name: str = "AUTO", mode: str = "AUTO", coverage: float = 
         margin = 0.1 * abs(high) or 1.0
         low, high = low - margin, high + margin
     return name, float(low), float(high)
+
+
+def all_zero(values) -> bool:
+    """Whether numbers are nothing but zeros, of which there is no range."""
+    return values.dtype.kind == "f" and len(values) > 0 and not values.any()
 
 
 def histogram(values, bounds, stepped: bool):

@@ -57,7 +57,7 @@ class DeformationGradients:
         tangents = self._tangents
         left = np.einsum("abn,bcn->acn", after - np.einsum("abn,bcn->acn", alike, before), tangents)
         inner = np.einsum("abn,bdn->adn", np.einsum("ban,bcn->acn", tangents, before), tangents)
-        slopes = np.einsum("abn,bcn->acn", left, _inverse(inner))
+        slopes = np.einsum("abn,bcn->acn", left, lifted_inverse(inner))
         stretched = np.einsum("abn,bcn->acn", alike, tangents) + slopes
         across = np.cross(stretched[:, 1], stretched[:, 0], axis=0)  # as `frames` orders them
         area = np.sqrt(np.einsum("an,an->n", across, across))
@@ -160,11 +160,11 @@ def _step_products(stiffness, rest):
     return sparse.vstack(parts, format="csr")
 
 
-def _inverse(matrices):
+def lifted_inverse(matrices, least=_ROUND):
     """Return the inverses of symmetric matrices, (2, 2, m), lifted where steps lie in a row and tell nothing across."""
     (a, b), (_, d) = matrices
     trace = a + d
     smaller = 0.5 * (trace - np.hypot(a - d, 2.0 * b))
-    lifted = np.where(trace > 0.0, np.maximum(_ROUND * trace - smaller, 0.0), 1.0)
+    lifted = np.where(trace > 0.0, np.maximum(least * trace - smaller, 0.0), 1.0)
     a, d = a + lifted, d + lifted
     return np.array([[d, -b], [-b, a]]) / (a * d - b * b)

@@ -8,6 +8,7 @@ from ..errors import PointCloudError
 from ..geometry import as_mask
 from .graph import near_graph
 
+_OBLIQUE = 3.0  # slope to the ray of a surface whose points are told from those behind it: 72 degrees
 _NEIGHBORS = 20  # so many directions make paths at most 2 % longer than the way along the surface
 
 
@@ -66,6 +67,59 @@ def grow(laplacian, chosen, distance):
         return mask.copy()
     way = dijkstra(graph.lengths, directed=False, indices=start, min_only=True, limit=reach)
     return mask | graph.scatter(np.isfinite(way), False)
+
+
+def front_point(points, eye, direction, reach):
+    """Find the point that one sees along a ray: the nearest to the eye among those around it.
+
+    Of points of one surface it is the one that is nearest to the ray.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Some may be infinite or no numbers.
+    eye, direction : array_like, (3,)
+        Where the ray begins and where it goes.
+    reach : float
+        How far from the ray the points may be [L]. Twice their spacing finds one wherever it meets the surface.
+
+    Returns
+    -------
+    int
+        Its number; -1 if there is none around the ray.
+
+    Raises
+    ------
+    PointCloudError
+        A direction of no length.
+
+    See Also
+    --------
+    grow : Takes the points around it in.
+
+    Examples
+    --------
+    From above one sees the upper pole of the unit sphere, not the lower one:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> seen = core.front_point(points, eye=[0, 0, 5], direction=[0, 0, -1], reach=0.25)
+    >>> print(points[seen, 2].round(1))
+    1.0
+    """
+    offset = np.asarray(points, dtype=np.float64) - np.asarray(eye, dtype=np.float64)
+    length = np.linalg.norm(direction)
+    if not 0.0 < length < np.inf:
+        raise PointCloudError("The direction of the ray has no length. Give one that is not zero.")
+    axis = np.asarray(direction, dtype=np.float64) / length
+    with np.errstate(invalid="ignore"):
+        depth = offset @ axis
+        away = np.linalg.norm(offset - depth[:, None] * axis, axis=1)
+    near = np.flatnonzero((depth > 0.0) & (away <= reach))
+    return int(near[(depth + _OBLIQUE * away)[near].argmin()]) if len(near) else -1
 
 
 def opposite_ends(laplacian, share=0.03):

@@ -1,9 +1,12 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
-from .formats import READABLE, WRITABLE, read_points, reading, write_points
-from .frames import numbered_files, order_frames
+from .digits import Digits, join_digits, split_digits
+from .formats import READABLE, SCANS, SPLATS, TEXTS, WRITABLE, read_points, reading, write_points
+from .frames import frame_number, numbered_files, order_frames
+from .las_choices import LasChoices, parse_classes
+from .lines import brief
 from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse
-from .ply import PlyVertices, read_vertex_columns, read_vertex_names, write_vertex_columns
-from .table import PointTable, check_places
+from .ply import PlyVertices, read_elements, read_vertex_columns, read_vertex_names, write_vertex_columns
+from .table import PointTable, check_places, from_columns
 from .whole import replacing

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InvalidPointsError
 from .e57_bytes import PAGE, place_of, read_bytes, read_streams, unpack
 from .lines import brief
-from .table import NORMAL, SCANNER, PointTable
+from .table import NORMAL, SCANNER, PointTable, full_color, unit_colors
 
 _HEAD = "<8sI12xQQQ"  # magic, version, offset and length of the description, size of a page
 _LONGEST = 32_000_000  # bytes of a description; that of a thousand scans has some millions
@@ -154,11 +154,9 @@ def _read_scan(file, place, end, scan, path):
         points, columns, single=all(fields[name].kind == "Float" and fields[name].width == 32 for name in names)
     )
     if fields.keys() >= set(_COLORS):
-        table.colors = np.ones((len(points), 4), np.float32)
-        for axis, name in enumerate(_COLORS):
-            low, high = _color_range(scan.element, fields[name])
-            shares = (columns.pop(name) - low) / (high - low)
-            table.colors[:, axis] = np.fmin(np.fmax(shares, 0.0), 1.0)  # NaN becomes 0
+        values = np.stack([columns.pop(name) for name in _COLORS], axis=1)
+        limits = [_color_range(scan.element, fields[name]) for name in _COLORS]
+        table.colors = _unit_colors(values, *np.transpose(limits))
     if fields.keys() >= set(_NORMALS):
         columns[NORMAL] = np.stack([columns.pop(name) for name in _NORMALS], axis=1)
     _put(table, scan.element)
@@ -190,6 +188,14 @@ def _color_range(scan, field):
     told = [_number(scan, f"colorLimits/{field.name}{end}", np.nan) for end in ("Minimum", "Maximum")]
     own = [field.scale * limit + field.offset for limit in (field.low, field.high)]
     return next(limits for limits in (told, own, (0.0, 255.0)) if limits[0] < limits[1])
+
+
+def _unit_colors(values, low, high):
+    """Return colors from 0 to 1 by their limits; by their numbers where they use the low byte alone, or exceed 1."""
+    full = full_color(values)
+    if not low.any() and (255.0 == full < high.min() or 1.0 == high.max() < full):
+        return unit_colors(values)
+    return unit_colors((values - low) / (high - low))
 
 
 def _put(table, scan):

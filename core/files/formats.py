@@ -12,12 +12,17 @@ from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
 from .arrays import read_array
 from .e57 import read_e57
 from .las import read_las
+from .las_choices import LasChoices
 from .lines import brief
+from .origin import look_like_degrees
 from .pcd import read_pcd
 from .ply import read_ply, write_ply
-from .table import PointTable, check_places
+from .ptx import read_ptx
+from .table import PointTable, check_places, without_missed
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
+
+_DEGREE = 1e5  # metres
 
 # What the modules that readers use raise about broken files; RuntimeError of archives with a password.
 _FAULTS = (ValueError, OverflowError, EOFError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile)
@@ -28,6 +33,7 @@ _READERS = {
     ".pcd": read_pcd,
     ".xyz": read_columns,
     ".pts": read_scan,
+    ".ptx": read_ptx,
     ".csv": read_columns,
     ".txt": read_columns,
     ".npy": read_array,
@@ -36,16 +42,24 @@ _READERS = {
     ".laz": read_las,
     ".e57": read_e57,
 }
+SCANS = (".las", ".laz")
 READABLE = tuple(_READERS)
+TEXTS = tuple(suffix for suffix, read in _READERS.items() if read in (read_columns, read_scan))  # rows of columns
 WRITABLE = (".ply", ".xyz", ".csv")
+SPLATS = (".splat", ".spz")  # of Gaussian splats alone, which core.splats reads
 
 
-def read_points(path) -> PointTable:
+def read_points(path, columns="", las=LasChoices()) -> PointTable:
     """Read the points of a file of one of the kinds in `READABLE`.
 
     Parameters
     ----------
     path : pathlib.Path
+    columns : str
+        Names of the columns of a file of one of the kinds in `TEXTS`, in their order, such as "x y z - r g b", where -
+        leaves one out, and ... at the end all that follow. Empty to find them.
+    las : LasChoices
+        Which points of a file of one of the kinds in `SCANS` are read.
 
     Returns
     -------
@@ -54,20 +68,41 @@ def read_points(path) -> PointTable:
     Raises
     ------
     PointCloudError
-        There is no such file, or no points in it, or it is broken; the text says where.
+        There is no such file, or no points in it, or it is broken; the text says where. Or columns are named that the
+        file does not have.
     """
     suffix = path.suffix.lower()
+    if suffix in SPLATS:
+        raise PointCloudError(f"{path} is a file of Gaussian splats. Read it as such, by read_splats.")
     if suffix not in _READERS:
-        raise PointCloudError(f"{path} is not a file with points. Give one of {', '.join(READABLE)}.")
+        known = ", ".join((*READABLE, *SPLATS))
+        raise PointCloudError(f"{path} is not a file with points. Give one of {known}.")
+    if columns.strip() and suffix not in TEXTS:
+        raise PointCloudError(f"{path} names its columns itself. Give Columns only with {', '.join(TEXTS)}.")
     with reading(path):
-        table = _READERS[suffix](path)
-    step = float(np.spacing(np.float32(check_places(table.points, path))))
-    if table.single and step * 8192.0 > np.ptp(table.points, axis=0).max():
-        table.notices.append(
-            f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in"
-            " double precision, or with a shift."
-        )
+        given = {"columns": columns} if columns.strip() else {"las": las} if suffix in SCANS else {}
+        table = without_missed(_READERS[suffix](path, **given), path)
+    check_places(table.points, path)
+    table.notices += _doubts(table, path)
     return table
+
+
+def _doubts(table, path):
+    """Yield what a user should know about the coordinates of a table."""
+    steps = np.spacing(np.abs(table.points).max(axis=0).astype(np.float32))
+    if table.degrees or look_like_degrees(table.points):
+        known = "are" if table.degrees else "look like"
+        yield (
+            f"{path.name}: x and y {known} degrees of longitude and latitude, in which lengths, areas and curvatures"
+            " mean nothing. Project the points to meters first."
+        )
+        steps[:2] *= _DEGREE
+    if table.single and steps.max() * 8192.0 > np.ptp(table.points, axis=0).max():
+        step = np.spacing(np.float32(np.abs(table.points).max()))
+        yield (
+            f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in double"
+            " precision, or with a shift."
+        )
 
 
 @contextmanager
@@ -102,7 +137,7 @@ def reading(path):
         ) from error
 
 
-def write_points(path, table, double=True):
+def write_points(path, table, double=True) -> list:
     """Write a table to a file of one of the kinds in `WRITABLE`; an older file stays if that fails.
 
     Parameters
@@ -111,12 +146,17 @@ def write_points(path, table, double=True):
     table : PointTable
     double : bool
         Whether coordinates are kept in double precision.
+
+    Returns
+    -------
+    list of str
+        What is written otherwise than it was given.
     """
     suffix = path.suffix.lower()
     if suffix not in WRITABLE:
         raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(WRITABLE)}.")
     with replacing(path) as part:
         if suffix == ".ply":
-            write_ply(part, table, double)
-        else:
-            write_columns(part, table, "," if suffix == ".csv" else " ", double)
+            return write_ply(part, table, double)
+        write_columns(part, table, "," if suffix == ".csv" else " ", double)
+        return []

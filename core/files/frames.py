@@ -4,7 +4,7 @@ import re
 from itertools import pairwise
 
 from ..errors import PointCloudError
-from .formats import READABLE
+from .formats import READABLE, SPLATS
 
 _NUMBERED = re.compile(r"(.*?)(\d+)(\D*)", re.ASCII)
 
@@ -29,14 +29,14 @@ def numbered_files(folder) -> list:
         There is no such folder, no numbered file, or files of several names.
     """
     try:
-        paths = [path for path in folder.iterdir() if path.suffix.lower() in READABLE]
+        paths = [path for path in folder.iterdir() if path.suffix.lower() in (*READABLE, *SPLATS)]
     except OSError as error:
         raise PointCloudError(f"The folder {folder} cannot be read: {error.strerror or error}. Check it.") from error
     frames = [path for path in paths if _NUMBERED.fullmatch(path.stem)]
     if not frames:
         raise PointCloudError(
             f"{folder} has no numbered files with points, such as scan_001.ply. Name frames by numbers, of one of"
-            f" {', '.join(READABLE)}."
+            f" {', '.join((*READABLE, *SPLATS))}."
         )
     return order_frames(frames)
 
@@ -70,3 +70,8 @@ def order_frames(paths) -> list:
         if int(match[2]) == int(following[2]):
             raise PointCloudError(f"{path.name} and {other.name} have the same number. Remove one of them.")
     return [path for path, _ in frames]
+
+
+def frame_number(path) -> int:
+    """Return the last number in the name of a file, by which `order_frames` goes."""
+    return int(_NUMBERED.fullmatch(path.stem)[2])

@@ -5,8 +5,9 @@ import struct
 
 import numpy as np
 
-from ..errors import InvalidPointsError, PointCloudError
-from .table import PointTable
+from ..errors import InvalidPointsError, PointCloudError, TooFewPointsError
+from .las_choices import LasChoices
+from .table import PointTable, unit_colors
 
 _COLUMNS = ("intensity", "classification", "return_number", "nir")  # that become attributes, where a file has them
 _COLORS = ("red", "green", "blue")
@@ -19,10 +20,15 @@ _CHUNKED, _LAYERED = 2, 3  # kinds of packing
 # Items of a packed point by number: bytes, and layers if packed in layers. Others are extra bytes, a layer for each.
 _ITEMS = {6: (20, 0), 7: (8, 0), 8: (6, 0), 9: (29, 0), 10: (30, 9), 11: (6, 1), 12: (8, 2), 13: (29, 1)}
 _EXTRA = (0, 14)
+_CLASSES = 256
+_MOST_DEGREES = 360.0
+_GEOGRAPHIC = (1024, 2)  # key of GeoTIFF and its value
 
 
-def read_las(path) -> PointTable:
+def read_las(path, las=LasChoices()) -> PointTable:
     """Read a LAS or LAZ file: coordinates, intensity, class, return, colors and what its maker added.
+
+    Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not.
 
     Raises
     ------
@@ -42,7 +48,7 @@ def read_las(path) -> PointTable:
             # Not in parallel: that takes memory for as many points as a file names in a chunk.
             with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader:
                 _check_size(file, reader.header, path)
-                return _read(reader, path)
+                return _read(reader, path, las)
         except (laspy.errors.LaspyException, lazrs.LazrsError) as error:
             raise ValueError(f"{error}") from error  # `read_points` tells it as it tells numpy's
 
@@ -130,38 +136,96 @@ def _read_items(data):
     return kind, [struct.unpack_from("<HH", data, 34 + 6 * index) for index in range(count)]
 
 
-def _read(reader, path):
+def _read(reader, path, choices):
     header = reader.header
     count, known = header.point_count, set(header.point_format.dimension_names)
-    extra = list(header.point_format.extra_dimension_names)
-    table = PointTable(np.empty((count, 3)))
+    names = [name for name in (*_COLUMNS, *header.point_format.extra_dimension_names) if name in known]
+    table, tally = PointTable(np.empty((count, 3))), _Tally(choices)
     colors = np.empty((count, 3), np.uint16) if known.issuperset(_COLORS) else None
     done = 0
     for block in reader.chunk_iterator(_BLOCK):
-        rows = slice(done, done + len(block))
+        kept = tally.keep(block)
         for axis, name in enumerate("XYZ"):
-            table.points[rows, axis] = block[name] * header.scales[axis] + header.offsets[axis]
+            values = block[name][kept] * header.scales[axis] + header.offsets[axis]
+            rows = slice(done, done + len(values))
+            table.points[rows, axis] = values
         if colors is not None:
             for axis, name in enumerate(_COLORS):
-                colors[rows, axis] = block[name]
-        for name in [*_COLUMNS, *extra]:
-            if name not in known:
-                continue
+                colors[rows, axis] = block[name][kept]
+        for name in names:
             values = np.asarray(block[name])
             if values.shape[1:] in ((), (3,)):
-                label = " ".join(name.split()) or "extra"
-                if label not in table.attributes:
-                    table.attributes[label] = np.empty((count, *values.shape[1:]), values.dtype)
-                table.attributes[label][rows] = values
+                _put(table, " ".join(name.split()) or "extra", rows, values[kept], count)
             elif done == 0:
                 table.notices.append(f"{path.name}: left out {name}, which has {values.shape[1]} numbers a point.")
+        if choices.withheld:
+            _put(table, "withheld", rows, np.asarray(block["withheld"])[kept].astype(np.uint8), count)
         done = rows.stop
-    if done < count:
+    if tally.total < count:
         raise InvalidPointsError(
-            f"{path} ends after {done} of the {count} points that its header names. Copy it again."
+            f"{path} ends after {tally.total} of the {count} points that its header names. Copy it again."
         )
-    if colors is not None and colors.any():  # all black are those of scanners without a camera
-        full = 255.0 if colors.max() <= 255 else 65535.0  # some programs use the low byte alone
-        table.colors = np.ones((count, 4), np.float32)
-        np.divide(colors, np.float32(full), out=table.colors[:, :3], casting="same_kind")
+    table.notices += tally.notices(path, done)
+    if done < count:
+        table.points = table.points[:done]
+        table.attributes = {name: values[:done] for name, values in table.attributes.items()}
+    if colors is not None and colors[:done].any():  # all black are those of scanners without a camera
+        table.colors = unit_colors(colors[:done])
+    table.degrees = np.abs(table.points[:, :2]).max(initial=0.0) <= _MOST_DEGREES and _is_geographic(header)
     return table
+
+
+class _Tally:
+    """Which points are read by choice, and how many there are of each class."""
+
+    def __init__(self, choices):
+        self._choices = choices
+        self.total = self._withheld = 0
+        self._found = np.zeros(_CLASSES, int)  # but withheld ones, unless these are read
+
+    def keep(self, block):
+        """Return which points of a block are read, as an index."""
+        withheld, classes = np.asarray(block["withheld"]).astype(bool), np.asarray(block["classification"])
+        kept = ~withheld | self._choices.withheld
+        self.total += len(kept)
+        self._withheld += np.count_nonzero(withheld)
+        self._found += np.bincount(classes[kept], minlength=_CLASSES)
+        if self._choices.classes:
+            kept &= np.isin(classes, [*self._choices.classes])
+        return slice(None) if kept.all() else kept
+
+    def notices(self, path, count) -> list:
+        """Tell what was left out so that this many points are read; refuse a file of which nothing is left."""
+        others, result = self._found.sum() - count, []
+        if self._withheld and self._choices.withheld:
+            result.append(
+                f"{path.name}: {self._withheld} points are withheld, which stands for deleted; they are kept."
+            )
+        elif self._withheld:
+            what = f"{self._withheld} withheld points, which stand for deleted ones. Withheld Points keeps them."
+            if not count and not others:
+                raise TooFewPointsError(f"{path} has no points but {what}")
+            result.append(f"{path.name}: left out {what}")
+        if others and not count:
+            there = ", ".join(f"{number} ({self._found[number]:,} points)" for number in np.flatnonzero(self._found))
+            wanted = ", ".join(map(str, sorted(self._choices.classes)))
+            raise TooFewPointsError(f"{path} has no points of the classes {wanted}. Choose some of {there}.")
+        if others:
+            result.append(f"{path.name}: left out {others} points of other classes than those chosen.")
+        return result
+
+
+def _put(table, name, rows, values, count):
+    """Put values into some rows of an attribute that has so many, which is made for the first of them."""
+    if name not in table.attributes:
+        table.attributes[name] = np.empty((count, *values.shape[1:]), values.dtype)
+    table.attributes[name][rows] = values
+
+
+def _is_geographic(header):
+    """Whether a file says that its coordinates are longitude and latitude: by its keys of GeoTIFF, or in words."""
+    words = "".join(detail.string for detail in header.vlrs.get("WktCoordinateSystemVlr"))
+    if words:
+        return ("GEOG" in words or "GEODCRS" in words) and "PROJ" not in words
+    keys = [key for detail in header.vlrs.get("GeoKeyDirectoryVlr") for key in detail.geo_keys]
+    return any((key.id, key.value_offset) == _GEOGRAPHIC for key in keys)

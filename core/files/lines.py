@@ -1,10 +1,31 @@
 """Text in blocks of lines: all lines of a file at once would take many times its size."""
 
+import codecs
+
 from ..errors import InvalidPointsError
 
 _BLOCK = 2**16  # characters that are read at once
 _LONGEST = 100_000  # characters of a line, thousands of columns
 _BRIEF = 100  # characters of what a text of an error quotes
+
+
+def read_text(path, skipped=()):
+    """Yield lists of lines of a file of text; see `read_blocks`."""
+    with open(path, encoding=_encoding(path), errors="replace") as file:
+        yield from read_blocks(file, path, skipped)
+
+
+def _encoding(path):
+    """Return the encoding of a file of text: its first bytes tell UTF-16, and what is no UTF-8 is Windows' own."""
+    with open(path, "rb") as file:
+        start = file.read(_BLOCK)
+    if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(start)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
 
 
 def read_blocks(file, path, skipped=()):

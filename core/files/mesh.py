@@ -5,12 +5,13 @@ import numpy as np
 from ..errors import PointCloudError
 from .origin import is_coarse
 from .ply import write_ply
+from .polygons import triangles
 from .whole import replacing
 
 _BLOCK = 10_000  # lines that are written at once
 
 
-def write_mesh(path, table, faces, double=True):
+def write_mesh(path, table, faces, double=True) -> list:
     """Write a mesh to a file of one of the kinds in `MESHES`; an older file stays if that fails.
 
     Parameters
@@ -22,12 +23,17 @@ def write_mesh(path, table, faces, double=True):
         Faces of k corners each, as indices of vertices.
     double : bool
         Whether coordinates are kept in double precision; STL has none.
+
+    Returns
+    -------
+    list of str
+        What is written otherwise than it was given.
     """
     suffix = path.suffix.lower()
     if suffix not in MESHES:
         raise PointCloudError(f"A mesh cannot be written to {path}. Give it one of {', '.join(MESHES)}.")
     with replacing(path) as part:
-        _WRITERS[suffix](part, table, double, faces)
+        return _WRITERS[suffix](part, table, double, faces) or []
 
 
 def _write_obj(path, table, double, faces):
@@ -55,7 +61,7 @@ def _write_stl(path, table, double, faces):
         raise PointCloudError(
             "STL keeps single precision, too little for coordinates as large as these. Write .ply or .obj."
         )
-    corners = np.concatenate([_triangles(part) for part in faces]) if len(faces) else np.zeros((0, 3), int)
+    corners = np.concatenate([triangles(part, table.points) for part in faces]) if len(faces) else np.zeros((0, 3), int)
     places = table.points[corners]
     normals = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -65,12 +71,6 @@ def _write_stl(path, table, double, faces):
         file.write(b"triangles of a mesh".ljust(80))
         file.write(np.array(len(rows), "<u4").tobytes())
         rows.tofile(file)
-
-
-def _triangles(faces):
-    """Divide faces of k corners, (m, k), into fans of triangles, (m (k - 2), 3)."""
-    fans = [faces[:, [0, corner, corner + 1]] for corner in range(1, faces.shape[1] - 1)]
-    return np.stack(fans, axis=1).reshape(-1, 3)
 
 
 _WRITERS = {".ply": write_ply, ".obj": _write_obj, ".stl": _write_stl}

@@ -52,7 +52,7 @@ def read_pcd(path) -> PointTable:
     table = from_columns(columns, path)
     if left_out:
         table.notices.append(f"{path.name}: left out {brief(', '.join(left_out))}, with several numbers a point.")
-    return _without_missed(table, path)
+    return table
 
 
 def _read_header(file, path):
@@ -176,15 +176,3 @@ def _split_color(column, alpha):
     parts = {name: (bits >> shift).astype(np.uint8) for name, shift in (("red", 16), ("green", 8), ("blue", 0))}
     opacity = (bits >> 24).astype(np.uint8)
     return parts | ({"alpha": opacity} if alpha and opacity.any() else {})
-
-
-def _without_missed(table, path):
-    """Leave out the points without coordinates, by which sensors with a raster of rays mark those that hit nothing."""
-    missed = np.isnan(table.points).any(axis=1)
-    if missed.any():
-        kept = ~missed
-        table.points = table.points[kept]
-        table.attributes = {name: values[kept] for name, values in table.attributes.items()}
-        table.colors = None if table.colors is None else table.colors[kept]
-        table.notices.append(f"{path.name}: left out {missed.sum()} points that the sensor missed (NaN).")
-    return table

@@ -5,14 +5,18 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidPointsError
+from .ascii_words import ascii_words
 from .lines import brief
+from .ply_lists import end_of_records, read_fixed
+from .polygons import triangles
 from .rows import read_records, read_rows
 from .table import PointTable, from_columns, to_columns
 
 _CODES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
 _NAMES = dict(zip(_CODES, ("char", "uchar", "short", "ushort", "int", "uint", "float", "double"), strict=True))
 _TYPES = {name: code for code, name in _NAMES.items()}
-_TYPES |= {np.dtype(code).name: code for code in _NAMES}  # int8, ..., float64
+_TYPES |= {np.dtype(code).name: code for code in (*_CODES, "i8", "u8")}  # int8, ..., float64; some write 64 bits
+_TYPES["bool"] = "u1"
 _ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
 _LONGEST = 1000  # characters of a line of the header, and lines
 _MOST_DIGITS = 15  # of a count
@@ -22,7 +26,12 @@ class _Element(NamedTuple):
     name: str
     count: int
     names: list  # of the properties
-    types: list  # numpy's codes; None for a list
+    types: list  # numpy's codes; a pair for a list: of its length and of its items
+
+    @property
+    def lists(self):
+        """Names of the properties that are lists."""
+        return [name for name, code in zip(self.names, self.types, strict=True) if isinstance(code, tuple)]
 
 
 class PlyVertices(NamedTuple):
@@ -71,23 +80,20 @@ def read_vertex_columns(path) -> PlyVertices:
             )
         vertex = elements[names.index("vertex")]
         before = [element for element in elements[: names.index("vertex")] if element.count]
-        for element in (vertex, *before):
-            if None in element.types:
-                raise InvalidPointsError(
-                    f"{path} has lists in its element {brief(element.name)}, before or among its points. Save it again"
-                    " with plain vertices first."
-                )
         if order is None:
-            skipped = sum(element.count for element in before)
-            columns = read_rows(file, vertex.types, vertex.count, path, skipped)
+            types = [None if isinstance(code, tuple) else code for code in vertex.types]
+            columns = read_rows(file, types, vertex.count, path, sum(element.count for element in before))
         else:
             columns = _read_binary(file, order, before, vertex, path)
+    single = [name for name in vertex.names if name not in vertex.lists]
     notices = [
         f"{path.name}: left out {element.count} {brief(element.name)} elements. Only points are read."
         for element in elements
         if element is not vertex and element.count
     ]
-    return PlyVertices(dict(zip(vertex.names, columns, strict=True)), order, comments, notices)
+    if vertex.lists:
+        notices.append(f"{path.name}: left out {brief(', '.join(vertex.lists))}, lists of numbers at each point.")
+    return PlyVertices(dict(zip(single, columns, strict=True)), order, comments, notices)
 
 
 def read_vertex_names(path) -> list:
@@ -95,6 +101,37 @@ def read_vertex_names(path) -> list:
     with open(path, "rb") as file:
         elements = _read_header(file, path)[1]
     return next((element.names for element in elements if element.name == "vertex"), [])
+
+
+def read_elements(path):
+    """Read all elements of a PLY file that has no lists, as they stand there; errors as of `read_ply`.
+
+    Returns
+    -------
+    str or None
+        As `PlyVertices.order`.
+    list of str
+        As `PlyVertices.comments`.
+    dict of str to dict of str to ndarray
+        By the names of the elements, their columns by the names of the properties.
+    """
+    found, before = {}, []
+    with open(path, "rb") as file:
+        order, elements, comments = _read_header(file, path)
+        begin = file.tell()
+        for element in elements:
+            if None in element.types:
+                raise InvalidPointsError(
+                    f"{path} has lists in its element {brief(element.name)}. Save it again without."
+                )
+            file.seek(begin)
+            if order is None:
+                columns = read_rows(file, element.types, element.count, path, sum(each.count for each in before))
+            else:
+                columns = _read_binary(file, order, before, element, path)
+            found[element.name] = dict(zip(element.names, columns, strict=True))
+            before.append(element)
+    return order, comments, found
 
 
 def _read_header(file, path):
@@ -117,7 +154,7 @@ def _read_header(file, path):
                 elements.append(_Element(name, int(count), [], []))
             case ["property", "list", length, item, name] if elements and length in _TYPES and item in _TYPES:
                 elements[-1].names.append(name)
-                elements[-1].types.append(None)
+                elements[-1].types.append((_TYPES[length], _TYPES[item]))
             case ["property", kind, name] if elements and kind in _TYPES:
                 elements[-1].names.append(name)
                 elements[-1].types.append(_TYPES[kind])
@@ -130,17 +167,18 @@ def _read_header(file, path):
 
 
 def _read_binary(file, order, before, vertex, path):
-    *skipped, record = (
-        np.dtype([(f"f{index}", order + code) for index, code in enumerate(element.types)])
-        for element in (*before, vertex)
-    )
-    begin = file.tell() + sum(element.count * kind.itemsize for element, kind in zip(before, skipped, strict=True))
+    begin = file.tell()
+    for element in before:
+        begin = end_of_records(file, begin, order, element.types, element.count, path)
+    if vertex.lists:
+        return read_fixed(file, begin, order, vertex.types, vertex.count, path)
+    record = np.dtype([(f"f{index}", order + code) for index, code in enumerate(vertex.types)])
     rows = read_records(file, begin, record, vertex.count, path)
     return [rows[f"f{index}"].astype(code) for index, code in enumerate(vertex.types)]
 
 
-def write_ply(path, table, double=True, faces=()):
-    """Write a table as a binary PLY file.
+def write_ply(path, table, double=True, faces=()) -> list:
+    """Write a table as a binary PLY file, and return notices; see `write_vertex_columns`.
 
     Parameters
     ----------
@@ -154,32 +192,42 @@ def write_ply(path, table, double=True, faces=()):
     columns = to_columns(table)
     if not double:
         columns.update((axis, columns[axis].astype(np.float32)) for axis in "xyz")
-    write_vertex_columns(path, columns, faces=faces)
+    return write_vertex_columns(path, columns, faces=faces)
 
 
-def write_vertex_columns(path, columns, order="<", comments=(), faces=()):
+def write_vertex_columns(path, columns, order="<", comments=(), faces=()) -> list:
     """Write a binary PLY file.
 
     Parameters
     ----------
     path : pathlib.Path
     columns : dict of str to ndarray, (n,)
+        Names become words of ASCII. PLY has no whole numbers of 8 bytes: those that no double can hold become two
+        columns, the second of which counts 2**32.
     order : {"<", ">"}
         Of the bytes.
     comments : sequence of str
         Lines of the header.
     faces : sequence of ndarray, (m, k) int
-        Of at most 255 corners each, as indices of vertices.
+        Of at most 255 corners each, as indices of vertices. Those of several numbers of corners become triangles, since
+        some programs read no file with both.
+
+    Returns
+    -------
+    list of str
+        What is written otherwise than it was given.
     """
-    columns = {name: values.view(np.uint8) if values.dtype == bool else values for name, values in columns.items()}
-    types = {name: _code(values) for name, values in columns.items()}
+    columns, notices = _with_types(columns)
+    names = dict(zip(columns, ascii_words(list(columns)), strict=True))
+    parts = [part for part in faces if len(part)]
+    faces = parts if len(parts) < 2 else [_all_triangles(parts, columns)]
     count = len(next(iter(columns.values())))
-    rows = np.empty(count, [(name, order + code) for name, code in types.items()])
+    rows = np.empty(count, [(names[name], order + values.dtype.str[1:]) for name, values in columns.items()])
     for name, values in columns.items():
-        rows[name] = values
+        rows[names[name]] = values
     kind = next(name for name, known in _ORDERS.items() if known == order)
     lines = ["ply", f"format {kind} 1.0", *comments, f"element vertex {count}"]
-    lines += [f"property {_NAMES[code]} {name.replace(' ', '_')}" for name, code in types.items()]
+    lines += [f"property {_NAMES[values.dtype.str[1:]]} {names[name]}" for name, values in columns.items()]
     if len(faces):
         lines += [f"element face {sum(map(len, faces))}", "property list uchar int vertex_indices"]
     with open(path, "wb") as file:
@@ -189,9 +237,41 @@ def write_vertex_columns(path, columns, order="<", comments=(), faces=()):
             lists = np.empty(len(corners), [("count", "u1"), ("corners", order + "i4", corners.shape[1])])
             lists["count"], lists["corners"] = corners.shape[1], corners
             lists.tofile(file)
+    if len(parts) > 1:
+        notices.append(
+            "Quads were divided into triangles, since some programs read no PLY file with both. No point is lost."
+        )
+    renamed = ", ".join(f"{name} as {word}" for name, word in names.items() if name != word)
+    if renamed:
+        notices.append(f"PLY takes words of ASCII alone: wrote {brief(renamed)}.")
+    return notices
 
 
-def _code(values):
-    """Return the type of the file that holds these numbers: PLY has none of 8 bytes for whole ones."""
-    code = values.dtype.str[1:]
-    return code if code in _NAMES else "f8"
+def _all_triangles(faces, columns):
+    places = np.stack([columns[axis] for axis in "xyz"], axis=1)
+    return np.concatenate([triangles(part, places) for part in faces])
+
+
+def _with_types(columns):
+    """Return columns in types that PLY has, and notices of those that became two."""
+    result, notices = {}, []
+    for name, values in columns.items():
+        if values.dtype == bool:
+            result[name] = values.view(np.uint8)
+        elif values.dtype.str[1:] in _NAMES:
+            result[name] = values
+        elif values.dtype.kind == "f" or (code := _whole_type(values)) is not None:
+            result[name] = values.astype("f8" if values.dtype.kind == "f" else code)
+        else:
+            upper = f"{name}_high"
+            result[name] = (values & values.dtype.type(2**32 - 1)).astype(np.uint32)
+            result[upper] = (values >> values.dtype.type(32)).astype("u4" if values.dtype.kind == "u" else "i4")
+            notices.append(f"PLY has no type for {name}: it is {name} + 4294967296 {upper} of the file.")
+    return result, notices
+
+
+def _whole_type(values):
+    """Return the smallest type of PLY that holds whole numbers of 8 bytes; None if there is none."""
+    low, high = (int(values.min()), int(values.max())) if len(values) else (0, 0)
+    limits = (("i4", -(2**31), 2**31 - 1), ("u4", 0, 2**32 - 1), ("f8", -(2**53), 2**53))
+    return next((code for code, least, most in limits if least <= low and high <= most), None)

@@ -1,12 +1,15 @@
 """Points one after another, as many as a header names: rows of text, or records of bytes."""
 
 import os
-from itertools import chain, islice
+from itertools import chain, groupby, islice
 
 import numpy as np
 
 from ..errors import InvalidPointsError
 from .lines import brief, is_number, read_blocks
+
+_LONG = ("i8", "u8")
+_EXACT = 2.0**53  # beyond this, doubles are no longer all whole numbers
 
 
 def read_records(file, begin, record, count, path):
@@ -36,38 +39,81 @@ def read_rows(file, types, count, path, skipped=0) -> list:
     ----------
     file : file object
         Of bytes.
-    types : list of str
-        numpy's code of each column, as the header names it.
+    types : list of str or None
+        numpy's code of each column, as the header names it; None for a list of numbers, which is passed over.
     count : int
         How many rows the header names.
     path : pathlib.Path
         The file, for the texts of errors.
     skipped : int
         How many rows stand before them.
+
+    Returns
+    -------
+    list of ndarray, (n,)
+        The columns that are no lists.
     """
-    begin, width = file.tell(), len(types)
+    begin, codes = file.tell(), [code for code in types if code is not None]
 
     def rows():
         """Return the lines of the points from the first on; there may be fewer than the header names."""
         file.seek(begin)
         filled = filter(bytes.strip, chain.from_iterable(read_blocks(file, path)))
-        return islice(filled, skipped, skipped + count)
+        lines = islice(filled, skipped, skipped + count)
+        return lines if None not in types else _without_lists(lines, types, path)
 
     lines = rows()
     line = next(lines, None)
     if line is None:
-        values = np.empty((0, width))
+        values = np.empty((0, len(codes)))
     else:
         try:
             values = np.loadtxt(chain([line], lines), ndmin=2, comments=None, encoding="ascii")
         except ValueError:
-            _refuse_row(rows(), width, path)
+            _refuse_row(rows(), len(codes), path)
             raise
-    if values.shape[1] != width:
-        _refuse_row(rows(), width, path)
+    if values.shape[1] != len(codes):
+        _refuse_row(rows(), len(codes), path)
     if len(values) < count:
         raise too_short(path, len(values), count)
-    return [_typed(column, code) for column, code in zip(values.T, types, strict=True)]
+    return [
+        _load_whole(rows(), index, code) if _is_long(column, code) else _typed(column, code)
+        for index, (column, code) in enumerate(zip(values.T, codes, strict=True))
+    ]
+
+
+def _without_lists(lines, types, path):
+    """Yield lines without their lists: each is a number of numbers, and these."""
+    steps = [(len([*run]), is_list) for is_list, run in groupby(code is None for code in types)]
+    for number, line in enumerate(lines, start=1):
+        words, kept, place = line.split(), [], 0
+        for length, is_list in steps:
+            if not is_list:
+                kept += words[place : place + length]
+                place += length
+                continue
+            for _ in range(length):
+                word = words[place] if place < len(words) else b""
+                place += 1 + int(word) if word.isdigit() else len(words) + 1
+        if place != len(words):
+            raise InvalidPointsError(
+                f"{path}, point {number}: {len(words)} numbers, which are not those of its properties and lists."
+                " Correct the file."
+            )
+        yield b" ".join(kept)
+
+
+def _is_long(column, code):
+    """Whether a column has whole numbers of 8 bytes whose last digits doubles would lose."""
+    if code not in _LONG or not len(column):
+        return False
+    limits = np.iinfo(code)
+    return float(limits.min) <= column.min() and _EXACT <= np.abs(column).max() < float(limits.max)
+
+
+def _load_whole(lines, index, code):
+    """Read a column of whole numbers as such."""
+    return np.loadtxt(lines, code, usecols=index, ndmin=1, comments=None, encoding="ascii")
 
 
 def _typed(column, code):

@@ -30,6 +30,8 @@ class PointTable:
         Red, green, blue and alpha from 0 to 1, in sRGB.
     single : bool
         Whether the coordinates were kept in single precision.
+    degrees : bool
+        Whether x and y are known to be longitude and latitude.
     notices : list of str
         What was left out.
     """
@@ -38,6 +40,7 @@ class PointTable:
     attributes: dict = field(default_factory=dict)
     colors: np.ndarray | None = None
     single: bool = False
+    degrees: bool = False
     notices: list = field(default_factory=list)
 
 
@@ -71,7 +74,8 @@ def from_columns(columns, path):
     table.single = any(place.dtype == np.float32 for place in places)
     colors = next(filter(None, map(take, _COLORS)), None)
     if colors is not None:
-        table.colors = _unit_colors(colors, take(("alpha",)))
+        alpha = take(("alpha",))
+        table.colors = unit_colors(np.stack(colors, axis=1), alpha and alpha[0])
     normals = take(_NORMALS)
     if normals is not None:
         table.attributes[NORMAL] = np.stack(normals, axis=1)
@@ -85,19 +89,40 @@ def from_columns(columns, path):
     return table
 
 
-def _unit_colors(colors, alpha):
-    """Return red, green, blue and alpha from 0 to 1, by the type of the numbers or, where it tells nothing, by them."""
-    values = np.stack(colors, axis=1)
-    if values.dtype.kind == "f":
-        whole = bool((values == np.round(values)).all())
-        full = 1.0 if values.max() <= 1.0 and not whole else 255.0 if values.max() <= 255.0 else 65535.0
-    else:
-        full = float(np.iinfo(values.dtype).max) if values.dtype.itemsize <= 2 else 255.0
-    result = np.ones((len(values), 4), np.float32)
-    result[:, :3] = values / full
-    if alpha is not None:
-        result[:, 3] = alpha[0] / (full if alpha[0].dtype == values.dtype else max(1.0, float(alpha[0].max())))
-    return np.fmin(np.fmax(result, 0.0), 1.0)  # NaN becomes 0
+def unit_colors(colors, alpha=None):
+    """Return colors from 0 to 1.
+
+    Parameters
+    ----------
+    colors : ndarray, (n, 3)
+        Red, green and blue in the range of their file.
+    alpha : ndarray, (n,), optional
+        In a range of its own.
+
+    Returns
+    -------
+    ndarray, (n, 4) float32
+    """
+    result = np.ones((len(colors), 4), np.float32)
+    for part, given in ((result[:, :3], colors), (result[:, 3], alpha)):
+        if given is not None:
+            given = given.view(np.uint8) if given.dtype == np.int8 else given  # which programs take for bytes
+            np.divide(given, np.float32(full_color(given)), out=part, casting="same_kind")
+    return np.fmin(np.fmax(result, 0.0, out=result), 1.0, out=result)  # NaN becomes 0
+
+
+def full_color(values) -> float:
+    """Return the number that stands for a full color: by the type of bytes, which is told, otherwise by the numbers.
+
+    Programs write 8 bits in types of 16, and from 0 to 1 in whole numbers where all colors are pure.
+    """
+    if values.dtype.itemsize == 1:
+        return 255.0
+    largest = float(np.fmax.reduce(values, axis=None, initial=0))
+    bright = largest < 2.0 and not (values == np.round(values)).all()  # brighter than 1, since whole numbers would be
+    if largest <= 1.0 or bright:
+        return 1.0
+    return next((full for full in (255.0, 65535.0, 2.0**32 - 1.0) if largest <= full), 1.0)
 
 
 def to_columns(table) -> dict:
@@ -125,6 +150,30 @@ def _free_name(name, columns):
     """Return a name for one more column, with a number if it is taken: an attribute may be called x."""
     numbered = (f"{name}_{number}" for number in count(2))
     return next(free for free in chain([name], numbered) if free not in columns)
+
+
+def without_missed(table, path) -> PointTable:
+    """Return a table without the points that have no place: sensors with a raster of rays write NaN where they miss.
+
+    Parameters
+    ----------
+    table : PointTable
+        Gets a notice, and loses what is left out itself.
+    path : pathlib.Path
+        The file, for the texts.
+    """
+    kept = np.isfinite(table.points).all(axis=1)
+    missed = len(kept) - np.count_nonzero(kept)
+    if not missed:
+        return table
+    what = "NaN or infinity" if np.isinf(table.points).any() else "NaN"
+    if missed == len(kept):
+        raise TooFewPointsError(f"{path} has no points: all {missed} are without a place ({what}). Export it again.")
+    table.points = table.points[kept]
+    table.attributes = {name: values[kept] for name, values in table.attributes.items()}
+    table.colors = None if table.colors is None else table.colors[kept]
+    table.notices.append(f"{path.name}: left out {missed} points that the sensor missed ({what}).")
+    return table
 
 
 def check_places(points, path) -> float:

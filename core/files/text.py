@@ -2,18 +2,24 @@
 
 import re
 from functools import partial
-from itertools import chain, islice
+from itertools import chain
 
 import numpy as np
 
 from ..errors import InvalidPointsError
-from .lines import brief, is_number, read_blocks
+from .cells import Rows, find_rows, load, load_whole
+from .digits import shortest
+from .guess import guess_names
+from .layout import find_layout, given_layout
+from .lines import is_number, read_text
+from .names import standard_names
+from .ptx import holds_ptx, read_ptx
 from .table import PointTable, from_columns, to_columns
 
-_DELIMITERS = (";", "\t", None, ",")  # in this order; None is white space
 _BLOCK = 10_000  # lines that are written at once
-_HEADER = 20  # lines before the first point at most
 _MOST_DIGITS = 15  # of a number of points; no file has so many
+_SKIPPED = ("#", "//")  # how lines begin that may be of any length
+_EXACT = 2.0**53  # from here on doubles skip whole numbers
 _SCAN_NAMES = {  # of the columns of PTS files
     4: ("x", "y", "z", "intensity"),
     6: ("x", "y", "z", "r", "g", "b"),
@@ -21,24 +27,91 @@ _SCAN_NAMES = {  # of the columns of PTS files
 }
 
 
-def read_columns(path) -> PointTable:
+def read_columns(path, columns="") -> PointTable:
     """Read a text file with a point a line.
 
-    Columns are separated by semicolons, tabs, white space or commas; beside commas as separators, numbers have decimal
-    points, otherwise points or commas. The last line before the first point, marked as a comment or not, may name the
-    columns; without names the first three are x y z.
+    Columns are separated by semicolons, tabs, bars, white space or commas; beside commas, numbers have decimal
+    points, otherwise points or commas. A line before the first point, marked as a comment or not, may name the columns;
+    without names the first three are x y z, and others colors or normals if they look like them. A PTX file by another
+    name is read as such.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    columns : str
+        Names of the columns in their order; see `given_layout`. Empty to find them.
     """
-    return _read_rows(partial(_blocks, path), path)
+    return _read_text(partial(read_text, path, _SKIPPED), path, columns)
 
 
-def _blocks(path, skipped=("#", "//")):
-    with open(path, encoding="utf-8-sig", errors="replace") as file:
-        yield from read_blocks(file, path, skipped)
+def read_scan(path, columns="") -> PointTable:
+    """Read a PTS file: scans one after another, each begins with the number of its points; columns as above."""
+    return _read_text(lambda: _without_counts(read_text(path, _SKIPPED), path), path, columns, _SCAN_NAMES)
 
 
-def read_scan(path) -> PointTable:
-    """Read a PTS file: scans one after another, each begins with the number of its points."""
-    return _read_rows(lambda: _without_counts(_blocks(path), path), path, _SCAN_NAMES)
+def _read_text(blocks, path, columns, usual=None):
+    """Read rows of numbers, in which columns without names have the usual ones for their number."""
+    columns = columns.strip()
+    if not columns and holds_ptx(read_text(path, _SKIPPED)):
+        return read_ptx(path)
+    rows = find_rows(blocks, path)
+    layout = given_layout(columns, rows) if columns else find_layout(rows, usual or {})
+    others, values, notices = load(rows, layout.places, layout.others, layout.label)
+    extra = {}
+    for index, column in zip(others, values.T[3:], strict=True):
+        extra[layout.label(index)], lost = _exact(rows, index, column)
+        if lost:
+            notices.append(f"{path.name}: {layout.label(index)} has whole numbers whose last digits are rounded.")
+    nameless = [layout.label(index) for index in others if not layout.names[index]]
+    if nameless:
+        guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless)
+        extra = _renamed(extra, dict(zip(nameless, guessed, strict=True)))
+        notices.append(_tell_guess(path, layout.places, nameless, guessed))
+    table = from_columns(dict(zip("xyz", values.T, strict=False)) | _renamed(extra, standard_names(extra)), path)
+    table.degrees = layout.degrees
+    table.notices += [*layout.notices, *notices]
+    if layout.announced not in (None, len(values)):
+        table.notices.append(f"{path.name}: announces {layout.announced} points, but {len(values)} lines follow.")
+    return table
+
+
+def _exact(rows, index, values):
+    """Return values as whole numbers if doubles would lose their digits, and whether some are lost nevertheless."""
+    if not (np.abs(values) >= _EXACT).any():
+        return values, False
+    whole, lost = load_whole(rows, index)
+    return (values if whole is None else whole), lost
+
+
+def _renamed(columns, names):
+    """Return columns by new names, but for those that others have, such as the places."""
+    taken = {*"xyz", *columns} - {*names}
+    return {_free(names.get(name, name), name, taken): values for name, values in columns.items()}
+
+
+def _free(new, old, taken):
+    """Return the new name of a column if it is free, otherwise the old one, which no place may have."""
+    if new != old and new not in taken:
+        return new
+    return f"{old}_2" if old in ("x", "y", "z") else old
+
+
+def _tell_guess(path, places, labels, names):
+    """Tell what columns without names were taken for."""
+    parts = [
+        (what, [label for label, name in zip(labels, names, strict=True) if name in kind])
+        for what, kind in (
+            ("colors", ("r", "g", "b", "alpha")),
+            ("normals", ("nx", "ny", "nz")),
+            ("intensity", ("intensity",)),
+            ("attributes", labels),
+        )
+    ]
+    told = "; ".join(f"{', '.join(found)} as {what}" for what, found in parts if found)
+    return (
+        f"{path.name}: not all columns have names. Read {', '.join(f'column_{i + 1}' for i in places)} as x y z;"
+        f" {told}. If that is wrong, give their names in Columns at the import."
+    )
 
 
 def _without_counts(blocks, path):
@@ -51,7 +124,7 @@ def _without_counts(blocks, path):
                 break
             word = line.strip()
             if word and missing:
-                missing -= 1
+                missing -= missing < count or _holds_numbers(word)
             elif word.isdecimal():
                 count = missing = int(word[:_MOST_DIGITS])
                 counted, lines[index] = True, ""
@@ -70,142 +143,34 @@ def _without_counts(blocks, path):
         )
 
 
-def _read_rows(blocks, path, usual=()) -> PointTable:
-    """Read rows of numbers, in which columns without names have the usual ones for their number.
-
-    `blocks` gives the lines of the file anew at each call; see `read_blocks`.
-    """
-    first, words, delimiter, before = _find_first(blocks(), path)
-    names = _find_names(before, delimiter, len(words))
-    if not names and len(words) in usual:
-        names = usual[len(words)]
-    numeric = [index for index, word in enumerate(words) if is_number(word)]
-    lower = [name.lower() for name in names]
-    if {"x", "y", "z"} <= set(lower):
-        places = [lower.index(axis) for axis in "xyz"]
-    else:
-        places = numeric[:3]
-    extra = [index for index in numeric if index not in places and index < len(names)]
-    notices = []
-    unnamed = len(numeric) - len(extra) - 3
-    if unnamed > 0:
-        notices.append(f"{path.name}: left out {unnamed} columns that no header names.")
-    try:
-        values = _load(blocks(), first, delimiter, places + extra)
-    except ValueError:
-        problem = _find_problem(blocks(), first, delimiter, places, names)
-        if problem:
-            raise InvalidPointsError(
-                f"{path} does not hold columns of numbers x y z: {problem}. Correct the file."
-            ) from None
-        problem = _find_problem(blocks(), first, delimiter, extra, names)
-        if not problem:
-            raise
-        notices.append(f"{path.name}: left out all columns but x y z, for {problem}.")
-        extra, values = [], _load(blocks(), first, delimiter, places)
-    columns = dict(zip("xyz", values.T, strict=False))
-    columns.update((names[index], values[:, 3 + number]) for number, index in enumerate(extra))
-    table = from_columns(columns, path)
-    table.notices += notices
-    return table
-
-
-def _load(blocks, first, delimiter, columns):
-    rows = chain.from_iterable(_plain(lines, delimiter) for lines in blocks)
-    return np.loadtxt(islice(rows, first, None), delimiter=delimiter, usecols=columns, ndmin=2)
-
-
-def _plain(lines, delimiter):
-    """Return lines as numpy reads them: it knows comments with # alone, and decimal points."""
-    text = "\n".join(lines)
-    if "//" in text:
-        text = re.sub("//.*", "", text)
-    elif delimiter == "," or "," not in text:
-        return lines
-    return (text if delimiter == "," else text.replace(",", ".")).split("\n")
-
-
-def _find_first(blocks, path):
-    """Find the first line with three numbers: how many are before it, its words, what separates them, the last before.
-
-    That is the last one with anything in it; empty if there is none.
-    """
-    seen, before = 0, ""
-    for number, line in enumerate(chain.from_iterable(blocks)):
-        if not line.strip():
-            continue
-        for delimiter in _DELIMITERS:
-            words = _words(line, delimiter)
-            if sum(map(is_number, words)) >= 3:
-                return number, words, delimiter, before
-        seen, before = seen + 1, line
-        if seen > _HEADER:
-            break
-    problem = "there are none" if seen <= _HEADER else f"there are none in its first {_HEADER} lines"
-    raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {problem}. Correct the file.")
-
-
-def _words(line, delimiter):
-    """Split a line without its comment, with decimal points; no words if the delimiter cannot be meant."""
-    line = line.split("#")[0].split("//")[0].strip()
-    if delimiter is None and re.search(r"\s,|,\s|,$", line):
-        return []
-    if delimiter != ",":
-        line = line.replace(",", ".")
-    return [word.strip() for word in line.split(delimiter)]
-
-
-def _find_names(line, delimiter, width):
-    """Return the names of the columns from the line before the first point; none if it does not fit."""
-    line = line.strip().lstrip("#/%! ")
-    for separator in (delimiter, None):
-        names = [name.strip().strip('"').strip() for name in line.split(separator)]
-        if len(names) == width and not any(map(is_number, names)) and len(set(names)) == width:
-            return tuple(names)
-    return ()
-
-
-def _find_problem(blocks, first, delimiter, columns, names):
-    """Return what is wrong with the first line that lacks a number in one of some columns; empty if none does."""
-    for number, line in enumerate(islice(chain.from_iterable(blocks), first, None), start=first + 1):
-        words = _words(line, delimiter) if line.strip() else []
-        if not any(words):
-            continue
-        for index in columns:
-            if index >= len(words):
-                return f"line {number} has {len(words)} columns only"
-            if not is_number(words[index]):
-                return f"line {number} has {brief(words[index])!r} where a number should be"
-    return ""
+def _holds_numbers(line):
+    """Tell whether a line is a point, and not one of names after a number of points."""
+    return any(map(is_number, re.split(r"[\s,;]+", line)))
 
 
 def read_vertices(path) -> PointTable:
     """Read the vertices of an OBJ file, with colors if they have any."""
     faces = 0
 
-    def blocks(other=()):
-        """Yield the lines of vertices without their v, and what is given in place of others."""
+    def blocks():
+        """Yield the lines of vertices without their v, and empty ones in place of others."""
         nonlocal faces
         faces = 0
-        for lines in _blocks(path, skipped=("#", "f", "l")):
+        for lines in read_text(path, ("#", "f", "l")):
             lines = [line.lstrip() for line in lines]
             faces += sum(line.startswith(("f ", "f\t", "l ", "l\t")) for line in lines)
-            yield [part for line in lines for part in ((line[2:],) if line.startswith(("v ", "v\t")) else other)]
+            yield [line[2:] if line.startswith(("v ", "v\t")) else "" for line in lines]
 
-    rows = chain.from_iterable(blocks())
-    words = next(filter(None, (row.split("#")[0].split() for row in rows)), None)
+    words = next(filter(None, (row.split("#")[0].split() for row in chain.from_iterable(blocks()))), None)
     if words is None:
         raise InvalidPointsError(f"{path} has no vertices, which are lines that begin with v. It holds no points.")
     names = {6: "x y z r g b", 7: "x y z w r g b"}.get(len(words), "x y z").split()
-    used = [index for index, name in enumerate(names) if name != "w"]
-    try:
-        values = np.loadtxt(chain.from_iterable(blocks()), usecols=used, ndmin=2)
-    except ValueError:
-        problem = _find_problem(blocks(other=[""]), 0, None, used, names)
-        if not problem:
-            raise
-        raise InvalidPointsError(f"{path} has a broken vertex: {problem}. Correct the file.") from None
-    table = from_columns(dict(zip([names[index] for index in used], values.T, strict=True)), path)
+    rows = Rows(blocks, path, 0, None, [], [words])
+    colors = [index for index, name in enumerate(names) if name in "rgb"]
+    others, values, notices = load(rows, [0, 1, 2], colors, names.__getitem__)
+    columns = dict(zip("xyz", values.T, strict=False)) | {names[i]: values[:, 3 + n] for n, i in enumerate(others)}
+    table = from_columns(columns, path)
+    table.notices += notices
     if faces:
         table.notices.append(f"{path.name}: left out {faces} faces and lines. Only points are read.")
     return table
@@ -224,7 +189,10 @@ def write_columns(path, table, delimiter=" ", double=True):
         Whether coordinates are written with the digits of double precision.
     """
     columns = to_columns(table)
-    formats = ["%d" if values.dtype.kind in "biu" else "%.9g" for values in columns.values()]
+    if not double:
+        columns.update((axis, columns[axis].astype(np.float32)) for axis in "xyz")
+    formats = [_text_format(values) for values in columns.values()]
+    columns = {name: shortest(item) if item.dtype == np.float32 else item for name, item in columns.items()}
     if double:
         formats[:3] = 3 * ["%.15g"]
     with open(path, "w", encoding="utf-8", newline="\n") as file:
@@ -232,5 +200,17 @@ def write_columns(path, table, delimiter=" ", double=True):
         file.write(("# " if delimiter.isspace() else "") + delimiter.join(names) + "\n")
         line = delimiter.join(formats) + "\n"
         for start in range(0, len(table.points), _BLOCK):  # some rows at a time take a third of the time of savetxt
-            rows = np.stack([values[start : start + _BLOCK] for values in columns.values()], axis=1, dtype=np.float64)
+            parts = [values[start : start + _BLOCK] for values in columns.values()]
+            rows = np.empty((len(parts[0]), len(parts)), object)  # doubles would round whole numbers of 64 bits
+            for index, part in enumerate(parts):
+                rows[:, index] = part
             file.write((line * len(rows)) % tuple(rows.reshape(-1).tolist()))
+
+
+def _text_format(values):
+    """Return how numbers are written so that they are the same when they are read again, in as few digits."""
+    if values.dtype.kind in "biu":
+        return "%d"
+    if values.dtype.itemsize < 8:
+        return "%.9g"
+    return "%.15g" if (values == np.rint(values)).all() and np.abs(values).max(initial=0.0) < 1e15 else "%s"

@@ -11,14 +11,14 @@ from .boundary import Boundary, find_boundary, given_boundary, measure_boundary,
 from .cells import measure_cells
 from .components import label_components, move_apart
 from .distances import measure_roughness
-from .nearest import Nearest, find_nearest
-from .noise import FILLING, LEFT, MOST, noise_level, project_points
+from .nearest import Nearest, changed_rows, find_nearest
+from .noise import FILLING, LEFT, MOST, near_misfit, noise_level, project_points
 from .normals import covariance_normals, orient_outwards, unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
 from .quadrics import Quadrics, check_surface, frames
-from .sheets import fit_sheets, label_sheets, separate_sheets
+from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 
 _DRAWN = 20  # points that a surface needs at least, to be drawn
 _NARROW = 0.6  # h over the depth of the surface that is too wide
@@ -54,10 +54,19 @@ class Sample:
 
 @dataclass(frozen=True)
 class Surface:
-    """A sample, and a quadric through the neighbours of each point on its own sheet; others weigh nothing there."""
+    """A sample, and a quadric through the neighbours of each point on its own sheet; others weigh nothing there.
+
+    `sheets` is how these were told; None where close sheets are not kept apart.
+    """
 
     sample: Sample
     quadrics: Quadrics
+    sheets: Sheets | None = None
+
+    @property
+    def mixed(self):
+        """The quadrics through all neighbours, whatever their sheet."""
+        return self.quadrics if self.sheets is None else self.sheets.mixed
 
 
 @dataclass(frozen=True)
@@ -267,8 +276,10 @@ def divide_components(sample, needed):
     return _regroup(sample, label_components(sample.nearest), needed)
 
 
-def fit_surface(sample, sheets):
+def fit_surface(sample, sheets, before=None):
     """Fit a quadric around every point, to the neighbours of its own sheet if close sheets are to be kept apart.
+
+    `before` is the surface of the same points before some of them moved.
 
     Returns
     -------
@@ -278,12 +289,14 @@ def fit_surface(sample, sheets):
     if not sheets:
         check_surface(nearest.quadrics)
         return Surface(sample, nearest.quadrics)
-    quadrics, nearest = fit_sheets(nearest)
-    return Surface(replace(sample, nearest=nearest), quadrics)
+    fitted = fit_sheets(nearest, before and before.sheets)
+    return Surface(replace(sample, nearest=fitted.nearest), fitted.quadrics, fitted)
 
 
 def remove_noise(surface, options):
     """Move points onto the surface that their neighbours describe, where the options or the noise ask for it.
+
+    Each round looks again only at points that the last one moved, and at their neighbours.
 
     Returns
     -------
@@ -292,31 +305,36 @@ def remove_noise(surface, options):
     """
     if options.projection == "off":
         return surface
-    noise = _noise(surface)
+    near = near_misfit(surface.sample.nearest)
+    noise = _noise(surface, near)
     if options.projection != "auto":
-        return _project(surface, options.projection, noise, np.ones(len(noise), dtype=bool), options.sheets)
+        return _project(surface, options.projection, noise, np.ones(len(noise), dtype=bool))
     noisy = noise > 0.0
     if noisy.mean() < _MANY:
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
     for _ in range(MOST):
-        level = np.where(filling, first, noise)
-        surface = _project(surface, "quadric", level, noisy, options.sheets)
-        noise, missed = _noise(surface), surface.quadrics.misfit / surface.sample.nearest.spacing
+        level, before = np.where(filling, first, noise), surface.sample.nearest
+        surface = _project(surface, "quadric", level, noisy)
+        nearest = surface.sample.nearest
+        rows = changed_rows(nearest, before)
+        near[rows] = near_misfit(nearest, rows)
+        noise, missed = _noise(surface, near), surface.quadrics.misfit / nearest.spacing
         noisy &= np.where(filling, np.median(missed[filling]) if filling.any() else 0.0, noise) > LEFT
         if not noisy.any():
             break
     return replace(surface, sample=replace(surface.sample, noise=first))
 
 
-def _noise(surface):
-    return noise_level(surface.sample.nearest, surface.quadrics.misfit)
+def _noise(surface, near):
+    return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 
-def _project(surface, method, noise, moving, sheets):
-    sample, points = surface.sample, surface.sample.nearest.points
-    moved = project_points(points, method, noise, sample.component)
-    return fit_surface(replace(sample, nearest=find_nearest(np.where(moving[:, None], moved, points))), sheets)
+def _project(surface, method, noise, moving):
+    sample, tree = surface.sample, surface.sample.nearest.tree
+    points, rows = tree.data.copy(), np.flatnonzero(moving)
+    points[rows] = project_points(tree, rows, method, noise, sample.component)
+    return fit_surface(replace(sample, nearest=find_nearest(points)), surface.sheets is not None, surface)
 
 
 def divide_sheets(surface, needed):

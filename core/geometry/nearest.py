@@ -79,6 +79,12 @@ def find_nearest(points):
     return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance))
 
 
+def changed_rows(nearest, before):
+    """Return which of the same points have moved, or have neighbours that did or that are others than before, (k,)."""
+    moved = (nearest.points != before.points).any(axis=1)
+    return np.flatnonzero(moved | moved[nearest.index].any(axis=1) | (nearest.index != before.index).any(axis=1))
+
+
 def spacing_of(distance):
     """Return the spacing of an even sample as dense as the nearest twelve neighbours, by their distances (n, k)."""
     last = min(12, distance.shape[1] - 1)

@@ -1,9 +1,9 @@
 """Noise: its measure around every point, and points moved onto the surface that their neighbours describe."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from .nearest import COUNT, fading_weights
+from ..blocks import blocks, on_all_cores
+from .nearest import fading_weights
 from .quadrics import fit_quadrics
 
 _FEW = 20  # neighbours of the fit that tells noise from shape, by that to all 40
@@ -14,17 +14,27 @@ LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with th
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
 _NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round what is shape
+_BLOCK = 1 << 12  # points projected at one time
 
 
-def noise_level(nearest, misfit):
+def near_misfit(nearest, rows=None):
+    """Return how far quadrics through 20 neighbours miss these, of all m points or of some rows, (k,)."""
+    rows = np.arange(len(nearest.points)) if rows is None else rows
+    part = slice(_FEW + 1)
+    weight = fading_weights(nearest.distance[rows, part])
+    return fit_quadrics(nearest.points, nearest.index[rows, part], weight, rows).misfit
+
+
+def noise_level(nearest, near, mixed, misfit):
     """Measure the noise around every point as a share of the spacing.
 
     Parameters
     ----------
     nearest : Nearest
         Of m points.
-    misfit : ndarray, (m,)
-        Of quadrics that keep close sheets apart: where it is much less, there are several sheets and no noise.
+    near, mixed, misfit : ndarray, (m,)
+        Of quadrics through 20 neighbours, through 40, and through those of 40 that lie on the point's own sheet: where
+        the last is much less, there are several sheets and no noise.
 
     Returns
     -------
@@ -34,14 +44,8 @@ def noise_level(nearest, misfit):
         All are geometric means over the neighbourhood: an edge that runs through it is no noise. The majority of
         the neighbours decides.
     """
-
-    def missed(count):
-        weight = fading_weights(nearest.distance[:, : count + 1])
-        return fit_quadrics(nearest.points, nearest.index[:, : count + 1], weight).misfit
-
     averaging = nearest.averaging()
-    every = np.stack([missed(_FEW), missed(COUNT - 1), misfit], axis=1) / nearest.spacing[:, None]
-    logarithms = np.log(np.maximum(every, 1e-12))
+    logarithms = np.log(np.maximum(np.stack([near, mixed, misfit], axis=1) / nearest.spacing[:, None], 1e-12))
     for _ in range(_ROUNDS):
         logarithms = averaging @ logarithms
     few, many, own = np.exp(logarithms.T)
@@ -49,13 +53,15 @@ def noise_level(nearest, misfit):
     return np.where(averaging @ noisy.astype(float) > 0.5, few, 0.0)
 
 
-def project_points(points, method, noise, component=None):
-    """Move points onto the surface that their neighbours describe.
+def project_points(tree, rows, method, noise, component=None):
+    """Move some points onto the surface that their neighbours describe.
 
     Parameters
     ----------
-    points : ndarray, (m, 3)
-        Components stand far apart.
+    tree : cKDTree
+        Of m points; components stand far apart in it.
+    rows : ndarray, (k,) int
+        Which points to move.
     method : {"quadric", "plane"}
         Onto a quadric through their neighbours, or onto the plane through the mean of 90, as the paper does.
     noise : ndarray, (m,)
@@ -65,20 +71,31 @@ def project_points(points, method, noise, component=None):
 
     Returns
     -------
-    ndarray, (m, 3)
+    ndarray, (k, 3)
     """
-    smallest = len(points) if component is None else np.bincount(component).min()
+    smallest = tree.n if component is None else np.bincount(component).min()
     # A quadric has six coefficients.
-    many = (
-        np.clip(6.0 * (noise / LEFT) ** 2, *_NEIGHBORS) if method == "quadric" else np.full(len(noise), _NEIGHBORS[1])
-    )
-    many = np.minimum(many.astype(int), smallest - 1)
-    distance, index = cKDTree(points).query(points, k=many.max() + 1, workers=-1)
+    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, *_NEIGHBORS) if method == "quadric" else _NEIGHBORS[1]
+    many = np.minimum(np.full(len(rows), asked, dtype=int), smallest - 1)
+    order = np.argsort(many, kind="stable")  # those who ask for few neighbours do not wait for others' many
+    result = np.empty((len(rows), 3))
+
+    def project(part):
+        block = order[part]
+        result[block] = _projected(tree, rows[block], many[block], method)
+
+    on_all_cores(project, blocks(len(rows), _BLOCK))
+    return result
+
+
+def _projected(tree, rows, many, method):
+    points = tree.data
+    distance, index = tree.query(points[rows], k=many.max() + 1)
     weight = fading_weights(np.minimum(distance, distance[np.arange(len(many)), many, None]))
     if method == "quadric":
-        return points + fit_quadrics(points, index, weight).height
+        return points[rows] + fit_quadrics(points, index, weight, rows).height
     weight /= weight.sum(axis=1, keepdims=True)
     mean = np.einsum("ik,ikc->ic", weight, points[index])
     centered = points[index] - mean[:, None]
     normal = np.linalg.eigh(np.swapaxes(weight[:, :, None] * centered, 1, 2) @ centered)[1][:, :, 0]
-    return points + np.einsum("ic,ic->i", mean - points, normal)[:, None] * normal
+    return points[rows] + np.einsum("ic,ic->i", mean - points[rows], normal)[:, None] * normal

@@ -41,6 +41,10 @@ class Quadrics:
     misfit: np.ndarray
     curved: np.ndarray
 
+    def take(self, rows):
+        """Return those of some rows, (k,) int."""
+        return Quadrics(**{quantity.name: getattr(self, quantity.name)[rows] for quantity in fields(self)})
+
     def put(self, rows, others):
         """Return the same but for some rows, (k,) int, with the quadrics of others, of k points, in their place."""
         result = {quantity.name: getattr(self, quantity.name).copy() for quantity in fields(self)}

@@ -1,5 +1,8 @@
 """Keep close sheets of a surface apart: which points lie on the same sheet, told by normals and by ways along it."""
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
@@ -7,8 +10,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 from ..blocks import blocks, on_all_cores
 from .components import label_connected, number_by_size
 from .distances import pair_heights
-from .nearest import ON, SMOOTH
-from .quadrics import check_surface, fit_quadrics, frames
+from .nearest import ON, SMOOTH, Nearest, changed_rows
+from .quadrics import Quadrics, check_surface, fit_quadrics, frames
 
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
@@ -69,7 +72,28 @@ def on_sheet(nearest, normals, rows, other, distance, close=2.0):
     return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], close), cosine
 
 
-def fit_sheets(nearest):
+class Sheets(NamedTuple):
+    """What is known of the sheet around every point, made by `fit_sheets`.
+
+    Attributes
+    ----------
+    quadrics : Quadrics
+        Of the m points, through neighbours on their own sheets.
+    nearest : Nearest
+        With the neighbours on other sheets at weight zero.
+    mixed : Quadrics
+        Through all neighbours.
+    planes : ndarray, (m, 3)
+        Unit normals by which neighbours on other sheets were told.
+    """
+
+    quadrics: Quadrics
+    nearest: Nearest
+    mixed: Quadrics
+    planes: np.ndarray
+
+
+def fit_sheets(nearest, before=None) -> Sheets:
     """Fit a quadric around every point to the neighbours of its own sheet.
 
     Where the quadric of all neighbours misses them, a plane is looked for among those through the point and two of its
@@ -80,39 +104,46 @@ def fit_sheets(nearest):
     ----------
     nearest : Nearest
         Of m points.
-
-    Returns
-    -------
-    Quadrics
-        Of the m points.
-    nearest : Nearest
-        With the neighbours on other sheets at weight zero.
+    before : Sheets, optional
+        Of the same points before some of them moved, which is kept where nothing has changed.
     """
-    points, index = nearest.points, nearest.index
-    surface = nearest.quadrics
-    check_surface(surface)
+    points, index, whole = nearest.points, nearest.index, nearest.weight
+    if before is None:
+        rows, mixed = np.arange(len(points)), nearest.quadrics
+    else:
+        rows = changed_rows(nearest, before.nearest)
+        mixed = before.mixed.put(rows, fit_quadrics(points, index[rows], whole[rows], rows))
+    check_surface(mixed)
     spacing = nearest.spacing
-    mixed = np.flatnonzero(surface.misfit > ON * spacing)
-    if not len(mixed):
-        return surface, nearest
-    normals = surface.normals.copy()
+    missed = mixed.misfit > ON * spacing
+    planes = mixed.normals.copy()
+    if before is not None:
+        planes[missed] = before.planes[missed]
+    looked = rows[missed[rows]]
 
     def find(part):
-        rows = mixed[part]
-        offset = points[index[rows]] - points[rows, None]
-        normals[rows] = _own_plane(offset, nearest.weight[rows], spacing[rows])
+        block = looked[part]
+        offset = points[index[block]] - points[block, None]
+        planes[block] = _own_plane(offset, whole[block], spacing[block])
 
-    on_all_cores(find, blocks(len(mixed), _BLOCK))
-    touched = np.zeros(len(points), dtype=bool)
-    touched[mixed] = True
-    touched = np.flatnonzero(touched | touched[index].any(axis=1))
+    on_all_cores(find, blocks(len(looked), _BLOCK))
+    changed = np.zeros(len(points), dtype=bool)
+    changed[rows] = True
+    changed |= changed[index].any(axis=1)
+    asked = np.flatnonzero(changed & (missed | missed[index].any(axis=1)))
     kept = np.ones(index.shape, dtype=bool)
-    kept[touched] = on_sheet(nearest, normals, touched, index[touched], nearest.distance[touched])[0]
-    whole, nearest = nearest.weight, nearest.keep(kept)
-    again = np.flatnonzero((nearest.weight != whole).any(axis=1))
+    kept[asked] = on_sheet(nearest, planes, asked, index[asked], nearest.distance[asked])[0]
+    nearest, quadrics = nearest.keep(kept), mixed
+    again = changed & (nearest.weight != whole).any(axis=1)
+    if before is not None:
+        nearest = replace(nearest, weight=np.where(changed[:, None], nearest.weight, before.nearest.weight))
+        rows = np.flatnonzero(changed)
+        quadrics = before.quadrics.put(rows, mixed.take(rows))
+    again = np.flatnonzero(again)
     if len(again):
-        surface = surface.put(again, fit_quadrics(points, index[again], nearest.weight[again], again, normals[again]))
-    return surface, nearest
+        fitted = fit_quadrics(points, index[again], nearest.weight[again], again, planes[again])
+        quadrics = quadrics.put(again, fitted)
+    return Sheets(quadrics, nearest, mixed, planes)
 
 
 def _own_plane(offset, weight, spacing):

@@ -10,6 +10,7 @@ _SWEEPS = 12  # of Jacobi's method; six reach full precision even for axes of a 
 _TOLERANCE = 1e-14  # of the cosine between two axes, below which they are not turned
 _LAST = 1e-8  # cosines of which a sweep leaves less than that: about their squares
 _LOST = 1e-14  # of the longest axis
+_OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # numbers of a quaternion beside one
 
 
 def matrices_of(quaternions):
@@ -39,6 +40,16 @@ def quaternions_of(matrices):
     longest = np.argmax(np.einsum("kkn->kn", products), axis=0)
     rows = products[longest, :, np.arange(len(longest))]
     return rows / np.sqrt(np.einsum("nk,nk->n", rows, rows))[:, None]
+
+
+def completed_quaternions(missing, others):
+    """Return unit quaternions, (n, 4), of three of their numbers, (n, 3), and which one above zero is missing, (n,)."""
+    left = 1.0 - np.einsum("nk,nk->n", others, others)
+    result = np.empty((len(others), 4))
+    rows = np.arange(len(others))
+    result[rows[:, None], _OTHERS[missing]] = others
+    result[rows, missing] = np.sqrt(np.maximum(left, 0.0))
+    return result
 
 
 def mapped(scales, rotations, gradients):

@@ -1,4 +1,4 @@
-"""Files of Gaussian splats: PLY with the properties that trainers write."""
+"""Files of Gaussian splats: PLY as trainers write it, and the layouts that hold as much."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -7,25 +7,43 @@ import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError
 from ..files import (
+    SPLATS,
     PlyVertices,
     check_places,
+    is_coarse,
+    read_points,
     read_vertex_columns,
     read_vertex_names,
     reading,
     replacing,
     write_vertex_columns,
 )
+from . import packed
+from .antimatter import read_antimatter
+from .columns import (
+    COLORS,
+    LENGTHS,
+    NEEDED,
+    OPACITY,
+    PLACES,
+    REST,
+    ROTATIONS,
+    SCALES,
+    decode_opacities,
+    decode_rotations,
+    decode_scales,
+    encode_opacities,
+    encode_rotations,
+    encode_scales,
+    rest_names,
+    stack,
+)
 from .harmonics import COUNTS
+from .layouts import completed, hold_enough, near_miss
 from .splats import Splats
+from .spz import is_spz, read_spz
 
-PLACES = ("x", "y", "z")
-COLORS = tuple(f"f_dc_{channel}" for channel in range(3))
-OPACITY = "opacity"
-SCALES = tuple(f"scale_{axis}" for axis in range(3))
-ROTATIONS = tuple(f"rot_{number}" for number in range(4))
-NEEDED = (*PLACES, *COLORS, OPACITY, *SCALES, *ROTATIONS)
-_REST = "f_rest_"  # the harmonics, channel by channel
-_PACKED = "packed_position"
+_LOST = 1e-6  # of the extent: rounding of places that matters
 
 
 class SplatFile(NamedTuple):
@@ -45,30 +63,65 @@ class SplatFile(NamedTuple):
     order: str = "<"
     comments: tuple = ()
 
+    def scaled(self, factors):
+        """Return this with those columns that are lengths multiplied by a factor for each splat, (n,)."""
+        lengths = {name: self.columns[name] for name in LENGTHS if name in self.columns}
+        scaled = {name: (values * factors).astype(values.dtype) for name, values in lengths.items()}
+        return self._replace(columns={**self.columns, **scaled})
+
 
 def holds_splats(path) -> bool:
-    """Tell whether a file is one of splats, by its header; files that are broken are none."""
-    if Path(path).suffix.lower() != ".ply":
-        return False
+    """Tell whether a file is one of splats, by how it begins, or by its name; PLY files that are broken are none."""
+    path = _path(path)
     try:
-        with reading(Path(path)):
-            return set(NEEDED) <= set(read_vertex_names(path))
+        with reading(path):
+            return _reader(path) is not None
     except PointCloudError:
         return False
 
 
+def read_file(path, read=read_points):
+    """Read the splats of a file; of one that holds none its points.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    read : callable
+        What reads points, of a path.
+
+    Returns
+    -------
+    Splats or PointTable
+        With a notice, where splats were meant but something that they need is missing.
+
+    Raises
+    ------
+    PointCloudError
+        There is no such file, or it is broken, or of no kind that is read.
+    """
+    if holds_splats(path):
+        return read_splats(path)
+    table = read(path)
+    missing = near_miss((*PLACES, *table.attributes))
+    if missing:
+        table.notices.append(f"{path.name} looks like Gaussian splats, but has {missing}: read as plain points.")
+    return table
+
+
 def read_splats(path) -> Splats:
-    """Read Gaussian splats from a PLY file, such as trainers write.
+    """Read Gaussian splats from a file of one of these kinds, whatever it is called.
 
     Parameters
     ----------
     path : path-like
-        Of a file with the properties x y z, f_dc_0 to f_dc_2, opacity, scale_0 to scale_2 and rot_0 to rot_3, and
-        f_rest_0 on for splats whose colour depends on the direction of view.
+        PLY with the properties x y z, f_dc_0 to f_dc_2, opacity, scale_0 to scale_2 and rot_0 to rot_3, and f_rest_0 on
+        for splats whose colour depends on the direction of view; with red green blue instead of f_dc, or one or two
+        scales, too. PLY packed by SuperSplat, .spz up to version 3, and .splat.
 
     Returns
     -------
     Splats
+        What was guessed, and how many were left out since their numbers are not finite, is among its notices.
 
     Raises
     ------
@@ -79,33 +132,78 @@ def read_splats(path) -> Splats:
     """
     path = _path(path)
     with reading(path):
-        vertices = read_vertex_columns(path)
-    missing = [name for name in NEEDED if name not in vertices.columns]
-    if missing:
-        packed = " It is a packed one; save it again as a plain PLY." if _PACKED in vertices.columns else ""
-        raise InvalidPointsError(
-            f"{path} holds no Gaussian splats: it has no {', '.join(missing)} among its properties.{packed} Give a PLY"
-            " file of splats."
-        )
-    return from_vertices(vertices, path)
+        return _from_vertices((_reader(path) or _refuse)(path), path)
 
 
-def from_vertices(vertices: PlyVertices, path) -> Splats:
-    """Make splats of the vertices of a file that has all properties they need."""
-    columns = vertices.columns
-    positions = _stack(columns, PLACES)
+def _reader(path):
+    """Return what reads the vertices of a file as columns that trainers write; None if it holds no splats."""
+    suffix = path.suffix.lower()
+    with open(path, "rb") as file:
+        is_ply = file.read(3) == b"ply"
+    if is_ply:
+        names = read_vertex_names(path)
+        if packed.MARK in names:
+            return packed.read_packed
+        return _read_ply if hold_enough(names) else None
+    if is_spz(path) or suffix == ".spz":
+        return read_spz
+    return read_antimatter if suffix == ".splat" else None
+
+
+def _refuse(path):
+    """Say what a file lacks."""
+    missing = [name for name in NEEDED if name not in read_vertex_names(path)]
+    raise InvalidPointsError(
+        f"{path} holds no Gaussian splats: it has no {', '.join(missing)} among its properties. Give a file of splats:"
+        f" PLY, {', '.join(SPLATS)}."
+    )
+
+
+def _read_ply(path):
+    vertices = read_vertex_columns(path)
+    columns, guesses = completed(vertices.columns)
+    told = [f"{path.name}: {'; '.join(guesses)}. Export Splats writes the common layout."] if guesses else []
+    return vertices._replace(columns=columns, notices=[*vertices.notices, *told])
+
+
+def _from_vertices(vertices: PlyVertices, path) -> Splats:
+    """Make splats of the vertices of a file that has all properties they need, but those that are not finite."""
+    columns, left_out = _without_broken(vertices.columns, path)
+    positions = stack(columns, PLACES)
     check_places(positions, path)
-    rest, notices = _harmonic_columns(columns, path)
+    rest, odd = _harmonic_columns(columns, path)
     return Splats(
         positions=positions,
-        scales=decode_scales(_stack(columns, SCALES)),
-        rotations=decode_rotations(_stack(columns, ROTATIONS)),
+        scales=decode_scales(stack(columns, SCALES)),
+        rotations=decode_rotations(stack(columns, ROTATIONS)),
         opacities=decode_opacities(columns[OPACITY].astype(np.float64)),
-        colors=_stack(columns, COLORS),
-        harmonics=_stack(columns, rest, np.float32).reshape(len(positions), 3, -1).swapaxes(1, 2),
-        notices=[*vertices.notices, *notices],
+        colors=stack(columns, COLORS),
+        harmonics=stack(columns, rest, np.float32).reshape(len(positions), 3, -1).swapaxes(1, 2),
+        notices=[*vertices.notices, *left_out, *odd],
         file=SplatFile(columns, vertices.order or "<", tuple(vertices.comments)),
     )
+
+
+def _without_broken(columns, path):
+    """Leave out splats with numbers that are not finite, as training leaves them, and tell how many.
+
+    Logarithms of sizes may be minus infinity, of sizes zero, and logits of opacities infinite, of 0 and 1.
+    """
+    sound = np.ones(len(columns[OPACITY]), bool)
+    for name in NEEDED:
+        values = columns[name]
+        if values.dtype.kind == "f":
+            limits = {**dict.fromkeys(SCALES, values < np.inf), OPACITY: ~np.isnan(values)}
+            sound &= limits[name] if name in limits else np.isfinite(values)
+    broken = np.count_nonzero(~sound)
+    if not broken:
+        return columns, []
+    if broken == len(sound):
+        raise InvalidPointsError(
+            f"{path}: all {broken} splats have numbers that are not finite (NaN or infinity). Train or export it again."
+        )
+    told = f"{path.name}: left out {broken:,} splats with numbers that are not finite (NaN or infinity)."
+    return {name: values[sound] for name, values in columns.items()}, [told]
 
 
 def write_splats(path, splats):
@@ -137,11 +235,18 @@ def write_splats(path, splats):
     if file is None or len(file.columns[OPACITY]) != len(splats):
         file = SplatFile({})
     columns = dict(file.columns)
-    for name, values in _encoded(splats, columns).items():
+    double = _needs_double(splats.positions)
+    for name, values in encoded(splats, columns).items():
         kind = columns[name].dtype if name in columns else np.float32
-        columns[name] = values.astype(kind)
+        columns[name] = values.astype(np.float64 if double and name in PLACES else kind)
     with replacing(path) as part:
         write_vertex_columns(part, columns, file.order, file.comments)
+
+
+def _needs_double(positions) -> bool:
+    """Whether single precision would hurt places, other than such as came from there."""
+    lost = np.abs(positions.astype(np.float32) - positions).max()
+    return is_coarse(positions) and lost > _LOST * np.ptp(positions, axis=0).max()
 
 
 def _path(given):
@@ -151,61 +256,32 @@ def _path(given):
         raise PointCloudError(f"{given!r} is no name of a file. Give a text or a path.") from error
 
 
-def _encoded(splats, columns):
+def encoded(splats, columns):
     """Return the columns of a file with these splats; numbers that did not change are those of the columns before."""
     result = dict(zip(PLACES, splats.positions.T, strict=True)) | dict(zip(COLORS, splats.colors.T, strict=True))
     rest = splats.harmonics.swapaxes(1, 2).reshape(len(splats), -1)
-    per_channel = sum(name.startswith(_REST) for name in columns) // 3 or splats.harmonics.shape[1]
-    result.update(zip(_rest_names(per_channel, splats.harmonics.shape[1]), rest.T, strict=True))
+    used = splats.harmonics.shape[1]
+    per_channel = max(sum(name.startswith(REST) for name in columns) // 3, used)
+    result.update(zip(rest_names(per_channel, used), rest.T, strict=True))
     for names, values, decode, encode in (
-        ((OPACITY,), splats.opacities[:, None], decode_opacities, _encode_opacities),
-        (SCALES, splats.scales, decode_scales, _encode_scales),
-        (ROTATIONS, splats.rotations, decode_rotations, lambda rotations: rotations),
+        ((OPACITY,), splats.opacities[:, None], decode_opacities, encode_opacities),
+        (SCALES, splats.scales, decode_scales, encode_scales),
+        (ROTATIONS, splats.rotations, decode_rotations, encode_rotations),
     ):
         values = values.astype(np.float32)
         coded = encode(values.astype(np.float64))
         if names[0] in columns:
-            before = _stack(columns, names)
+            before = stack(columns, names)
             same = (decode(before).astype(np.float32) == values).all(axis=1, keepdims=True)
             coded = np.where(same, before, coded)
         result.update(zip(names, coded.T, strict=True))
     return result
 
 
-def decode_scales(logarithms):
-    """Return half axes of their logarithms; zero for what is no number."""
-    with np.errstate(over="ignore"):
-        return np.nan_to_num(np.exp(logarithms), nan=0.0, posinf=_LARGEST)
-
-
-def _encode_scales(scales):
-    return np.log(np.maximum(scales, _SMALLEST))
-
-
-def decode_opacities(logits):
-    """Return opacities from 0 to 1 of their logits; zero for what is no number."""
-    with np.errstate(over="ignore"):
-        return np.nan_to_num(1.0 / (1.0 + np.exp(-logits)), nan=0.0)
-
-
-def _encode_opacities(opacities):
-    inside = np.clip(opacities, _SMALLEST, 1.0 - _NEAR)
-    return np.log(inside) - np.log1p(-inside)
-
-
-def decode_rotations(quaternions):
-    """Return unit quaternions; no turn for those without a length."""
-    length = np.sqrt(np.einsum("nk,nk->n", quaternions, quaternions))[:, None]
-    sound = np.isfinite(length) & (length > 0.0)
-    return np.where(sound, quaternions / np.where(sound, length, 1.0), [1.0, 0.0, 0.0, 0.0])
-
-
 def _harmonic_columns(columns, path):
     """Return the names of the harmonics that can be used, channel by channel, and what to tell about the others."""
-    count = sum(name.startswith(_REST) for name in columns)
-    whole = (
-        count % 3 == 0 and count // 3 <= COUNTS[-1] and all(f"{_REST}{number}" in columns for number in range(count))
-    )
+    count = sum(name.startswith(REST) for name in columns)
+    whole = count % 3 == 0 and count // 3 <= COUNTS[-1] and all(f"{REST}{number}" in columns for number in range(count))
     per_channel = count // 3
     used = max(known for known in COUNTS if known <= per_channel) if whole else 0
     notices = []
@@ -214,22 +290,4 @@ def _harmonic_columns(columns, path):
             f"{path.name}: {count} numbers f_rest are not those of whole degrees up to 4, and {3 * used} of them are"
             " used. Colors may not turn with the surface."
         )
-    return _rest_names(per_channel, used), notices
-
-
-def _rest_names(per_channel, used):
-    """Return the names of the first harmonics of each channel, of which a file has so many."""
-    return [f"{_REST}{channel * per_channel + number}" for channel in range(3) for number in range(used)]
-
-
-def _stack(columns, names, dtype=np.float64):
-    count = len(columns[OPACITY])
-    result = np.empty((count, len(names)), dtype)
-    for index, name in enumerate(names):
-        result[:, index] = columns[name]
-    return result
-
-
-_SMALLEST = float(np.finfo(np.float32).tiny)
-_LARGEST = float(np.finfo(np.float32).max)
-_NEAR = 2.0**-25  # half a step of single precision below one
+    return rest_names(per_channel, used), notices

@@ -96,6 +96,7 @@ class Splats:
         -------
         Splats
             With the covariances F R S^2 R^T F^T. Harmonics turn by the rotation next to F, mirrored where F mirrors.
+            Further lengths of their file grow as the root of the volume.
 
         Raises
         ------
@@ -110,14 +111,25 @@ class Splats:
                 f"{bad} of {len(self)} splats get positions or gradients that are not finite (NaN or infinity). Give a"
                 " place and a map for each."
             )
-        scales, rotations = mapped(self.scales, self.rotations, maps)
-        return replace(
-            self,
-            positions=places,
-            scales=scales,
-            rotations=rotations,
-            harmonics=turned(self.harmonics, orthogonal_parts(maps)) if self.harmonics.shape[1] else self.harmonics,
-        )
+        shapes = self.scales, self.rotations, self.harmonics
+        rows = np.flatnonzero((maps != np.eye(3)).any(axis=(1, 2)))
+        if len(rows) == len(self):
+            shapes = _mapped(*shapes, maps)
+        elif len(rows):  # the others keep every bit
+            moved = _mapped(*(part[rows] for part in shapes), maps[rows])
+            shapes = [part.copy() for part in shapes]
+            for part, new in zip(shapes, moved, strict=True):
+                part[rows] = new
+        scales, rotations, harmonics = shapes
+        file = self.file and self.file.scaled(np.cbrt(np.abs(np.linalg.det(maps))))
+        return replace(self, positions=places, scales=scales, rotations=rotations, harmonics=harmonics, file=file)
+
+
+def _mapped(scales, rotations, harmonics, maps):
+    """Return half axes, rotations and harmonics after linear maps, (n, 3, 3)."""
+    if harmonics.shape[1]:
+        harmonics = turned(harmonics, orthogonal_parts(maps))
+    return *mapped(scales, rotations, maps), harmonics
 
 
 def orthogonal_parts(gradients):

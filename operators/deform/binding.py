@@ -16,14 +16,15 @@ from ...core import PointCloudError
 from ..objects.attributes import (
     DISPLACEMENT,
     REST,
-    own_positions,
+    in_edit_mesh,
     point_count,
+    positions_now,
     read_attribute,
     tag_changed,
     write_attribute,
 )
 from ..objects.carried import carries, moved_names, write_moved
-from ..objects.counting import members, summarize
+from ..objects.counting import members, weighted_checksum
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
 from ..objects.handlers import tell
 from ..objects.options import settings_values
@@ -89,13 +90,13 @@ def constrain(names, weights, anchors) -> Constraints:
     moved, kept = np.flatnonzero(weights.max(axis=0) > 0.0), np.flatnonzero(anchors > 0.0)
     owner = weights.argmax(axis=0)[moved]
     strength = np.concatenate([weights.max(axis=0)[moved], anchors[kept]])
-    checksum = _groups_checksum(names, [summarize(held) for held in (*weights, anchors)])
+    checksum = _groups_checksum(names, [weighted_checksum(held) for held in (*weights, anchors)])
     return Constraints(names, moved, owner, kept, strength, checksum)
 
 
-def _groups_checksum(names, found) -> str:
-    """Checksum of the members of the groups of the handles, given by name, and of the anchors."""
-    return f"{zlib.crc32(repr((names, [group.weighted for group in found])).encode()):08x}"
+def _groups_checksum(names, weighted) -> str:
+    """Checksum of the groups of the handles, given by name, and of the anchors, by the checksums of their weights."""
+    return f"{zlib.crc32(repr((names, weighted)).encode()):08x}"
 
 
 def _groups_now(obj, glance, trusting):
@@ -106,7 +107,8 @@ def _groups_now(obj, glance, trusting):
         return None
     by_empty = _moved_by_empties(obj)
     edited = [group.rows for name, group in zip(names, found[:-1], strict=True) if name not in by_empty]
-    return _groups_checksum(names, found), np.concatenate(edited) if edited else np.empty(0, int)
+    checksum = _groups_checksum(names, [group.weighted for group in found])
+    return checksum, np.concatenate(edited) if edited else np.empty(0, int)
 
 
 def forget_bound():
@@ -241,11 +243,6 @@ def is_there(obj, scene=None) -> bool:
     return scene in found if scene is not None else bool(found)
 
 
-def in_edit_mesh(obj) -> bool:
-    """Whether a mesh is in Edit Mode, by this object or another one, so that its data are out of reach as arrays."""
-    return obj.type == "MESH" and obj.data.is_editmode
-
-
 def relative_matrix(obj, empty, depsgraph=None):
     """Return the matrix of an empty in the space of an object, (4, 4) float64, as a depsgraph has evaluated them."""
     if depsgraph is not None:
@@ -286,16 +283,6 @@ def empty_change(obj, item, depsgraph=None):
 def solver_settings(settings) -> tuple:
     """Values of the settings that the factors depend on."""
     return settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0
-
-
-def positions_now(obj):
-    """Read the positions of the points in local space, with changes of Edit Mode that are not yet in the mesh."""
-    if not in_edit_mesh(obj):
-        return own_positions(obj.data)
-    obj.update_from_editmode()
-    positions = np.empty((len(obj.data.vertices), 3), np.float32)
-    obj.data.vertices.foreach_get("co", positions.reshape(-1))
-    return positions
 
 
 def read_rest(obj):

@@ -8,6 +8,7 @@ from mathutils import Matrix, Vector
 from ... import core
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
+from ..objects.animation import moves_by_keys, stop_moving
 from ..objects.attributes import (
     DISC,
     REST,
@@ -33,6 +34,7 @@ from . import live
 from .binding import (
     POSE,
     WRITES,
+    bound_objects,
     constrain,
     copied_from,
     edited_rows,
@@ -301,8 +303,22 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
     bl_idname = "meshfree.deform_apply"
     bl_label = "Apply"
 
+    keep_keyframes: BoolProperty(
+        name="Keep Keyframes",
+        description="Let the handles keep the keyframes that move them, which bend the applied shape from the next"
+        " frame on",
+        default=False,
+    )
+
+    def invoke(self, context, event):
+        """Ask, where keyframes would be lost."""
+        if bpy.app.background or not keyed_empties(self.subject(context)):
+            return self.execute(context)
+        return context.window_manager.invoke_props_dialog(self)
+
     def change(self, context, obj):
         check_movable(obj, "IN_PLACE")
+        keyed = keyed_empties(obj)
         settings, constraints = obj.meshfree.deform, read_constraints(obj)
         positions = (read_attribute(obj.data, REST) + shown_displacement(obj)).astype(np.float32)
         empties = [
@@ -316,7 +332,27 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
                 write_attribute(obj.data, DISC, values)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
         write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True, moved={})
+        if keyed and not self.keep_keyframes:
+            for empty in keyed:
+                stop_moving(empty)
+            self.warn(_lost_keyframes(context.scene, keyed), obj)
         return f"{obj.name}: {len(positions):,} points are at rest where they are now"
+
+
+def keyed_empties(obj) -> list:
+    """Return the empties that keyframes move and that move this object alone, so that these go when it is applied."""
+    items = [item for item in obj.meshfree.deform.handle_items if item.has_empty and is_there(item.empty)]
+    others = [other for other in bound_objects() if other != obj]
+    shared = {item.empty for other in others for item in other.meshfree.deform.handle_items}
+    return [item.empty for item in items if item.empty not in shared and moves_by_keys(item.empty)]
+
+
+def _lost_keyframes(scene, empties):
+    names = ", ".join(f'"{empty.name}"' for empty in empties)
+    return (
+        f"The keyframes that moved {names} were removed: the shape of frame {scene.frame_current} is at rest now, and"
+        " they would bend it once more. Undo, and turn on Keep Keyframes, to keep them."
+    )
 
 
 class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ... import core
 from ...core import PointCloudError
-from ...core.files import WRITABLE, read_points, write_points
+from ...core.files import WRITABLE, PointTable, write_points
 from .verbs import ONE_LINE, Verb
 
 _SHARES = (0.01, 0.5, 0.99)  # quantiles that are told
@@ -66,24 +66,24 @@ class Deform(Verb):
         if output is None:
             raise PointCloudError("Nothing would be written. Give --out or --out-dir.")
         wanted = _read_handles(arguments.handles)
-        splats = core.read_splats(path) if core.splats.holds_splats(path) else None
+        given = core.splats.read_file(path)
+        splats = None if isinstance(given, PointTable) else given
         if splats is not None and output.suffix.lower() != ".ply":
             raise PointCloudError(f"Splats cannot be written to {output}. Let its name end in .ply.")
-        table = read_points(path) if splats is None else None
-        points = table.points if splats is None else splats.positions
+        points = given.points if splats is None else splats.positions
         handles, goal = _moves(wanted, points)
         anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
         out = core.splats.floating_rows(splats) if splats is not None else ()
         laplacian = core.build_laplacian(points, left_out=out)
         deformer = core.CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
         moved = deformer.solve(goal)
+        written = []
         if splats is None:
-            write_points(output, replace(table, points=moved), double=not table.single)
+            written = write_points(output, replace(given, points=moved), double=not given.single)
         else:
             core.write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
-        notices = (table if splats is None else splats).notices
         farthest = float(np.linalg.norm(moved - points, axis=1).max())
-        notices = [*notices, *deformer.notices]
+        notices = [*given.notices, *deformer.notices, *written]
         return {"points": len(points), "farthest": farthest, "left_out": len(out), "notices": notices}
 
 

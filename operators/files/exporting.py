@@ -12,22 +12,22 @@ from ...core import PointCloudError
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
 from ..objects.place import place_of
-from ..objects.reading import read_points
+from ..objects.reading import TYPES, read_points
 from ..objects.result import read_eigenvalues
-from ..objects.splats import has_splats
+from ..objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..running import cache
 from ..running.application import build_operator
 from ..running.job import JobOperator
 from ..running.ready import reporting
 from .objects import analysis_arrays, file_filter, point_table, save_arrays
-from .splats import splats_to_write
+from .splats import splats_in_world, splats_to_write
 
 
 class ExportOperator(JobOperator, ExportHelper):
     """An operator that writes one file about the active object; an older file stays if that fails.
 
     A subclass has a method `plan`, which reads all that is needed and returns a function of a path and a progress
-    callback that writes the file, without touching Blender, and returns a line for the status bar.
+    callback that writes the file, without touching Blender, and returns a line for the status bar, or notices and it.
     """
 
     bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
@@ -53,7 +53,10 @@ class ExportOperator(JobOperator, ExportHelper):
 
     def finish(self, context, objects, results):
         """Tell what was written."""
-        self.report({"INFO"}, results)
+        *notices, line = [results] if isinstance(results, str) else results
+        for notice in notices:
+            self.warn(notice, context.object)
+        self.report({"INFO"}, line)
         return {"FINISHED"}
 
 
@@ -98,20 +101,27 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
 
         def write(path, progress):
             progress("Write", 0.0)
-            write_points(path, table, double=not table.single)
-            return f"{name}: {len(table.points):,} points written to {path.name}"
+            notices = write_points(path, table, double=not table.single)
+            return *table.notices, *notices, f"{name}: {len(table.points):,} points written to {path.name}"
 
         return write
 
 
 class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
-    """Export the Gaussian splats of the active object to a PLY file, as its deformation shows them"""
+    """Export Gaussian splats to a PLY file, as deformations show them: of the active object, or of all selected ones"""
 
     bl_idname = "meshfree.export_splats"
     bl_label = "Export Splats"
     filename_ext = ".ply"
 
+    asks = ("all_selected",)
+
     filter_glob: file_filter(".ply")
+    all_selected: BoolProperty(
+        name="All Selected",
+        description="Where several objects of splats are selected, write all to one file, as they stand in the world",
+        default=True,
+    )
 
     @classmethod
     def obstacle(cls, context):
@@ -121,9 +131,14 @@ class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
         return f'"{context.object.name}" holds no Gaussian splats. Import a file of splats'
 
     def plan(self, context, obj):
-        splats, name = splats_to_write(obj), obj.name
-        scaled = not np.allclose(np.linalg.norm(np.array(obj.matrix_world)[:3, :3], axis=0), 1.0, atol=1e-5)
-        hint = ". The scale of the object is not in it: Apply Transform to Splats applies it" if scaled else ""
+        objects = [each for each in context.selected_objects if each.type in TYPES and has_splats(each.data)]
+        several = self.all_selected and len(objects) > 1
+        if several:
+            splats, name, hint = splats_in_world(objects), f"{len(objects)} objects", ", in world space"
+        else:
+            objects, splats, name, hint = [obj], splats_to_write(obj), obj.name, _scale_hint(obj)
+        for each in filter(lambda each: are_left_behind(each.data), objects):
+            self.warn(f"{each.name}: {LEFT_BEHIND}", each)
 
         def write(path, progress):
             progress("Write", 0.0)
@@ -131,6 +146,11 @@ class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
             return f"{name}: {len(splats):,} splats written to {path.name}{hint}"
 
         return write
+
+
+def _scale_hint(obj):
+    scaled = not np.allclose(np.linalg.norm(np.array(obj.matrix_world)[:3, :3], axis=0), 1.0, atol=1e-5)
+    return ". The scale of the object is not in it: Apply Transform to Splats applies it" if scaled else ""
 
 
 class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):

@@ -11,22 +11,38 @@ from bpy_extras.io_utils import ImportHelper
 
 from ... import core
 from ...core import PointCloudError
-from ...core.files import READABLE, numbered_files, order_frames, read_points
+from ...core.files import (
+    READABLE,
+    SCANS,
+    SPLATS,
+    TEXTS,
+    LasChoices,
+    frame_number,
+    numbered_files,
+    order_frames,
+    parse_classes,
+)
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import DISC, check_size, point_count, tag_changed, write_attribute
+from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
+from ..objects.colors import own_colors
 from ..objects.handlers import tell
+from ..objects.notices import keep
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
-from .objects import add_object, file_filter
+from .columns import tell_columns
+from .objects import add_object, file_filter, read_file
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
 
-OWN = tuple(suffix for suffix in READABLE if suffix not in (".ply", ".obj"))  # Blender reads those by itself, too
+OWN = tuple(
+    suffix for suffix in (*READABLE, *SPLATS) if suffix not in (".ply", ".obj")
+)  # Blender reads those by itself, too
 
 _QUICK = 80_000  # points whose discs are found in less than two seconds
+_DEPTH = 10.0  # how far a view looks beyond what it has in its middle
 _DRAWN = 200_000  # splats whose ellipsoids are drawn by themselves
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
 if bpy.app.version >= (4, 5, 0):
@@ -38,13 +54,11 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
-    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, CSV and text files, or numpy arrays, as vertices"""
+    """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, PTX, CSV, text and numpy files, or splats"""
 
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-    asks = ("up", "kind", "attributes", "surface", "sequence", "frame")
-
     filepath: StringProperty(
         name="File Path",
         description="File to import",
@@ -52,7 +66,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         subtype="FILE_PATH",
         options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
     )
-    filter_glob: file_filter(*READABLE)
+    filter_glob: file_filter(*READABLE, *SPLATS)
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Files",
@@ -70,7 +84,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Axis of the file that points upwards",
         items=[
             ("Z", "Z", "Coordinates as they are in the file, as in Blender and in surveys"),
-            ("Y", "Y", "Turn the points upright that other programs store with Y upwards"),
+            ("Y", "Y", "Turn the points upright that other programs store with Y upwards, as in .spz"),
             ("-Y", "-Y", "Turn the points upright that are stored with Y downwards, as many Gaussian splats are"),
         ],
         default="Z",
@@ -80,6 +94,12 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         name="Attributes",
         description="Import the other columns too: colors, normals, intensity and so on",
         default=True,
+    )
+    columns: StringProperty(
+        name="Columns",
+        description="Names of the columns of text files in their order, such as x y z - r g b, where - leaves one out"
+        " and ... at the end all that follow; empty to find them",
+        options={"SKIP_SAVE"},
     )
     surface: BoolProperty(
         name="Show as Surface",
@@ -93,11 +113,36 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         default=False,
         options={"SKIP_SAVE"},
     )
+    numbers: BoolProperty(
+        name="Follow Numbers",
+        description="Show each file of a sequence at the frame of its number; where numbers are missing, the file"
+        " before stays",
+        default=False,
+    )
+    classes: StringProperty(
+        name="Classes",
+        description="Import only points of these classes of LAS files, such as 2 5 or 3-5 (2 is the ground); empty for"
+        " all",
+    )
+    withheld: BoolProperty(
+        name="Withheld Points",
+        description="Import points of LAS files, too, that are flagged as withheld, which stands for deleted",
+        default=False,
+    )
     frame: BoolProperty(
         name="Frame in View",
         description="Let the 3D views look at the imported points, unless a script imports them",
         default=True,
     )
+
+    @property
+    def asks(self):
+        """Names of the settings: some are those of sequences, and of a kind of file; of text until one is chosen."""
+        sequence = ("sequence", "numbers") if self.sequence else ("sequence",)
+        suffixes = {path.suffix.lower() for path in self._chosen()}
+        scans = ("classes", "withheld") if suffixes & {*SCANS} else ()
+        text = ("columns",) if suffixes & {"", *TEXTS} else ()
+        return "up", "kind", "attributes", *text, *scans, "surface", *sequence, "frame"
 
     @classmethod
     def obstacle(cls, context):
@@ -112,14 +157,18 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     @reporting
     def execute(self, context):
         self._framed = self._attended and self.frame
-        names = [item.name for item in self.files if item.name]
-        folder = Path(bpy.path.abspath(self.directory))
-        paths = [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
+        paths, choices = self._chosen(), LasChoices(parse_classes(self.classes), self.withheld)
         if self.sequence:
             paths = order_frames(paths) if len(paths) > 1 else numbered_files(paths[0].parent)
         self._paths = paths
-        surface = self.surface and not self.sequence
-        return self.work(context, [], lambda progress: _read_all(paths, surface, progress))
+        surface, columns = self.surface and not self.sequence, self.columns
+        return self.work(context, [], lambda progress: _read_all(paths, columns, choices, surface, progress))
+
+    def _chosen(self):
+        """Return the files that are named."""
+        names = [item.name for item in self.files if item.name]
+        folder = Path(bpy.path.abspath(self.directory))
+        return [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
 
     def finish(self, context, objects, results):
         """Add an object for each table."""
@@ -146,15 +195,17 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         surfaces, clouds = [], []
         for path, (table, found) in zip(self._paths, read, strict=True):
             if isinstance(table, core.Splats):
-                clouds.append(self._add_splats(context, path.stem, table))
+                obj = self._add_splats(context, path.stem, table, shared)
+                clouds.append(obj)
+                shared = shared if shared is not None or OFFSET not in obj else offset_of(obj)
                 continue
             turned = _turned_up(table, self.up) if self.up != "Z" else table
             obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
             obj.select_set(True)
             context.view_layer.objects.active = obj
-            self._tell(obj, table, shared)
+            self._tell(obj, table, shared, f"{len(table.points):,} points")
             if isinstance(found, str):
-                self.report({"INFO"}, f"{obj.name} is shown as dots. {found}")
+                self.note(f"{obj.name} is shown as dots. {found}", obj)
             elif found is not None:
                 surfaces.append(obj)
                 if DISC not in obj.data.attributes:  # those of the file, if there are any, may have been turned
@@ -166,44 +217,54 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         _convert(context, every if self.kind == "POINTCLOUD" else clouds)
         for obj in every:
             obj.select_set(True)
+            deselect(obj.data)  # else the first group would hold all points
         for obj in clouds:
             mark(obj.data)
             if self.surface and not self.sequence and point_count(obj.data) <= _DRAWN and not is_drawn(obj.data):
                 tell("splats_found", obj)
         for obj in surfaces:  # Convert would have taken discs for points
             tell("surface_found", obj)
+        colored = [obj for obj in every if obj not in surfaces and own_colors(obj.data)]
+        for objects in [colored] if self.sequence and colored else [[obj] for obj in colored]:
+            tell("colors_found", objects)
         if self.sequence:
             self._join(context)
 
-    def _add_splats(self, context, name, splats):
+    def _add_splats(self, context, name, splats, shared):
         """Add an object of splats, which keep the numbers of their file: it is the object that is turned upright."""
-        obj = add_splats(name, splats, context.collection)
-        obj.rotation_euler.x = {"Z": 0.0, "Y": 0.5, "-Y": -0.5}[self.up] * np.pi
+        obj = add_splats(name, splats, context.collection, shared, self.up)
         obj.select_set(True)
         context.view_layer.objects.active = obj
-        for notice in splats.notices:
-            self.report({"WARNING"}, notice)
         degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
-        self.report({"INFO"}, f"{obj.name}: {len(splats):,} Gaussian splats with harmonics of degree {degree}")
+        self._tell(obj, splats, shared, f"{len(splats):,} Gaussian splats with harmonics of degree {degree}")
         return obj
 
     def _join(self, context):
-        """Let one object show those just imported, one at each frame from the scene's first one on."""
+        """Let one object show those just imported: one at each frame from the scene's first one on, or by numbers."""
         frames, first = context.selected_objects, context.scene.frame_start
-        sequence = add_sequence(context, self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence", frames, first)
+        name = self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence"
+        numbers = [frame_number(path) for path in self._paths] if self.numbers else range(first, first + len(frames))
+        sequence = add_sequence(context, name, frames, numbers)
         sequence.select_set(True)
         context.view_layer.objects.active = sequence
-        self.report({"INFO"}, f"{sequence.name}: frames {first} to {first + len(frames) - 1}")
+        for frame in frames:  # which nobody selects
+            for told in frame.meshfree.notices:
+                text = told.text if frame.name in told.text else f"{frame.name}: {told.text}"
+                keep(sequence, told.tool, text, told.level)
+        missing = numbers[-1] - numbers[0] + 1 - len(numbers)
+        rest = f"; {missing} of them have no file and show the one before" if missing else ""
+        self.report({"INFO"}, f"{sequence.name}: frames {numbers[0]} to {numbers[-1]}{rest}")
 
-    def _tell(self, obj, table, shared):
+    def _tell(self, obj, table, shared, what):
         """Report what was imported, and what became of its coordinates."""
-        for notice in table.notices:
-            self.report({"WARNING"}, notice)
+        for notice in (*table.notices, *tell_columns(obj)):
+            self.warn(notice, obj)
         offset = offset_of(obj)
-        shift = f", shifted by ({', '.join(f'{-value:.10g}' for value in offset)})" if offset.any() else ""
-        self.report({"INFO"}, f"{obj.name}: {len(table.points):,} points{shift}")
+        self.report({"INFO"}, f"{obj.name}: {what}")
+        if offset.any():
+            self.note(f"{obj.name} is shifted by ({', '.join(f'{0.0 - value:.10g}' for value in offset)})", obj)
         if shared is not None and (offset != shared).any():
-            self.report({"WARNING"}, f"{obj.name} is too far from the points imported before to share their shift")
+            self.warn(f"{obj.name} is too far from the points imported before to share their shift", obj)
 
 
 def _convert(context, objects):
@@ -228,9 +289,11 @@ def _frame_selected(context):
             region = next(region for region in area.regions if region.type == "WINDOW")
             with context.temp_override(area=area, region=region):
                 bpy.ops.view3d.view_selected()
+                space, view = area.spaces.active, area.spaces.active.region_3d
+                space.clip_end = max(space.clip_end, _DEPTH * view.view_distance)  # or a large scan would not be seen
 
 
-def _read_all(paths, surface, progress):
+def _read_all(paths, columns, choices, surface, progress):
     """Read some files, those that were just read from memory: Adjust Last Operation imports them again.
 
     Returns
@@ -242,8 +305,8 @@ def _read_all(paths, surface, progress):
     for number, path in enumerate(paths):
         progress("Read", number / len(paths))
         state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
-        key = ("file", str(path), state and (state.st_mtime_ns, state.st_size))
-        tables.append(cache.fetch(key, lambda path=path: _read(path)))
+        key = ("file", str(path), state and (state.st_mtime_ns, state.st_size), columns, choices)
+        tables.append(cache.fetch(key, lambda path=path: read_file(path, columns, choices)))
     if not surface:
         return [(table, None) for table in tables]
     total = sum(len(table.points) for table in tables if not isinstance(table, core.Splats))
@@ -252,11 +315,6 @@ def _read_all(paths, surface, progress):
     return [
         (table, None if isinstance(table, core.Splats) else _find_discs(table.points, progress)) for table in tables
     ]
-
-
-def _read(path):
-    """Read one file, as splats where it holds such."""
-    return core.read_splats(path) if core.splats.holds_splats(path) else read_points(path)
 
 
 def _find_discs(points, progress):

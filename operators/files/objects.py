@@ -4,12 +4,25 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
+from ... import core
 from ...core import PointCloudError
-from ...core.files import READABLE, WRITABLE, PointTable, choose_origin, is_coarse, replacing
+from ...core.files import (
+    READABLE,
+    SPLATS,
+    WRITABLE,
+    LasChoices,
+    PointTable,
+    choose_origin,
+    is_coarse,
+    read_points,
+    replacing,
+    split_digits,
+)
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
 from ..objects.attributes import (
     NORMAL,
+    ONLY_DRAWN,
     PREFIX,
     STORABLE,
     own_positions,
@@ -17,14 +30,17 @@ from ..objects.attributes import (
     type_of,
     write_attribute,
 )
+from ..objects.colors import COLOR, own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions
+from .columns import Column, doubted_columns, known_digits, read_columns, remember_columns
 
-INPUTS = (*READABLE, ".blend")
+INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
-_COLORS = ("BYTE_COLOR", "FLOAT_COLOR")
+_ALL = LasChoices()
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
+_PART = 5  # of them that tell the second part of a column
 
 
 def file_filter(*suffixes):
@@ -35,6 +51,26 @@ def file_filter(*suffixes):
         default=";".join(f"*{suffix}" for suffix in suffixes),
         options={"HIDDEN"},
     )
+
+
+def read_file(path, columns="", las=_ALL):
+    """Read a file, as splats where it holds such.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    columns : str
+        Names of the columns of a file of text; empty to find them.
+    las : LasChoices
+        Which points of LAS files are read.
+
+    Returns
+    -------
+    Splats or PointTable
+    """
+    if columns.strip():
+        return read_points(path, columns)
+    return core.splats.read_file(path, lambda path: read_points(path, las=las))
 
 
 def add_object(name, table, collection, known=None, with_attributes=True):
@@ -56,39 +92,65 @@ def add_object(name, table, collection, known=None, with_attributes=True):
     -------
     bpy.types.Object
     """
-    origin = choose_origin(table.points, known)
+    origin = choose_origin(table.points, known, degrees=table.degrees)
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(table.points))
     mesh.attributes["position"].data.foreach_set("vector", (table.points - origin).astype(np.float32).reshape(-1))
+    columns = {}
     if with_attributes:
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large for single precision becomes infinite
             for column, values in table.attributes.items():
                 is_place = column == SCANNER and values.ndim == 2
-                add_column(mesh, column, values - origin if is_place else values)
+                columns |= _add_parts(mesh, column, values - origin if is_place else values)
         if table.colors is not None:
-            layer = mesh.color_attributes.new("Color", "BYTE_COLOR", "POINT")
+            layer = mesh.color_attributes.new(COLOR, "BYTE_COLOR", "POINT")
             layer.data.foreach_set("color_srgb", table.colors.reshape(-1))
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)
     if origin.any():
         obj[OFFSET] = origin.tolist()
+    remember_columns(obj, columns)
     collection.objects.link(obj)
     return obj
 
 
+def _add_parts(mesh, name, values):
+    """Add a column of a file as an attribute, or two if one has too few digits; return `Column` by name if it has."""
+    if name.startswith(PREFIX) or (name in (SCANNER, FILE_NORMAL) and values.ndim == 2):
+        add_column(mesh, name, values)
+        return {}
+    parts, digits = split_digits(values)
+    known = None if digits is None else known_digits(name)
+    if known is not None:
+        parts, digits = split_digits(values, known)
+    first = add_column(mesh, name, parts[0])
+    if digits is None:
+        return {}
+    stem = name.encode()[: _LONGEST_NAME - _PART].decode(errors="ignore")
+    return {first: Column(digits, add_column(mesh, f"{stem}_{digits.part}", parts[1]) if digits.part else "")}
+
+
 def add_column(mesh, name, values):
-    """Add a column of a file as an attribute; our own by the types that they have."""
+    """Add a column of a file as an attribute, our own by the types that they have; return its name in Blender."""
     if values.ndim == 2:
         kind = "FLOAT_VECTOR"
     elif name.startswith(PREFIX) and type_of(name) != "FLOAT_VECTOR":
         kind = type_of(name)
     else:
-        kind = "INT" if np.can_cast(values.dtype, np.int32) and values.dtype != bool else "FLOAT"
+        kind = "INT" if values.dtype.kind in "iu" and _fit(values) else "FLOAT"
     name = name.encode()[:_LONGEST_NAME].decode(errors="ignore")
     layer = None if name in mesh.attributes else mesh.attributes.new(name, kind, "POINT")
     if layer is None:  # Blender keeps a few names for itself, each for one type
         layer = mesh.attributes.new(f"file_{name}", kind, "POINT")
-    write_attribute(mesh, layer.name, values, kind)
+    name = layer.name
+    write_attribute(mesh, name, values, kind)
+    return name
+
+
+def _fit(values):
+    """Whether whole numbers fit into those of Blender."""
+    limits = np.iinfo(np.int32)
+    return limits.min <= values.min(initial=0) and values.max(initial=0) <= limits.max
 
 
 def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
@@ -106,7 +168,8 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     Returns
     -------
     PointTable
-        With normals and places of scanners of the world. `single` tells that single precision does for the coordinates.
+        With normals and places of scanners of the world. `single` tells that single precision does for the coordinates,
+        and notices tell which columns are in doubt.
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     with np.errstate(invalid="ignore"):  # infinite points have no place when they are turned
@@ -116,8 +179,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     names = [layer.name for layer in data.attributes if _is_column(layer)] if attributes != "NONE" else []
     if attributes == "RESULTS":
         names = [name for name in names if name.startswith(PREFIX)]
-    for name in names:
-        table.attributes[name] = read_attribute(data, name)
+    table.attributes, table.notices = read_columns(obj, names), doubted_columns(obj) if names else []
     vectors = [name for name in (NORMAL, FILE_NORMAL) if np.ndim(table.attributes.get(name)) == 2]
     normals = [table.attributes.pop(name) for name in vectors]
     if normals:
@@ -130,7 +192,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
 
 
 def _is_column(layer):
-    hidden = layer.name.startswith(".") or layer.name == "position"
+    hidden = layer.name.startswith(".") or layer.name == "position" or layer.name in ONLY_DRAWN
     return not hidden and layer.domain == "POINT" and layer.data_type in STORABLE
 
 
@@ -144,11 +206,10 @@ def _world_normals(normals, matrix):
 
 def _read_colors(data):
     """Read the active color attribute of a mesh, or else the first one on points, (n, 4); None without one."""
-    layers = [layer for layer in data.attributes if layer.data_type in _COLORS and layer.domain == "POINT"]
-    if not layers:
+    name = own_colors(data)
+    if not name:
         return None
-    active = data.color_attributes.active_color_name if isinstance(data, bpy.types.Mesh) else ""
-    layer = next((layer for layer in layers if layer.name == active), layers[0])
+    layer = data.attributes[name]
     colors = np.empty(4 * len(layer.data), np.float32)
     layer.data.foreach_get("color_srgb", colors)
     return np.clip(colors.reshape(-1, 4), 0.0, 1.0)
@@ -246,9 +307,9 @@ def attribute_arrays(obj):
     """Return the points in the world, and what this extension wrote by its names without the lb_."""
     arrays = {"points": file_points(obj)}
     for attribute in obj.data.attributes:
-        if attribute.name.startswith(PREFIX):
+        if attribute.name.startswith(PREFIX) and attribute.name not in ONLY_DRAWN:
             arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)
     for name, values in obj.items():
-        if name.startswith(PREFIX):
+        if name.startswith(PREFIX) and not isinstance(values, str):
             arrays[name.removeprefix(PREFIX)] = np.array(values)
     return arrays

@@ -4,16 +4,18 @@ import bpy
 
 from ... import core
 from ...core import PointCloudError
-from ...core.files import WRITABLE, read_points, write_points
+from ...core.files import WRITABLE, PointTable, write_points
 from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
+from ..objects.colors import own_colors
 from ..objects.handlers import tell
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
-from .objects import add_object, point_table, save_arrays
+from .columns import tell_columns
+from .objects import add_object, point_table, read_file, save_arrays
 from .splats import add_splats, splats_to_write, with_results
 
 
-def load(path, name: str = "", option: str = "--object"):
+def load(path, name: str = "", option: str = "--object", read=read_file):
     """Open a file in place of everything that is loaded.
 
     Parameters
@@ -24,6 +26,8 @@ def load(path, name: str = "", option: str = "--object"):
         The object's name; empty for the active one, or else the only mesh.
     option : str
         Of the command line, by which one names it.
+    read : callable
+        What reads a file that is no .blend, of a path.
 
     Returns
     -------
@@ -39,11 +43,11 @@ def load(path, name: str = "", option: str = "--object"):
     """
     notices = []
     if path.suffix.lower() != ".blend":
-        add, read = (add_splats, core.read_splats) if core.splats.holds_splats(path) else (add_object, read_points)
         given = read(path)
-        notices = given.notices
         bpy.ops.wm.read_homefile(use_empty=True)
-        add(path.stem, given, bpy.context.scene.collection)
+        add = add_object if isinstance(given, PointTable) else add_splats
+        obj = add(path.stem, given, bpy.context.scene.collection)
+        notices = [*given.notices, *tell_columns(obj)]
     elif path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
     else:
@@ -71,10 +75,11 @@ def _choose_object(path, name, option):
     return chosen[0]
 
 
-def save(path, obj, arrays, shown=""):
+def save(path, obj, arrays, shown="") -> list:
     """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, points or splats, or the arrays by name.
 
-    The scene shows the attribute `shown`, or else another result that the points have.
+    The scene shows the attribute `shown`, or else another result that the points have, or their own colors. Returns
+    what is written otherwise than it is.
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
@@ -83,14 +88,17 @@ def save(path, obj, arrays, shown=""):
         core.write_splats(path, with_results(splats_to_write(obj), obj.data))
     elif suffix in WRITABLE:
         table = point_table(bpy.context, obj)
-        write_points(path, table, double=not table.single)
+        return [*table.notices, *write_points(path, table, double=not table.single)]
     else:
         for other in bpy.context.view_layer.objects:
             other.select_set(other == obj)
         names = [name for name in (shown, *APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
         if names:
             tell("result_written", obj, names[0])
+        elif own_colors(obj.data):
+            tell("colors_found", [obj])
         save_scene(path)
+    return []
 
 
 def save_scene(path):

@@ -2,17 +2,23 @@
 
 import bpy
 
+from ...core import PointCloudError
+from ..objects.attributes import write_attribute
 from ..objects.modifiers import COLLECTION, SEQUENCE_TAG, add_input, add_node, is_intact, new_group, set_input
 
 NAME = "Mesh-Free Sequence"
 FIRST, STEP = "First Frame", "Frame Step"  # inputs of the nodes, beside the collection
+FRAME = "frame"  # attribute of its points, one for each object: from which frame on that is shown, less the first
+_NUMBERS = "Frame Numbers"  # name of the node that reads them; nodes of earlier versions have none
+_LAST = 1_048_574  # frame of Blender
 
 
-def add_sequence(context, name: str, frames, first: int):
+def add_sequence(context, name: str, frames, numbers):
     """Add an object that shows other objects one after the other, which move to a collection of their own.
 
     Nodes choose by the frame of the scene, so that renders, undo and saved files need nothing else. They take the
-    objects of the collection in the order of their names, numbers by their size.
+    objects of the collection in the order of their names, numbers by their size, and from which frame on each is shown
+    from the points of the object, one for each of them.
 
     Parameters
     ----------
@@ -20,20 +26,33 @@ def add_sequence(context, name: str, frames, first: int):
     name : str
     frames : sequence of bpy.types.Object
         In the active collection.
-    first : int
-        Frame of the scene at which the first is shown.
+    numbers : sequence of int
+        Ascending: the frames of the scene from which on each is shown.
 
     Returns
     -------
     bpy.types.Object
+
+    Raises
+    ------
+    PointCloudError
+        A number is beyond the last frame that Blender has.
     """
+    first, last = numbers[0], numbers[-1]
+    if last > _LAST:
+        raise PointCloudError(
+            f"The last file has the number {last}, beyond Blender's last frame {_LAST:,}. Turn off Follow Numbers."
+        )
     collection = bpy.data.collections.new(f"{name} Frames")
     context.collection.children.link(collection)
     for obj in frames:
         for other in list(obj.users_collection):
             other.objects.unlink(obj)
         collection.objects.link(obj)
-    sequence = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(numbers))
+    write_attribute(mesh, FRAME, [number - first for number in numbers], "INT")
+    sequence = bpy.data.objects.new(name, mesh)
     context.collection.objects.link(sequence)
     modifier = sequence.modifiers.new(NAME, "NODES")
     modifier.node_group = _known_group() or _new_group()
@@ -54,11 +73,11 @@ def _layers(layer):
 
 def _known_group():
     groups = [group for group in bpy.data.node_groups if SEQUENCE_TAG in group and group.library is None]
-    return next(filter(is_intact, groups), None)
+    return next((group for group in groups if is_intact(group) and _NUMBERS in group.nodes), None)
 
 
 def _new_group():
-    """Make the nodes: the object whose place among the others is the number of steps since the first frame."""
+    """Make the nodes: the last object, by its place among the others, whose number of steps since the first is over."""
     group = new_group(NAME, SEQUENCE_TAG)
     add_input(group, COLLECTION, "Collection", "Collection whose objects are shown one after the other, by name")
     add_input(
@@ -70,6 +89,9 @@ def _new_group():
     frames = add_node(group, "GeometryNodeCollectionInfo", 1, 0)
     frames.inputs["Separate Children"].default_value = True
     time = add_node(group, "GeometryNodeInputSceneTime", 0, -300)
+    numbers = add_node(group, "GeometryNodeInputNamedAttribute", 3, -700, name=_NUMBERS, data_type="INT")
+    numbers.inputs["Name"].default_value = FRAME
+    begun = add_node(group, "GeometryNodeAttributeStatistic", 4, -300)
     place = add_node(group, "GeometryNodeInputIndex", 5, -500)
     size = add_node(group, "GeometryNodeAttributeDomainSize", 2, -500, component="INSTANCES")
     chosen = add_node(group, "GeometryNodeSeparateGeometry", 7, 0, domain="INSTANCE")
@@ -91,12 +113,15 @@ def _new_group():
         (frames.outputs[0], chosen.inputs["Geometry"]),
         (chosen.outputs["Selection"], realized.inputs[0]),
         (realized.outputs[0], result.inputs[0]),
+        (given.outputs["Geometry"], begun.inputs["Geometry"]),
     ):
         group.links.new(source, target)
     since = math(1, -300, "SUBTRACT", time.outputs["Frame"], given.outputs[FIRST])
     steps = math(2, -300, "DIVIDE", since, math(1, -500, "MAXIMUM", given.outputs[STEP], 1.0))
-    number = math(4, -300, "MAXIMUM", math(3, -300, "FLOOR", steps), 0.0)
+    over = math(3, -300, "ADD", math(3, -300, "FLOOR", steps), 0.5)
+    group.links.new(math(4, -700, "LESS_THAN", numbers.outputs[0], over), begun.inputs["Attribute"])
+    number = math(5, -300, "MAXIMUM", math(5, -300, "SUBTRACT", begun.outputs["Sum"], 1.0), 0.0)
     last = math(3, -500, "SUBTRACT", size.outputs["Instance Count"], 1.0)
-    number = math(5, -300, "MINIMUM", number, last)
+    number = math(6, -300, "MINIMUM", number, last)
     group.links.new(math(6, -300, "COMPARE", number, place.outputs[0], 0.5), chosen.inputs["Selection"])
     return group

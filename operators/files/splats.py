@@ -1,31 +1,46 @@
 """Objects of files of Gaussian splats, and files of such objects."""
 
-import json
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from ... import core
+from ...core.files import choose_origin
 from ...core.files.table import split_columns
-from ..objects.attributes import PREFIX, STORABLE, read_attribute, write_attribute
-from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, shown_splats
+from ..objects.attributes import ONLY_DRAWN, PREFIX, STORABLE, read_attribute, write_attribute
+from ..objects.place import OFFSET, place_of
+from ..objects.splat_file import (
+    OWN_OFFSET,
+    keep_format,
+    keep_raw,
+    own_offset,
+    read_format,
+    read_raw,
+    with_digits,
+    write_places,
+)
+from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, growth, remember_places, shown_splats
 from .objects import add_column
 
-FORMAT = "lb_splat_format"  # custom property of an object: how the file that it came from was laid out
-# What decoding a file loses, so that what is not changed can be written as it was: attributes and their columns.
-_RAW = {
-    "ply_scale": ("FLOAT_VECTOR", ("scale_0", "scale_1", "scale_2")),
-    "ply_rotation": ("FLOAT_COLOR", ("rot_0", "rot_1", "rot_2", "rot_3")),
-    "ply_opacity": ("FLOAT", ("opacity",)),
-}
 _TYPE = "GAUSSIAN_SPLAT"  # of point clouds, from Blender 5.3 on
+_UPRIGHT = {"Z": 0, "Y": 1, "-Y": -1}  # quarters of a turn about x, by the axis of the file that points upwards
 
 
-def add_splats(name, splats, collection):
+def add_splats(name, splats, collection, known=None, up="Z"):
     """Add an object of splats as loose vertices, which become a point cloud by `mark` and Object > Convert.
 
-    Coordinates are those of the file.
+    Coordinates are those of the file, less an offset if they are far from the origin; it is the object that is turned.
+
+    Parameters
+    ----------
+    name : str
+    splats : Splats
+    collection : bpy.types.Collection
+    known : ndarray, (3,), optional
+        The offset of other objects, taken if the splats are near enough.
+    up : {"Z", "Y", "-Y"}
+        Axis of the file that points upwards.
 
     Returns
     -------
@@ -33,7 +48,10 @@ def add_splats(name, splats, collection):
     """
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(splats))
-    mesh.attributes["position"].data.foreach_set("vector", splats.positions.astype(np.float32).reshape(-1))
+    obj = bpy.data.objects.new(name, mesh)
+    obj.rotation_euler.x = _UPRIGHT[up] * 0.5 * np.pi
+    _write_shifted(obj, splats.positions.astype(np.float64), _turn(_UPRIGHT[up]), known)
+    remember_places(mesh)
     write_attribute(mesh, SCALE, splats.scales, "FLOAT_VECTOR")
     write_attribute(mesh, ROTATION, splats.rotations, "QUATERNION")
     kinds = bpy.types.Attribute.bl_rna.properties["data_type"].enum_items
@@ -41,7 +59,6 @@ def add_splats(name, splats, collection):
     write_attribute(mesh, BASE, base, "FLOAT4" if "FLOAT4" in kinds else "FLOAT_COLOR")
     for number in range(splats.harmonics.shape[1]):
         write_attribute(mesh, f"{HARMONIC}{number}", splats.harmonics[:, number], "FLOAT_VECTOR")
-    obj = bpy.data.objects.new(name, mesh)
     if splats.file is not None:
         _keep_file(obj, splats)
     mesh.update()
@@ -49,16 +66,32 @@ def add_splats(name, splats, collection):
     return obj
 
 
+def _turn(quarters):
+    """Return the rotation by quarters of a turn about x, (3, 3), without an error of rounding."""
+    return np.linalg.matrix_power(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), quarters)
+
+
+def _write_shifted(obj, places, turn, known):
+    """Write places of a file, those far away less an offset, which the object keeps as it is in the world."""
+    turned = places @ turn.T
+    origin = choose_origin(turned, known)
+    if known is None or (origin != known).any():
+        # Where a few floaters lie far away, the others would lose digits by a shift to the middle of all.
+        nearer = np.median(np.abs(turned - origin), axis=0) < np.median(np.abs(turned), axis=0)
+        origin = np.where(nearer, origin, 0.0)
+    own = origin @ turn
+    if origin.any():
+        obj[OFFSET], obj[OWN_OFFSET] = origin.tolist(), own.tolist()
+    write_places(obj.data, places - own)
+
+
 def _keep_file(obj, splats):
     """Keep on an object what its splats do not tell of their file."""
     columns = splats.file.columns
-    for name, (kind, parts) in _RAW.items():
-        write_attribute(obj.data, name, np.column_stack([columns[part] for part in parts]), kind)
-    known = _known_columns(splats)
-    for name in columns.keys() - known:
+    keep_raw(obj.data, columns)
+    for name in columns.keys() - _known_columns(splats):
         add_column(obj.data, name, columns[name])
-    types = [[name, values.dtype.str[1:]] for name, values in columns.items()]
-    obj[FORMAT] = json.dumps({"order": splats.file.order, "comments": splats.file.comments, "columns": types})
+    keep_format(obj, splats.file)
 
 
 def _known_columns(splats):
@@ -81,19 +114,34 @@ def is_drawn(data) -> bool:
     return getattr(data, "type", "") == _TYPE
 
 
-def splats_to_write(obj) -> "core.Splats":
+def splats_to_write(obj):
+    """Return the splats of an object as a deformation shows them, where they were in their file, with what it held."""
+    splats = _with_file(obj)
+    return replace(splats, positions=splats.positions + own_offset(obj))
+
+
+def splats_in_world(objects):
+    """Return the splats of objects as they are seen, in the world and before any shift, with what their files held."""
+    return core.splats.joined([_placed(obj) for obj in objects])
+
+
+def _placed(obj):
+    splats = _with_file(obj)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    maps = np.broadcast_to(matrix, (len(splats), 3, 3))
+    return splats.deformed(splats.positions @ matrix.T + place_of(obj), maps)
+
+
+def _with_file(obj):
     """Return the splats of an object as a deformation shows them, in local space, with what their file held."""
-    splats, data = shown_splats(obj), obj.data
-    written = obj.get(FORMAT)
-    if not written:
-        return splats
-    written = json.loads(written)
-    raw = {}
-    for name, (_, parts) in _RAW.items():
-        values = read_attribute(data, name) if name in data.attributes else np.zeros((len(splats), len(parts)))
-        raw.update(zip(parts, values.reshape(len(splats), -1).T, strict=True))
+    splats, data, known = shown_splats(obj), obj.data, read_format(obj)
+    positions = with_digits(data, splats.positions.astype(np.float32))
+    if known is None:
+        return replace(splats, positions=positions)
+    order, comments, types = known
+    raw = read_raw(data, len(splats))
     columns = {}
-    for name, code in written["columns"]:
+    for name, code in types.items():
         if name in raw:
             values = raw[name]
         elif name in data.attributes:
@@ -101,15 +149,15 @@ def splats_to_write(obj) -> "core.Splats":
         else:  # written from the splats, or deleted since
             values = np.zeros(len(splats))
         columns[name] = values.astype(code)
-    file = core.splats.SplatFile(columns, written["order"], tuple(written["comments"]))
-    rest = (splats.positions, splats.scales, splats.rotations, splats.opacities, splats.colors, splats.harmonics)
-    return core.Splats(*rest, file=file)
+    file = core.splats.SplatFile(columns, order, comments)
+    grown = growth(read_attribute(data, SCALE), splats.scales)
+    return replace(splats, positions=positions, file=file.scaled(grown))
 
 
 def with_results(splats, data):
     """Return splats to be written with the results that their points hold, as columns of the file beside its own."""
     columns = {} if splats.file is None else dict(splats.file.columns)
     for layer in data.attributes:
-        if layer.name.startswith(PREFIX) and layer.data_type in STORABLE:
+        if layer.name.startswith(PREFIX) and layer.name not in ONLY_DRAWN and layer.data_type in STORABLE:
             columns.update(split_columns(layer.name, read_attribute(data, layer.name)))
     return replace(splats, file=(splats.file or core.splats.SplatFile({}))._replace(columns=columns))

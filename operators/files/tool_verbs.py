@@ -102,9 +102,9 @@ class Mesh(Apply):
         if output.suffix.lower() == ".blend":
             tool.conclude(bpy.context, [obj])
             opening.save_scene(output)
-        else:
-            table = files.point_table(bpy.context, made)
-            write_mesh(output, table, files.faces_of(made), double=not table.single)
+            return []
+        table = files.point_table(bpy.context, made)
+        return write_mesh(output, table, files.faces_of(made), double=not table.single)
 
     def figures(self, tool, result):
         ((_, name, opened),) = tool.made

@@ -1,10 +1,14 @@
 """Verbs of the command line: what one is, the analysis, and those of tools that need nothing but their settings."""
 
+from functools import partial
+
 import bpy
 
 from ...core import PointCloudError
+from ...core.files import LasChoices, parse_classes
 from ..objects import options
 from ..objects.attributes import point_count
+from ..objects.notices import renew
 from ..objects.place import place_of
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.result import analysis_names, check_writable, write_result
@@ -18,7 +22,15 @@ from .arguments import add_setting
 
 ONE_LINE = "Writes one JSON line per input, with notices, or the error. The exit code is 1 if any input failed."
 _SETTINGS = (*options.ALL_NAMES, "make_single_user")  # of the object
-LEFT_OUT = {"rna_type", "show", "display", "target", "animate", "period"}  # of an operator: points are moved in place
+LEFT_OUT = {
+    "rna_type",
+    "show",
+    "hide_reference",
+    "display",
+    "target",
+    "animate",
+    "period",
+}  # of an operator: points are moved in place
 
 
 class Verb:
@@ -60,6 +72,16 @@ class ObjectVerb(Verb):
 
     def add_options(self, parser):
         parser.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
+        parser.add_argument(
+            "--columns",
+            default="",
+            metavar="NAMES",
+            help='names of the columns of text files, such as "x y z - r g b"; else those found',
+        )
+        parser.add_argument(
+            "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
+        )
+        parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
         settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
         for name in _SETTINGS:
             add_setting(parser, settings[name])
@@ -71,7 +93,10 @@ class ObjectVerb(Verb):
 
     def open(self, path, option, arguments):
         """Open a file in place of all that is loaded; return the object that an option names, set up, and notices."""
-        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}")
+        columns = arguments.columns if option == "object" else ""
+        las = LasChoices(parse_classes(arguments.classes), arguments.withheld)
+        read = partial(files.read_file, columns=columns, las=las)
+        obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}", read)
         reason = obstacle(obj)
         if reason:
             raise PointCloudError(reason)
@@ -79,6 +104,8 @@ class ObjectVerb(Verb):
             value = getattr(arguments, setting)
             if value is not None:
                 setattr(obj.meshfree, setting, files.group_of(obj, value) if _names_group(setting) else value)
+        if notices:
+            renew(obj, "Import Points", notices)
         return obj, notices
 
     def work(self, obj, path, arguments, output) -> dict:
@@ -134,8 +161,8 @@ class Analyze(ObjectVerb):
         if sharing_objects(obj):  # by choice, or it would not be writable
             obj.data = obj.data.copy()
         write_result(obj, analysis, arguments.write_limit)
-        if output is not None:
-            opening.save(output, obj, _arrays(obj, analysis))
+        renew(obj, self.operator.name, analysis.notices)
+        written = [] if output is None else opening.save(output, obj, _arrays(obj, analysis))
         return {
             "points": len(analysis.measures.areas),
             "total_area": analysis.total_area,
@@ -143,7 +170,7 @@ class Analyze(ObjectVerb):
             "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
             **matched,
             "seconds": _rounded(analysis.seconds),
-            "notices": analysis.notices,
+            "notices": [*analysis.notices, *written],
         }
 
 
@@ -186,23 +213,23 @@ class Apply(ObjectVerb):
         with Stages(bpy.context.window_manager, self.operator.name) as stages:
             results = compute_all(plans, stages)
         ((*notices, line),) = tool.write_all(bpy.context, [obj], results)
+        renew(obj, self.operator.name, notices)
         figures = self.figures(tool, results[0])
-        if output is not None:
-            self.save(tool, obj, output)
+        written = [] if output is None else self.save(tool, obj, output)
         return {
             "points": point_count(obj.data),
             "done": line,
             **figures,
             "seconds": _rounded(stages.seconds),
-            "notices": notices,
+            "notices": [*notices, *written],
         }
 
     def prepare(self, tool, obj, path, arguments):
         """Give the tool what its settings do not hold."""
 
-    def save(self, tool, obj, output):
-        """Write the output."""
-        opening.save(output, obj, files.attribute_arrays(obj), tool.shown)
+    def save(self, tool, obj, output) -> list:
+        """Write the output, and return what is written otherwise than it is."""
+        return opening.save(output, obj, files.attribute_arrays(obj), tool.shown)
 
     def figures(self, tool, result) -> dict:
         """Return numbers to print, beside the line about what was done."""

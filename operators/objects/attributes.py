@@ -41,6 +41,11 @@ COMPONENT = "lb_component"
 TRUST = "lb_trust"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"  # principal ones
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
+# Slopes of what is shown, or of both texture coordinates, and the values, by their means. Blender hides such names.
+SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
+# What viewports in Solid show instead: colors, linear, and how these change with what is shown.
+SOLID, TILT = ".lb_color", ".lb_tilt"
+RISE = "lb_rise"  # by how much what is shown rises in discs that the display draws
 CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
 SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
 DEVIATION, COMPARED = "lb_deviation", "lb_compared"  # from another cloud, and where there is one
@@ -53,6 +58,7 @@ DISPLACEMENT = "lb_displacement"
 REST = "lb_rest"  # positions before the displacement
 SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of splats that are carried along
 MOVED_DISC = "lb_moved_disc"  # what a deformation makes of the disc
+ONLY_DRAWN = DISC, MOVED_DISC, CORNER  # which say nothing about the points, only how they are drawn
 SPLAT_HARMONIC = "lb_splat_sh_"  # followed by the number of the harmonic, from 0
 EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
@@ -66,7 +72,7 @@ APPLICATIONS = (
 )
 _TYPES = {  # all others are FLOAT
     **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DIRECTION), "FLOAT_VECTOR"),
-    **dict.fromkeys((DISC, MOVED_DISC, DISPLACEMENT, REST), "FLOAT_VECTOR"),
+    **dict.fromkeys((DISC, MOVED_DISC, DISPLACEMENT, REST, SLOPE, SLOPE_2, TILT), "FLOAT_VECTOR"),
     **dict.fromkeys((COMPONENT, SEGMENT, CELL), "INT"),
     **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
     UV: "FLOAT2",
@@ -120,10 +126,34 @@ def own_positions(data):
     return positions
 
 
+def in_edit_mesh(obj) -> bool:
+    """Whether a mesh is in Edit Mode, by this object or another one, so that its data are out of reach as arrays."""
+    return obj.type == "MESH" and obj.data.is_editmode
+
+
+def positions_now(obj):
+    """Read the positions of the points in local space, with changes of Edit Mode that are not yet in the mesh."""
+    if not in_edit_mesh(obj):
+        return own_positions(obj.data)
+    obj.update_from_editmode()
+    positions = np.empty((len(obj.data.vertices), 3), np.float32)
+    obj.data.vertices.foreach_get("co", positions.reshape(-1))
+    return positions
+
+
 def write_own_positions(data, positions):
     """Move the points of a mesh or a point cloud to these positions, (n, 3)."""
     data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
     tag_changed(data)
+
+
+def deselect(data):
+    """Let no point of a mesh or a point cloud be selected; new ones are, or count as such."""
+    nothing = np.zeros(point_count(data), dtype=bool)
+    if isinstance(data, bpy.types.Mesh):
+        data.vertices.foreach_set("select", nothing)
+    else:
+        write_attribute(data, SELECTION, nothing, "BOOLEAN")
 
 
 def tag_changed(data):

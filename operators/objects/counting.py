@@ -26,16 +26,16 @@ _MOST = 50  # objects that are remembered
 
 
 class Members(NamedTuple):
-    """Which points a group gives a weight above zero.
+    """Which points a group holds, and which of them it gives a weight above zero.
 
     Attributes
     ----------
     count : int
-        How many.
+        How many it holds, those of weight zero included.
     checksum, weighted : int
-        Checksum of which ones, and one that their weights count in, too.
+        Checksum of which ones have a weight above zero, and one that their weights count in, too.
     bits : bytes
-        One for each point, packed.
+        One for each point, packed: whether its weight is above zero.
     """
 
     count: int = 0
@@ -45,17 +45,22 @@ class Members(NamedTuple):
 
     @property
     def rows(self):
-        """Indices of the points, (count,)."""
+        """Indices of the points whose weight is above zero."""
         return np.flatnonzero(np.unpackbits(np.frombuffer(self.bits, np.uint8)))
 
 
 def summarize(weights) -> Members:
-    """Tell which points have a weight above zero, given all, (n,)."""
-    inside = weights > 0.0
+    """Tell what a group holds, given all weights, (n,), which are no numbers for the points outside."""
+    inside, count = weights > 0.0, np.count_nonzero(np.isfinite(weights))
     if not inside.any():
-        return Members()
-    weighted = zlib.crc32(np.where(inside, weights, 0.0).astype(np.float32))
-    return Members(np.count_nonzero(inside), zlib.crc32(inside), weighted, np.packbits(inside).tobytes())
+        return Members(count)
+    return Members(count, zlib.crc32(inside), weighted_checksum(weights), np.packbits(inside).tobytes())
+
+
+def weighted_checksum(weights) -> int:
+    """Checksum of the weights above zero, given all, (n,)."""
+    inside = weights > 0.0
+    return zlib.crc32(np.where(inside, weights, 0.0).astype(np.float32)) if inside.any() else 0
 
 
 @dataclass
@@ -83,7 +88,7 @@ _passes = {}  # by session_uid
 
 
 def members(obj, name: str, glance=False, trusting=False) -> Members | None:
-    """Tell to which points a group gives a weight above zero.
+    """Tell which points a group holds.
 
     Parameters
     ----------
@@ -98,7 +103,7 @@ def members(obj, name: str, glance=False, trusting=False) -> Members | None:
     if not has_group(obj, name):
         return Members()
     if obj.type != "MESH":
-        return summarize(group_weights(obj, name))
+        return summarize(group_weights(obj, name, outside=np.nan))
     known = _recall(obj)
     until = known.until.get(name, 0.0)
     if glance and name in known.members and until and (trusting or perf_counter() < until):
@@ -109,7 +114,7 @@ def members(obj, name: str, glance=False, trusting=False) -> Members | None:
             bpy.app.timers.register(_tick, first_interval=_PAUSE)
         return known.members.get(name)
     began = perf_counter()
-    known.members[name] = summarize(group_weights(obj, name))
+    known.members[name] = summarize(group_weights(obj, name, outside=np.nan))
     known.until[name] = perf_counter() + _PATIENCE * (perf_counter() - began)
     return known.members[name]
 
@@ -152,7 +157,7 @@ def _go_on(obj) -> bool:
     work = _passes.get(uid)
     if work is None or work.weights.shape[1] != count or any(not has_group(obj, name) for name in work.names):
         names = [name for name in _wanted[uid] if has_group(obj, name)]
-        work = _passes[uid] = _Pass(names, np.zeros((len(names), count), np.float32))
+        work = _passes[uid] = _Pass(names, np.full((len(names), count), np.nan, np.float32))
     rows = {obj.vertex_groups[name].index: row for row, name in enumerate(work.names)}
     began = perf_counter()
     while work.place < count and perf_counter() < began + _BIT:
@@ -161,7 +166,7 @@ def _go_on(obj) -> bool:
             (rows[item.group], index, item.weight)
             for index, vertex in enumerate(chunk, start=work.place)
             for item in vertex.groups
-            if item.group in rows and item.weight > 0.0
+            if item.group in rows
         ]
         if held:
             row, index, weight = zip(*held, strict=True)

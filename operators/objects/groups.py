@@ -7,14 +7,17 @@ import numpy as np
 from ...core import PointCloudError
 from .attributes import point_count, read_attribute, tag_changed, write_attribute
 
-HANDLE, ANCHOR, FIXED, SOURCE, VALUE, BOUNDARY_GROUP = ROLES = (
+HANDLE, ANCHOR, FIXED, SOURCE, LOW, HIGH, VALUE, BOUNDARY_GROUP = ROLES = (
     "Handle",
     "Anchor",
     "Fixed",
     "Source",
+    "Low",
+    "High",
     "Value",
     "Boundary",
 )
+_GIVEN = LOW, HIGH, VALUE  # a point has one value
 _FORMER = {BOUNDARY_GROUP: "Rim"}  # what version 0.1.0 called them
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
 
@@ -36,6 +39,11 @@ def role_group(obj, role: str) -> str:
     """Name of an object's group for a role: that of the role, or its former one if the object has only that."""
     former = _FORMER.get(role, role)
     return former if has_group(obj, former) and not has_group(obj, role) else role
+
+
+def rivals(obj, role: str) -> list:
+    """Names of the groups of an object that a point leaves when it is assigned to that of a role."""
+    return [name for name in _GIVEN if name != role and role in _GIVEN and has_group(obj, name)]
 
 
 def handle_names(obj) -> list:

@@ -9,6 +9,7 @@ _OWN = {
     "shape_changed": [],  # (obj) of its points, dots or discs: ui/show.py
     "groups_changed": [],  # (obj) what they hold, or whether they are colored: ui/show.py
     "surface_found": [],  # (obj) of its discs, which are to be shown: ui/show.py
+    "colors_found": [],  # (objects) which are to be shown in colors of their own, by one material: ui/show.py
     "splats_found": [],  # (obj) whose splats are to be shown: ui/show.py
     "result_written": [],  # (obj, name of the attribute to show, empty for the one on show): ui/show.py
     "mesh_made": [],  # (obj, the new object of its mesh, which is to be shown like it): ui/show.py

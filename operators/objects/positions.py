@@ -92,13 +92,16 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
 
 
 def add_key(obj, name: str, moved):
-    """Add a shape key of value 0 that moves the points by so much, (n, 3), beside what other keys do, as active one."""
+    """Add a shape key of value 0 that moves the points by so much, (n, 3), beside what the other keys do.
+
+    It is the active one, as those that Blender adds are.
+    """
     if obj.data.shape_keys is None:
         obj.shape_key_add(name="Basis", from_mix=False)
     key = obj.shape_key_add(name=name, from_mix=False)
     key.value = 0.0
     positions = key_positions(obj.data.shape_keys.reference_key) + moved
     key.points.foreach_set("co", positions.astype(np.float32).reshape(-1))
-    obj.active_shape_key_index = len(obj.data.shape_keys.key_blocks) - 1
+    obj.active_shape_key_index = obj.data.shape_keys.key_blocks.find(key.name)
     obj.data.update()
     return key

@@ -13,7 +13,7 @@ from .counting import members
 from .evaluated import evaluated_positions
 from .groups import chosen_members
 from .modifiers import is_own, is_sequence, modifier_settings
-from .splats import has_splats, read_splats
+from .splats import LEFT_BEHIND, are_left_behind, has_splats, read_splats
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
 _CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
@@ -56,12 +56,12 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
             f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under'
             " Points and Groups"
         )
+    if any(map(is_sequence, obj.modifiers)):
+        return (
+            f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'
+            " collection in the Outliner, and select its objects"
+        )
     if not point_count(obj.data):
-        if any(map(is_sequence, obj.modifiers)):
-            return (
-                f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'
-                " collection in the Outliner, and select its objects"
-            )
         if any(item.type == "NODES" and not is_own(item) for item in obj.modifiers):
             return (
                 f'"{obj.name}" has no {kind} but those that its nodes make. Put the node Points to Vertices at the end'
@@ -142,6 +142,8 @@ def read_points(context, obj) -> Reading:
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
         notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
+    if are_left_behind(obj.data):
+        notices.append(f"{obj.name}: {LEFT_BEHIND}.")
     judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)
     splats = read_splats(obj.data, with_harmonics=False) if judged else None
     reading = Reading(core.check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)

@@ -28,6 +28,7 @@ from .attributes import (
 from .options import point_budget, settings_values
 from .reading import chosen_sides, fingerprint, metric, sharing_objects
 
+_DIGITS = 3  # that scans bear
 EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
 
 
@@ -168,4 +169,4 @@ def length_text(length: float) -> str:
 
 def _in_units(kind, value, power):
     units = bpy.context.scene.unit_settings
-    return bpy.utils.units.to_string(units.system, kind, value * units.scale_length**power, precision=6).strip()
+    return bpy.utils.units.to_string(units.system, kind, value * units.scale_length**power, precision=_DIGITS).strip()

@@ -12,7 +12,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import deform_settings
+from . import deform_settings, notices
 from .color_choices import color_choice
 from .earlier import FormerSettings
 from .handlers import tell
@@ -269,6 +269,23 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         default=True,
         update=_reshape,
     )
+    smooth: BoolProperty(
+        name="Smooth Colors",
+        description="Let colors run on from each disc to the next, by the slope of what is shown; otherwise each disc"
+        " has the one color of its point, as labels and directions have",
+        default=True,
+        update=_recolor,
+    )
+    shaded: FloatProperty(
+        name="Shaded",
+        description="How much the light shows the form: 0 for flat colors, as in the legend, 1 for a surface that is"
+        " nothing but lit. In Material Preview and renders; Solid shades by itself",
+        default=0.4,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_recolor,
+    )
     dim_back: BoolProperty(
         name="Dim Back Side",
         description="Darken discs that are seen from behind, such as those of the inside of an open scan",
@@ -283,6 +300,16 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     )
     legend: BoolProperty(
         name="Legend", description="Draw the colors with their values over the 3D view", default=True, update=_redraw
+    )
+    legend_place: FloatVectorProperty(
+        name="Legend Place",
+        description="Where the legend lies in the 3D view, which the mouse moves: shares of the way from left to right"
+        " and from bottom to top",
+        default=(1.0, 0.0),
+        min=0.0,
+        max=1.0,
+        size=2,
+        update=_redraw,
     )
     histogram: BoolProperty(
         name="Histogram",
@@ -305,8 +332,17 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         min=0.0,
         subtype="DISTANCE",
     )
+    own_material: PointerProperty(
+        type=bpy.types.Material,
+        name="Own Material",
+        description="Material of the first slot that the display shows, and will follow",
+    )
+    slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
 
+    notices: CollectionProperty(
+        type=notices.MESHFREE_PG_notice, name="Notices", description="What tools told of the object, until dismissed"
+    )
     deform: PointerProperty(
         type=deform_settings.MESHFREE_PG_deform, name="Deform", description="How the object follows handles"
     )
@@ -329,12 +365,21 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     stages: CollectionProperty(
         type=MESHFREE_PG_stage, name="Stages", description="How long each stage of the last analysis took"
     )
+    compared_with: PointerProperty(
+        type=bpy.types.Object, name="Compared With", description="Object that the last comparison measured from"
+    )
+    compared_within: FloatProperty(
+        name="Compared Within",
+        description="Greatest distance of the last comparison; 0 for any distance",
+        min=0.0,
+        subtype="DISTANCE",
+    )
     fingerprint: StringProperty(name="Fingerprint", description="Checksum of the points that were analyzed")
     metric: FloatVectorProperty(name="Metric", description="Scale and shear that were analyzed", size=9)
     settings_used: StringProperty(name="Settings Used", description="Settings of the last analysis")
 
 
-CLASSES = (MESHFREE_PG_stage, *deform_settings.CLASSES, MESHFREE_PG_settings)
+CLASSES = (MESHFREE_PG_stage, *notices.PROPERTY_GROUPS, *deform_settings.CLASSES, MESHFREE_PG_settings)
 
 
 def attach():

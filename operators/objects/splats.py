@@ -22,6 +22,14 @@ from .attributes import (
 from .modifiers import get_input, is_deform
 
 SCALE, ROTATION, BASE, HARMONIC = "scale", "rotation", "radiance:base", "radiance:sh_"
+PLACE = ".splat_place"  # attribute: where a splat was when its ellipsoid was written, but for a common step
+LEFT_BEHIND = (
+    "some of its splats were turned or scaled without their ellipsoids, as Blender's own Join and Apply do. Undo that,"
+    " and use Join Splats or Apply Transform to Splats instead"
+)
+_MOST_STEPS = 32  # that splats take with their ellipsoids: those of parts that were moved, not turned or scaled
+_STEP = 1e-5  # of the largest coordinate: a step as large as this is told from none
+_GLANCE = 4000  # splats that a panel looks at
 _TYPES = {SCALE: ("FLOAT_VECTOR",), ROTATION: ("QUATERNION",), BASE: ("FLOAT4", "FLOAT_COLOR")}
 
 
@@ -67,8 +75,20 @@ def read_splats(data, with_harmonics=True) -> "core.Splats":
 
 
 def write_splats(data, splats):
-    """Move the splats of a mesh or a point cloud, and write their sizes, rotations and harmonics, in local space."""
+    """Move the splats of a mesh or a point cloud, and write their sizes, rotations and harmonics, in local space.
+
+    Further lengths that they have grow with their sizes.
+    """
+    moved = splats.positions - own_positions(data)
     write_own_positions(data, splats.positions)
+    if PLACE in data.attributes:
+        write_attribute(data, PLACE, read_attribute(data, PLACE) + moved, "FLOAT_VECTOR")
+    else:
+        remember_places(data)
+    grown = growth(read_attribute(data, SCALE), splats.scales)
+    for name in core.splats.LENGTHS:
+        if name in data.attributes:
+            write_attribute(data, name, read_attribute(data, name) * grown, "FLOAT")
     write_attribute(data, SCALE, splats.scales, "FLOAT_VECTOR")
     write_attribute(data, ROTATION, splats.rotations, "QUATERNION")
     for number, name in enumerate(harmonic_names(data)):
@@ -95,6 +115,39 @@ def shown_splats(obj) -> "core.Splats":
         if name in data.attributes:
             harmonics[:, number] = _between(harmonics[:, number], read_attribute(data, name), strength)
     return replace(splats, positions=positions, scales=scales, rotations=rotations, harmonics=harmonics)
+
+
+def growth(before, after):
+    """Return by which factor lengths of splats grow, (n,), as the roots of their volumes; 1 for those without one."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factors = np.exp(np.mean(np.log(after, dtype=np.float64) - np.log(before, dtype=np.float64), axis=1))
+    return np.where(np.isfinite(factors) & (factors > 0.0), factors, 1.0)
+
+
+def remember_places(data):
+    """Remember where splats are whose ellipsoids were just written."""
+    write_attribute(data, PLACE, own_positions(data), "FLOAT_VECTOR")
+
+
+def are_left_behind(data, glance=False) -> bool:
+    """Whether splats were turned or scaled without their ellipsoids, as Blender's own Join and Apply do.
+
+    Where splats are only moved, they take one step, or few different ones. A glance, quick enough for a panel, looks at
+    some of them.
+    """
+    if PLACE not in data.attributes or not has_splats(data):
+        return False
+    now, before = own_positions(data), read_attribute(data, PLACE)
+    every = 1 + len(now) // _GLANCE if glance else 1
+    return _count_steps(now[::every], before[::every]) > _MOST_STEPS
+
+
+def _count_steps(now, before):
+    """Count how many different steps splats took from where they were, (n, 3) both."""
+    known = before.any(axis=1)  # those of other origin have zeros
+    size = max(np.abs(values[known]).max(initial=0.0) for values in (now, before)) or 1.0
+    steps = np.round((now - before)[known].astype(np.float64) / (_STEP * size)).astype(np.int64)
+    return len(np.unique(steps @ [1, 1 << 20, 1 << 40]))
 
 
 def _between(one, other, share):

@@ -7,6 +7,7 @@ from bpy.props import BoolProperty
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, write_attribute
+from ..objects.colors import own_material, shows_own_material
 from ..objects.handlers import tell
 from ..objects.options import laplacian_options
 from ..objects.reading import TYPES, discs, obstacle, read_points, sharing_objects
@@ -26,6 +27,7 @@ class Tool:
 
     asks = ()  # names of the settings that a dialog asks for before the work; without any there is none
     adjustable = ()  # names of those that Adjust Last Operation, which waits, offers: they compute nothing long again
+    at_zero = {}  # words that stand beside settings of 0, by their names, where that is no number but leaves it open
     writes = ()  # names of the attributes that `write` makes
 
     @property
@@ -65,6 +67,7 @@ class ApplicationOperator(Tool, JobOperator):
     """
 
     only_active = False  # for what has one object by nature
+    keeps_line = False  # whether what it says in the end are figures that one looks at again
 
     at_once: BoolProperty(
         name="At Once",
@@ -92,17 +95,25 @@ class ApplicationOperator(Tool, JobOperator):
         sharing = [other for obj in objects for other in sharing_objects(obj)]
         with all_or_nothing([*objects, *sharing]):
             texts = self.write_all(context, objects, results)
+            self.begin_notices(objects)
             self.conclude(context, objects)
-        for reason in self._left_out:
-            self.report({"WARNING"}, f"Left out: {reason}.")
-        for *notices, line in texts:
-            for notice in notices:
-                self.report({"WARNING"}, notice)
-            self.report({"INFO"}, line)
+            for reason in self._left_out:
+                self.warn(f"Left out: {reason}.", objects[0])
+            for obj, (*notices, line) in zip(objects, texts, strict=True):
+                self.tell(obj, notices, line)
         return {"FINISHED"}
 
     def conclude(self, context, objects):
         """Do what is left when all objects are written."""
+
+    def tell(self, obj, notices, line: str):
+        """Report what one should know of an object, and what was done with it."""
+        for notice in notices:
+            self.warn(notice, obj)
+        if self.keeps_line:
+            self.note(line, obj)
+        else:
+            self.report({"INFO"}, line)
 
     def is_repeated(self, context):
         return any(last.as_pointer() == self.as_pointer() for last in context.window_manager.operators)
@@ -119,6 +130,12 @@ class ShownOperator(ApplicationOperator):
         if self.show:
             for obj in objects:
                 _write_discs(context, obj)
+            for obj in filter(shows_own_material, [*objects, *sharing]):
+                self.warn(
+                    f'{obj.name}: colors take the place of the material "{own_material(obj).name}". Own Material under'
+                    " Display brings it back.",
+                    obj,
+                )
             for obj in [*objects, *sharing]:
                 tell("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
 

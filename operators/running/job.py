@@ -148,13 +148,8 @@ class Job(StageTimes):
             self._thread.join(seconds)
 
     def show(self, context):
-        """Tell in all windows how far it is, and let Esc end it there."""
+        """Tell in all windows how far it is."""
         windows = context.window_manager.windows
-        if not bpy.app.background:
-            for window in windows:  # also such as were opened meanwhile
-                if all(operator.bl_idname != _ESCAPE for operator in window.modal_operators):
-                    with bpy.context.temp_override(window=window):
-                        bpy.ops.meshfree.escape("INVOKE_DEFAULT")
         text = f"{self.label}: {self.stage}, {self.fraction:.0%}    Esc to stop"
         if text != self._shown:
             self._shown = text
@@ -231,8 +226,8 @@ def _set_status(workspaces, text):
 class JobOperator(ReadyOperator):
     """An operator whose work runs beside the window when somebody there has started it.
 
-    The work ends early by Esc, by undo and redo, when an object of it is deleted, and when another file is opened. All
-    other keys go to Blender.
+    The work ends early by *Stop*, which is Esc, by undo and redo, when an object of it is deleted, and when another
+    file is opened. It takes no keys itself, which what runs beside it, such as a drag, may need.
     """
 
     _job = None
@@ -304,7 +299,8 @@ class JobOperator(ReadyOperator):
         try:
             objects = [snapshot.find_same(context, self.works_in) for snapshot in job.snapshots]
         except PointCloudError as change:
-            self.report({"WARNING"}, f"{job.label} wrote nothing: {change}")
+            there = [snapshot.find() for snapshot in job.snapshots]
+            self.warn(f"{job.label} wrote nothing: {change}", *filter(None, there))
             return {"CANCELLED"}
         return self.finish(context, objects, results)
 
@@ -324,36 +320,6 @@ class MESHFREE_OT_stop(bpy.types.Operator):
     def execute(self, context):
         running().stop()
         return {"FINISHED"}
-
-
-class MESHFREE_OT_escape(bpy.types.Operator):
-    """Let Esc stop what is running, in the window where it is pressed"""
-
-    bl_idname = "meshfree.escape"
-    bl_label = "Stop by Esc"
-    bl_options = {"INTERNAL"}  # each window has one while something runs
-
-    def invoke(self, context, event):
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        job = running()
-        if job is None:
-            self.cancel(context)
-            return {"CANCELLED", "PASS_THROUGH"}
-        if event.type != "ESC" or event.value != "PRESS":
-            return {"PASS_THROUGH"}
-        job.stop()
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context):
-        """Leave no timer behind, should the window be closed."""
-        context.window_manager.event_timer_remove(self._timer)
-
-
-_ESCAPE = MESHFREE_OT_escape.__name__
 
 
 def attach():
@@ -386,4 +352,4 @@ def _abandon(*_):
 
 
 _HANDLERS = {"undo_post": _undone, "redo_post": _undone, "load_pre": _abandon}
-CLASSES = (MESHFREE_OT_stop, MESHFREE_OT_escape)
+CLASSES = (MESHFREE_OT_stop,)

@@ -5,7 +5,8 @@ from functools import wraps
 from numpy.linalg import LinAlgError
 
 from ...core import PointCloudError
-from ..objects.reading import obstacle
+from ..objects.notices import forget, keep
+from ..objects.reading import obstacle, sharing_objects
 
 _TEXTS = {  # what may go wrong in any computation, in plain words
     PointCloudError: "{}",
@@ -35,7 +36,37 @@ def reporting(method):
     return guarded
 
 
-class ReadyOperator:
+class TellingOperator:
+    """An operator whose warnings stay with the object that they are about, where the panel shows them.
+
+    The line about a report in the status bar is gone with the next one.
+    """
+
+    def warn(self, text: str, *objects):
+        """Report what somebody should know of some objects, and keep it there."""
+        self._keep("WARNING", text, objects)
+
+    def note(self, text: str, *objects):
+        """Report figures of some objects that one looks at again, and keep them there."""
+        self._keep("INFO", text, objects)
+
+    def _keep(self, level, text, objects):
+        self.report({level}, text)
+        for owner in _owners(objects):
+            keep(owner, self.bl_label, text, level)
+
+    def begin_notices(self, objects):
+        """Drop what this operator told of objects when it ran before."""
+        for owner in _owners(objects):
+            forget(owner, self.bl_label)
+
+
+def _owners(objects):
+    """Some objects, and those that show the same points."""
+    return [owner for obj in objects for owner in (obj, *sharing_objects(obj))]
+
+
+class ReadyOperator(TellingOperator):
     """An operator for the active object; where that is unfit, the button is gray and its tooltip says why."""
 
     bl_options = {"REGISTER", "UNDO"}

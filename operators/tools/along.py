@@ -69,6 +69,7 @@ class Unwrap(Tool):
     writes = (UV,)
     asks = ("group", "radius", "angle", "show")
     adjustable = ("radius", "angle", "show")
+    at_zero = {"radius": "All Points"}
 
     group: StringProperty(
         name="Middle",

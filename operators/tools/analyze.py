@@ -94,8 +94,6 @@ def resolved_modes(laplacian, modes, progress):
 class AnalysisOperator(ShownOperator):
     """What the operators that analyze objects have in common; `wanted` is how many modes one computes."""
 
-    adjustable = ("write_limit", "show")
-
     write_limit: IntProperty(
         name="Modes to Write",
         description="Write at most this many modes as attributes; the eigenvalues of all of them are kept",
@@ -109,6 +107,11 @@ class AnalysisOperator(ShownOperator):
         default=False,
         options={"SKIP_SAVE"},
     )
+
+    @property
+    def adjustable(self):
+        """Names of the settings: how many modes to write is no question where all are."""
+        return ("write_limit", "show") if self.wanted > WRITE_LIMIT else ("show",)
 
     @property
     def writes(self):

@@ -2,11 +2,12 @@
 
 import bpy
 import numpy as np
-from bpy.props import FloatProperty
+from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
 from ...core import PointCloudError
 from ..objects.attributes import COMPARED, DEVIATION, tag_changed, write_attribute
+from ..objects.place import hide
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
 from ..running.application import ShownOperator, Tool, naming, operator_reader
@@ -16,7 +17,8 @@ class Compare(Tool):
     """The settings and the work of `meshfree.compare`."""
 
     writes = (DEVIATION, COMPARED)
-    asks = ("greatest", "show")
+    asks = ("greatest", "show", "hide_reference")
+    at_zero = {"greatest": "Any"}
 
     greatest: FloatProperty(
         name="Greatest Distance",
@@ -24,6 +26,11 @@ class Compare(Tool):
         default=0.0,
         min=0.0,
         subtype="DISTANCE",
+    )
+    hide_reference: BoolProperty(
+        name="Hide Reference",
+        description="Hide the other cloud, which covers the colors, in views and renders",
+        default=True,
     )
 
     def plan(self, context, obj):
@@ -53,14 +60,24 @@ class Compare(Tool):
 
     def other(self, context, obj):
         """Return the name of the other cloud, what gives its operator, and how points lie about it, less as read."""
-        [other] = _others(context)
+        other = self.reference_of(context)
         with naming(other.name):
             _, operator = operator_reader(context, other)
         # Points are read without the place of their objects.
         return other.name, operator, np.array(obj.matrix_world.translation) - np.array(other.matrix_world.translation)
 
+    @classmethod
+    def reference_of(cls, context):
+        """Return the other cloud: the one that is selected, else that of the comparison before; None without one."""
+        selected = _others(context)
+        if len(selected) == 1:
+            return selected[0]
+        return None if selected else _compared(context)
+
     def write(self, context, obj, result):
         found, name = result
+        obj.meshfree.compared_with = bpy.data.objects.get(name)  # None for a file
+        obj.meshfree.compared_within = self.greatest
         write_attribute(obj.data, DEVIATION, found.distance)
         write_attribute(obj.data, COMPARED, found.known)
         tag_changed(obj.data)
@@ -82,23 +99,73 @@ def distances(found):
     return float(sizes.mean()), float(np.percentile(sizes, 95.0)), float(sizes.max())
 
 
-class MESHFREE_OT_compare(Compare, ShownOperator, bpy.types.Operator):
-    """Measure how far the points of the active object are from the surface of the other selected one"""
+class CompareOperator(Compare, ShownOperator):
+    """What the operators that compare have in common."""
 
-    bl_idname = "meshfree.compare"
-    bl_label = "Compare Points"
-    only_active = True
+    adjustable = ("show", "hide_reference")
+    only_active = keeps_line = True
 
     @classmethod
     def obstacle(cls, context):
         reason = super().obstacle(context)
         if reason:
             return reason
-        count = len(_others(context))
-        if count != 1:
+        other = cls.reference_of(context)
+        if other is None:
+            count = len(_others(context))
             many = f"{count} others are" if count else "no other is"
             return f'"{context.object.name}" is compared with one other cloud, and {many} selected. Select one'
-        return obstacle(_others(context)[0])
+        return obstacle(other)
+
+    def conclude(self, context, objects):
+        """Show the colors, and not the cloud that covers them."""
+        super().conclude(context, objects)
+        if self.hide_reference:
+            hide(objects[0].meshfree.compared_with)
+
+
+class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):
+    """Measure how far the points of the active object are from the surface of the other selected one"""
+
+    bl_idname = "meshfree.compare"
+    bl_label = "Compare Points"
+
+
+class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
+    """Compare the other way round: show how far the points of the reference are from the active object's surface"""
+
+    bl_idname = "meshfree.compare_swap"
+    bl_label = "Swap Comparison"
+    asks = ()
+
+    @classmethod
+    def subject(cls, context):
+        return _compared(context)
+
+    @classmethod
+    def reference_of(cls, context):
+        return context.object
+
+    @classmethod
+    def obstacle(cls, context):
+        if cls.subject(context) is None:
+            return "The active object was not compared yet. Press Compare Points under Measure"
+        return super().obstacle(context)
+
+    def conclude(self, context, objects):
+        """Make the former reference the active object too."""
+        super().conclude(context, objects)
+        hide(objects[0], False)
+        for other in context.selected_objects:
+            other.select_set(False)
+        objects[0].select_set(True)
+        context.view_layer.objects.active = objects[0]
+
+
+def _compared(context):
+    """Return what the active object was compared with, if it is still there, or None."""
+    other = context.object and context.object.meshfree.compared_with
+    return other if other is not None and other.name in context.view_layer.objects else None
 
 
 def _others(context):
@@ -106,4 +173,4 @@ def _others(context):
     return [other for other in context.selected_objects if other != context.object and other.type in TYPES]
 
 
-CLASSES = (MESHFREE_OT_compare,)
+CLASSES = (MESHFREE_OT_compare, MESHFREE_OT_compare_swap)

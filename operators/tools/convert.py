@@ -13,7 +13,7 @@ from ..objects.attributes import SELECTION, point_count, write_attribute
 from ..objects.counting import renew_counts
 from ..objects.evaluated import POINTCLOUDS_SINCE, shown_as_own, shown_points
 from ..objects.groups import ROLES, group_weights, handle_names, has_group, role_group
-from ..objects.modifiers import get_input, is_display, set_input
+from ..objects.modifiers import inputs_of, is_display, put_inputs, set_input
 from ..objects.result import check_writable
 from ..running.application import chosen_objects
 from ..running.ready import ReadyOperator, reporting
@@ -167,7 +167,7 @@ def _take_display(obj):
     modifier = next((item for item in obj.modifiers if is_display(item)), None)
     if modifier is None:
         return None
-    kept = modifier.name, modifier.node_group, {name: get_input(modifier, name) for name in ("Radius", "Material")}
+    kept = modifier.name, modifier.node_group, inputs_of(modifier)
     set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
     obj.modifiers.remove(modifier)
     return kept
@@ -180,8 +180,7 @@ def _put_display(obj, display):
     modifier = obj.modifiers.new(name, "NODES")
     modifier.node_group = group
     modifier.use_pin_to_last = True
-    for key, value in inputs.items():
-        set_input(modifier, key, value)
+    put_inputs(modifier, inputs)
 
 
 CLASSES = (MESHFREE_OT_convert,)

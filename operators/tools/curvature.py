@@ -92,6 +92,7 @@ class Roughness(Tool):
 
     writes = (ROUGHNESS,)
     asks = ("wavelength", "show")
+    at_zero = {"wavelength": "Automatic"}
 
     wavelength: FloatProperty(
         name="Wavelength",

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
-from ..objects.groups import SOURCE, VALUE, chosen_members, chosen_weights, group_kind
+from ..objects.groups import HIGH, LOW, SOURCE, VALUE, chosen_weights, group_kind, has_group, is_chosen
 from ..objects.result import length_text
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
@@ -25,14 +25,19 @@ class HarmonicField(Tool):
         name="Values",
         description="Where the given values come from",
         items=[
+            ("AUTO", "All Groups", "From all of the groups below that are there"),
             ("WEIGHTS", "Weights", "The points of one group have their weights as values"),
             ("GROUPS", "Two Groups", "The points of each of two groups have one value"),
         ],
-        default="WEIGHTS",
+        default="AUTO",
+    )
+    low_group: StringProperty(
+        name="Low Group", description="Vertex group of the points with the low value", default=LOW
+    )
+    high_group: StringProperty(
+        name="High Group", description="Vertex group of the points with the high value", default=HIGH
     )
     group: StringProperty(name="Group", description="Vertex group whose weights are the values", default=VALUE)
-    low_group: StringProperty(name="Low Group", description="Vertex group of the points with the low value")
-    high_group: StringProperty(name="High Group", description="Vertex group of the points with the high value")
     low: FloatProperty(name="Low Value", description="Value of the low group, or of weight 0", default=0.0)
     high: FloatProperty(name="High Value", description="Value of the high group, or of weight 1", default=1.0)
     source: StringProperty(
@@ -42,8 +47,9 @@ class HarmonicField(Tool):
 
     @property
     def asks(self):
-        """Names of the settings: the values come from one group, or from two."""
-        groups = ("group",) if self.values == "WEIGHTS" else ("low_group", "high_group")
+        """Names of the settings: the values come from one group, from two, or from all three."""
+        ends, weights = ("low_group", "high_group"), ("group",)
+        groups = {"WEIGHTS": weights, "GROUPS": ends, "AUTO": (*ends, *weights)}[self.values]
         return "values", *groups, "low", "high", "source", "show"
 
     @property
@@ -52,26 +58,8 @@ class HarmonicField(Tool):
         return ("show",) if self.source else ("low", "high", "show")
 
     def plan(self, context, obj):
-        if self.values == "GROUPS":
-            low = chosen_members(obj, self.low_group, "Low Group")
-            high = chosen_members(obj, self.high_group, "High Group")
-            both = np.count_nonzero(low & high)
-            if both:
-                raise PointCloudError(
-                    f'{both} points are both in "{self.low_group}" and in "{self.high_group}". Remove them from one.'
-                )
-            fixed, shares = low | high, high.astype(np.float64)
-        elif self.group or not self.source:
-            shares = chosen_weights(obj, self.group, "Group", least=0, outside=np.nan)
-            fixed = np.isfinite(shares)  # with weight 0 too
-            if not fixed.any():
-                raise PointCloudError(
-                    f'The {group_kind(obj)} "{self.group}" of "{obj.name}" holds no points. Assign some to'
-                    " it in Edit Mode."
-                )
-        else:
-            shares = np.zeros(point_count(obj.data))
-            fixed = np.zeros(len(shares), dtype=bool)
+        shares = self._shares(obj)
+        fixed = np.isfinite(shares)
         source = None
         if self.source:
             source = read_attribute(obj.data, self.source).astype(np.float64)
@@ -105,6 +93,53 @@ class HarmonicField(Tool):
             )
 
         return compute
+
+    def _shares(self, obj):
+        """Return the share of the way from the low to the high value, (n,); not a number where none is given."""
+        shares, known = np.full(point_count(obj.data), np.nan), {}
+        for setting, share in self._given(obj).items():
+            name, title = getattr(self, setting), setting.replace("_", " ").title()
+            weights = chosen_weights(obj, name, title, least=int(self.values == "GROUPS"), outside=np.nan)
+            held = np.isfinite(weights) if share is None else weights > 0.0  # a value may be a weight of 0, too
+            for other, there in known.items():
+                both = np.count_nonzero(held & there)
+                if both:
+                    raise PointCloudError(f'{both} points are both in "{other}" and in "{name}". Remove them from one.')
+            known[name] = held
+            shares[held] = weights[held] if share is None else share
+        if self.group or not self.source:
+            self._check_given(obj, {name for name, held in known.items() if held.any()})
+        return shares
+
+    def _given(self, obj):
+        """Return the settings whose groups give values, with the shares of their points, None for their weights."""
+        ends, weights = {"low_group": 0.0, "high_group": 1.0}, {"group": None}
+        if self.values == "GROUPS":
+            return ends
+        if self.values == "WEIGHTS" or self.group not in ("", VALUE):
+            return weights if self.group or not self.source else {}
+        every = ends | weights
+        defaults = dict(zip(every, (LOW, HIGH, VALUE), strict=True))
+        return {name: every[name] for name in every if is_chosen(obj, getattr(self, name), defaults[name])}
+
+    def _check_given(self, obj, names):
+        """Refuse to solve without values, or with those of one end alone, by the names of groups that hold points."""
+        if not names and has_group(obj, self.group):
+            raise PointCloudError(
+                f'The {group_kind(obj)} "{self.group}" of "{obj.name}" holds no points. Assign some to it in Edit Mode.'
+            )
+        if not names:
+            raise PointCloudError(
+                f'"{obj.name}" has no points with given values. Select those of one end in Edit Mode and press Assign'
+                " to Low, and those of the other end and press Assign to High."
+            )
+        ends = {self.low_group, self.high_group}
+        if self.values == "AUTO" and len(names) == 1 and names < ends and not self.source:
+            (missing,) = ends - names
+            raise PointCloudError(
+                f'Only the {group_kind(obj)} "{min(names)}" of "{obj.name}" gives values, so that all would be the'
+                f' same. Assign points to "{missing}", too.'
+            )
 
     def write(self, context, obj, result):
         write_attribute(obj.data, FIELD, result)

@@ -8,13 +8,14 @@ from bpy.props import BoolProperty, FloatProperty
 from ... import core
 from ..objects.attributes import DIRECTION_1, DISC, NORMAL, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
+from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
 from ..objects.handlers import tell
-from ..objects.place import OFFSET
+from ..objects.place import copy_place, hide
+from ..objects.splats import has_splats
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 
-_COLORS = "FLOAT_COLOR", "BYTE_COLOR"
 _LEFT = DISC, "position"  # attributes that mean nothing on a mesh, or something else
 _GAP = 12  # edges around a hole that is no opening, but a gap between points
 _STEPS = 255  # of weights
@@ -24,7 +25,7 @@ class MeshSurface(Tool):
     """The settings and the work of `meshfree.mesh_surface`."""
 
     asks = ("detail", "keep_open")
-    adjustable = ("keep_open",)
+    adjustable = ("detail", "keep_open")
     made = ()  # names of objects, of those that hold their meshes, and how many edges of these are open
 
     detail: FloatProperty(
@@ -47,14 +48,8 @@ class MeshSurface(Tool):
         reading, operator = operator_reader(context, obj)
         detail, kept = self.detail, _Kept(obj)
 
-        def make(laplacian, progress):
-            mesh = core.mesh_surface(laplacian, detail, progress=progress)
-            carrying = core.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
-            return mesh, carrying
-
         def compute(progress):
-            laplacian = operator(progress)
-            mesh, carrying = cache.result(laplacian, "mesh", detail, compute=lambda: make(laplacian, progress))
+            mesh, carrying = surface_mesh(operator(progress), detail, progress)
             faces = mesh.faces if np.linalg.det(reading.matrix) > 0.0 else mesh.faces[:, ::-1]
             return reading.local(mesh.vertices), faces, kept.carried(carrying, len(mesh.vertices))
 
@@ -66,8 +61,7 @@ class MeshSurface(Tool):
         for collection in obj.users_collection:
             collection.objects.link(made)
         made.matrix_world = obj.matrix_world
-        if OFFSET in obj:
-            made[OFFSET] = obj[OFFSET]
+        copy_place(made, obj)
         opened = _close(made.data, _GAP if self.keep_open else 0)
         carried.write(made)
         for name in COLOR_CHOICES:
@@ -88,7 +82,7 @@ class MeshSurface(Tool):
             made[obj.name].select_set(True)
         context.view_layer.objects.active = made[objects[0].name]
         for obj in objects:
-            obj.hide_set(True)
+            hide(obj)
 
 
 class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Operator):
@@ -98,29 +92,42 @@ class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Opera
     bl_label = "Surface from Points"
 
 
+def surface_mesh(laplacian, detail, progress):
+    """Return a mesh of the points of an operator, and the `Prolongation` to its vertices, made only once."""
+
+    def make():
+        mesh = core.mesh_surface(laplacian, detail, progress=progress)
+        return mesh, core.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
+
+    return cache.result(laplacian, "mesh", detail, compute=make)
+
+
 class _Kept:
     """What the points of an object hold: attributes, colors, and weights in vertex groups."""
 
     def __init__(self, obj):
-        self._types, self._values = {}, {}
+        self._types, self._values, self._active = {}, {}, own_colors(obj.data)
+        splats = has_splats(obj.data)  # whose colors are harmonics
         for attribute in obj.data.attributes:
             name = attribute.name
             if attribute.domain != "POINT" or name in _LEFT or name.startswith("."):
                 continue
             if attribute.data_type in STORABLE:
                 self._values[name] = read_attribute(obj.data, name)
-            elif attribute.data_type in _COLORS:
+            elif attribute.data_type in COLORS and not splats:
                 self._values[name] = np.empty((point_count(obj.data), 4), np.float32)
                 attribute.data.foreach_get("color", self._values[name].reshape(-1))
             else:
                 continue
             self._types[name] = attribute.data_type
+        if splats:
+            self._types[COLOR], self._values[COLOR], self._active = "FLOAT_COLOR", splat_colors(obj.data), COLOR
         self._groups = _weights(obj)
 
     def carried(self, carrying, count):
         """Return the same on the vertices of a mesh, the last ones of so many, by a `Prolongation`."""
         result = object.__new__(_Kept)
-        result._types = self._types
+        result._types, result._active = self._types, self._active
         result._values = {name: self._carry(carrying, name, values)[-count:] for name, values in self._values.items()}
         result._groups = {
             name: np.clip(carrying.interpolate(weights)[-count:], 0.0, 1.0) for name, weights in self._groups.items()
@@ -133,16 +140,18 @@ class _Kept:
         smooth = carrying.interpolate(values)
         if name == NORMAL:
             smooth /= np.maximum(np.linalg.norm(smooth, axis=1), 1e-30)[:, None]
-        return np.clip(smooth, 0.0, None) if self._types[name] in _COLORS else smooth
+        return np.clip(smooth, 0.0, None) if self._types[name] in COLORS else smooth
 
     def write(self, obj):
         """Put all of it on the vertices of a mesh."""
         for name, values in self._values.items():
-            if self._types[name] in _COLORS:
+            if self._types[name] in COLORS:
                 layer = obj.data.attributes.new(name, self._types[name], "POINT")
                 layer.data.foreach_set("color", np.ascontiguousarray(values, np.float32).reshape(-1))
             else:
                 write_attribute(obj.data, name, values, self._types[name])
+        if self._active:
+            obj.data.color_attributes.active_color_name = self._active
         for name, weights in self._groups.items():
             add_group(obj, name, np.round(_STEPS * weights) / _STEPS)
 

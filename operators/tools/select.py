@@ -2,22 +2,43 @@
 
 from contextlib import contextmanager
 
+import bmesh
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
+from bpy_extras import view3d_utils
 
 from ... import core
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import SELECTION, point_count, read_attribute, tag_changed, write_attribute
+from ..objects.attributes import (
+    SELECTION,
+    point_count,
+    positions_now,
+    read_attribute,
+    tag_changed,
+    write_attribute,
+)
 from ..objects.counting import renew_counts
-from ..objects.groups import HANDLE, SOURCE, assign, check_assignable, chosen_members, is_chosen, role_group
+from ..objects.groups import (
+    HANDLE,
+    SOURCE,
+    assign,
+    check_assignable,
+    chosen_members,
+    chosen_weights,
+    group_weights,
+    has_group,
+    is_chosen,
+    rivals,
+    role_group,
+)
 from ..objects.handlers import tell
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.splats import read_splats
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
-from ..running.ready import reporting
+from ..running.ready import ReadyOperator, reporting
 from ..running.stages import Stages
 
 
@@ -169,6 +190,8 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.select_grow"
     bl_label = "Grow Selection"
+    asks = ("distance",)
+    at_zero = {"distance": "Automatic"}
 
     distance: FloatProperty(
         name="Distance",
@@ -251,6 +274,8 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             ("ANCHOR", "Anchor", "Points that stay where they are"),
             ("FIXED", "Fixed", "The boundary that a minimal surface keeps"),
             ("SOURCE", "Source", "Points from which distances are measured"),
+            ("LOW", "Low", "Points with the low value of a field, at one end"),
+            ("HIGH", "High", "Points with the high value of a field, at the other end"),
             ("VALUE", "Value", "Points with given values of a field, as weights"),
             ("BOUNDARY", "Boundary", "Points at which the surface ends; it becomes the Boundary Group of the settings"),
         ],
@@ -274,6 +299,14 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
         name="Front Only", description="Leave out points whose normals point away from the viewer", default=False
     )
 
+    @classmethod
+    def description(cls, context, properties):
+        """Say what a button does; an empty text leaves it to the docstring."""
+        return {
+            "ADD": "Add the selected points to the group, which keeps those that it holds",
+            "REMOVE": "Remove the selected points from the group",
+        }.get(properties.action, "")
+
     @property
     def surface(self):
         """Whether it needs the operator on the points, for their normals."""
@@ -288,18 +321,127 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     f'All selected points of "{obj.name}" face away from the viewer. Turn off Front Only, or'
                     " look from the other side."
                 )
-        name = self.name or role_group(obj, self.role.title())
+        role = self.role.title()
+        name = self.name or role_group(obj, role)
         check_assignable(obj, name, must_exist=self.action == "REMOVE")
+        others = rivals(obj, role) if name == role and self.action != "REMOVE" else []
+        for other in others:
+            check_assignable(obj, other, must_exist=True)
+        gone = _replaced(obj, name, chosen) if self.action == "REPLACE" else 0
 
         def change():
+            for other in others:
+                assign(obj, other, chosen, "REMOVE", 1.0)
             assign(obj, name, chosen, self.action, self.weight)
             groups_changed(obj)
             if self.role == "BOUNDARY" and self.action != "REMOVE":
                 obj.meshfree.boundary_group = name
             done = {"REPLACE": "are in", "ADD": "were added to", "REMOVE": "were removed from"}[self.action]
-            return f'{np.count_nonzero(chosen):,} points {done} the group "{name}"'
+            left = f", in place of {gone:,} others" if gone else ""
+            return f'{np.count_nonzero(chosen):,} points {done} the group "{name}"{left}'
 
         return change
+
+
+def _replaced(obj, name, chosen):
+    """Count the points that a group holds beside the chosen ones, (n,) bool."""
+    return np.count_nonzero(np.isfinite(group_weights(obj, name, np.nan)) & ~chosen) if has_group(obj, name) else 0
+
+
+class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
+    """Select the point that is seen along a ray, and not one behind it: what a click in Edit Mode does"""
+
+    bl_idname = "meshfree.select_point"
+    bl_label = "Select Point"
+    works_in = ("EDIT",)
+
+    eye: FloatVectorProperty(name="Eye", description="Where the ray begins, in the world", subtype="XYZ")
+    direction: FloatVectorProperty(
+        name="Viewing Direction", description="Direction of the ray", default=(0.0, 0.0, -1.0), subtype="XYZ"
+    )
+    extend: BoolProperty(
+        name="Extend",
+        description="Keep what is selected already, and deselect the point if it is",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context, event):
+        """Take the ray under the mouse; leave to Blender what it does better, or what shows no point."""
+        if not _is_opaque_cloud(context):
+            return {"PASS_THROUGH"}
+        place = event.mouse_region_x, event.mouse_region_y
+        self.eye = view3d_utils.region_2d_to_origin_3d(context.region, context.region_data, place)
+        self.direction = view3d_utils.region_2d_to_vector_3d(context.region, context.region_data, place)
+        found = self.find(context)
+        return {"PASS_THROUGH"} if found is None else self.take(context, *found)
+
+    @reporting
+    def execute(self, context):
+        found = self.find(context)
+        if found is None:
+            raise PointCloudError("No point is seen along the ray. Aim at the surface.")
+        return self.take(context, *found)
+
+    def take(self, context, obj, index):
+        """Select a point of an object, or deselect it where it is one more of the selected ones."""
+        for other in edited_objects(context):
+            known = selection(other)  # that of now, since `find` has read the points
+            wanted = known & self.extend
+            if other == obj:
+                wanted[index] = not wanted[index]
+            _put_selection(other, known, wanted)
+        return {"FINISHED"}
+
+    def find(self, context):
+        """Return the object and the index of the point in front, or None."""
+        eye, direction = np.array(self.eye, dtype=np.float64), np.array(self.direction, dtype=np.float64)
+        found = []
+        for obj in edited_objects(context):
+            matrix = np.array(obj.matrix_world)
+            points = positions_now(obj) @ matrix[:3, :3].T + matrix[:3, 3]
+            points[_hidden(obj)] = np.nan
+            known = obj.meshfree.spacing * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))  # where a display measured it
+            index = core.front_point(points, eye, direction, 2.0 * (known or core.geometry.typical_distance(points)))
+            if index >= 0:
+                found.append(((points[index] - eye) @ direction, obj.name, obj, index))
+        return min(found)[2:] if found else None
+
+
+def _is_opaque_cloud(context):
+    """Whether somebody sees the points of clouds, and does not look through them."""
+    space = context.space_data
+    if space is None or space.type != "VIEW_3D" or context.region_data is None:
+        return False
+    shading = space.shading
+    through = shading.show_xray_wireframe if shading.type == "WIREFRAME" else shading.show_xray
+    if shading.type in ("SOLID", "WIREFRAME") and through:
+        return False
+    meshes = [bmesh.from_edit_mesh(obj.data) for obj in edited_objects(context) if obj.type == "MESH"]
+    return not meshes or (context.tool_settings.mesh_select_mode[0] and not any(len(mesh.edges) for mesh in meshes))
+
+
+def _put_selection(obj, known, wanted):
+    """Select points of an object in Edit Mode, and deselect others, (n,) bool, where that changes."""
+    if obj.type != "MESH":
+        write_attribute(obj.data, SELECTION, wanted, "BOOLEAN")
+        tag_changed(obj.data)
+        return
+    edited = bmesh.from_edit_mesh(obj.data)
+    edited.verts.ensure_lookup_table()
+    for index in np.flatnonzero(known != wanted).tolist():
+        edited.verts[index].select_set(bool(wanted[index]))
+        if wanted[index]:
+            edited.select_history.add(edited.verts[index])
+    bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
+
+
+def _hidden(obj):
+    """Read which points are hidden, (n,) bool, after `positions_now`."""
+    hidden = np.zeros(point_count(obj.data), dtype=bool)
+    if obj.type == "MESH":
+        obj.data.vertices.foreach_get("hide", hidden)
+    return hidden
 
 
 class MESHFREE_OT_select_boundary(SelectionOperator, bpy.types.Operator):
@@ -344,11 +486,14 @@ class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
     name: StringProperty(name="Name", description="Name of the group", default=HANDLE, maxlen=63)
 
     def prepare(self, context, obj):
-        chosen = chosen_members(obj, self.name, "Name")
+        chosen = np.isfinite(chosen_weights(obj, self.name, "Name", least=0, outside=np.nan))
+        if not chosen.any():
+            raise PointCloudError(f'"{self.name}" of "{obj.name}" holds no points. Assign some to it in Edit Mode.')
         return lambda: select(context, obj, chosen)
 
 
 CLASSES = (
+    MESHFREE_OT_select_point,
     MESHFREE_OT_select_grow,
     MESHFREE_OT_select_component,
     MESHFREE_OT_select_front,

@@ -70,6 +70,8 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
     bl_idname = "meshfree.analyze_sequence"
     bl_label = "Analyze Sequence"
     bl_options = {"REGISTER", "UNDO"}
+    asks = ("modes", "shown_mode", "show")
+    at_zero = {"shown_mode": "Mean Curvature"}
 
     modes: IntProperty(
         name="Modes", description="Compute this many vibration modes of each frame", default=0, min=0, soft_max=50
@@ -117,18 +119,29 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
                 write_result(obj, analysis, max(self.modes, WRITE_LIMIT))
             if self.show:
                 tell("sequence_written", objects, name)
-        for obj, (analysis, overlaps) in zip(objects, results, strict=True):
-            for notice in analysis.notices:
-                self.report({"WARNING"}, f"{obj.name}: {notice}")
-            lost = np.flatnonzero(overlaps < 0.5) + 1
-            if len(lost):
-                shown = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")
-                self.report({"WARNING"}, f"{obj.name}: modes {shown} do not continue those of the frame before")
+            self._tell(objects, results)
         areas = [analysis.total_area for analysis, _ in results]
         span = f"area {area_text(min(areas))} to {area_text(max(areas))}"
         modes = f", {self.modes} modes" if self.modes else ""
         self.report({"INFO"}, f"{len(objects)} frames, {span}{modes}")
         return {"FINISHED"}
+
+    def _tell(self, frames, results):
+        """Tell of what is in doubt, on frames and on what shows them, since nobody selects frames."""
+        sequences = [obj for obj in bpy.data.objects if frames_of(obj) == frames]
+        self.begin_notices([*sequences, *frames])
+        for obj, (analysis, overlaps) in zip(frames, results, strict=True):
+            for notice in [*analysis.notices, *_lost(overlaps)]:
+                self.warn(f"{obj.name}: {notice}", obj, *sequences)
+
+
+def _lost(overlaps):
+    """Say which modes have nothing to continue."""
+    lost = np.flatnonzero(overlaps < 0.5) + 1
+    if not len(lost):
+        return []
+    shown = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")
+    return [f"modes {shown} do not continue those of the frame before"]
 
 
 def _compute(plans, progress):

@@ -3,10 +3,10 @@
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
-from bpy_extras import anim_utils
 
 from ... import core
 from ...core import PointCloudError
+from ..objects.animation import curves
 from ..objects.carried import carries
 from ..objects.groups import chosen_weights
 from ..objects.positions import check_movable, target_property, write_positions
@@ -23,6 +23,8 @@ _FINEST = 8.0  # details finer than this share of the wavelength count as noise,
 
 class Smooth(Tool):
     """The settings and the work of `meshfree.smooth`."""
+
+    at_zero = {"wavelength": "Automatic"}
 
     method: EnumProperty(
         name="Method",
@@ -183,6 +185,7 @@ class ModeShape(Tool):
     """The settings and the work of `meshfree.mode_shape`."""
 
     adjustable = ("mode", "amplitude", "phase", "animate", "period", "target")
+    at_zero = {"amplitude": "Automatic"}
 
     mode: IntProperty(
         name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
@@ -256,12 +259,7 @@ class ModeShape(Tool):
 
 def _animated_value(key, frame):
     """Return the value that its keyframes give a shape key at a frame."""
-    animation = key.id_data.animation_data
-    if hasattr(animation, "action_slot"):  # Blender 4.4 on
-        curves = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot).fcurves
-    else:
-        curves = animation.action.fcurves
-    return curves.find(key.path_from_id("value")).evaluate(frame)
+    return curves(key.id_data).find(key.path_from_id("value")).evaluate(frame)
 
 
 class MESHFREE_OT_mode_shape(ModeShape, ApplicationOperator, bpy.types.Operator):

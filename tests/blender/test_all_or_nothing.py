@@ -1,5 +1,6 @@
 """What fails while results are written leaves everything as it was, wherever it fails."""
 
+import importlib
 import inspect
 import sys
 
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_group, add_object, differences, everything, grid_points, sphere_points
+from tests.blender.conftest import MODULE
+from tests.blender.splats import add_splats, bar_splats
 
 SKIPPED = inspect.CO_GENERATOR, "all_or_nothing.py"  # what Python ends by itself, and what puts things back
 
@@ -23,7 +26,7 @@ class Fault:
         code = frame.f_code
         if not code.co_filename.startswith(self._folder):
             return
-        self._writing |= code.co_name in ("write_all", "_convert", "_add", "change", "show_attribute")
+        self._writing |= code.co_name in ("write_all", "_convert", "_add", "change", "show_attribute", "_join")
         if not self._writing or code.co_flags & SKIPPED[0] or code.co_filename.endswith(SKIPPED[1]):
             return
         self._left -= 1
@@ -178,6 +181,19 @@ def test_nothing_is_left_of_a_sequence_whose_import_fails(extension, tmp_path):
         np.save(tmp_path / f"points_{number}.npy", sphere_points(50))
     path = str(tmp_path / "points_1.npy")
     assert fail_everywhere(extension, handled, "import_points", filepath=path, sequence=True, step=3) > 2
+
+
+def two_of_splats():
+    splats = bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1)
+    for name in ("First", "Second"):
+        add_splats(splats, name).rotation_euler.x = 0.4
+    for obj in bpy.data.objects:
+        obj.select_set(True)
+    bpy.context.view_layer.update()
+
+
+def test_splats_stay_if_joining_fails(extension):
+    assert fail_everywhere(extension, two_of_splats, "join_splats", step=1) > 10
 
 
 def shown():

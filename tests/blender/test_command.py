@@ -135,9 +135,34 @@ def test_points_far_from_the_origin_are_written_where_they_were(extension, run, 
 
 
 def test_what_of_a_file_is_left_out_is_told(run, tmp_path):
-    np.savetxt(tmp_path / "in.xyz", np.hstack([POINTS, POINTS]))
-    code, (line,) = run("analyze", tmp_path / "in.xyz")
-    assert (code, line["notices"]) == (0, ["in.xyz: left out 3 columns that no header names."])
+    rows = "".join(f"{x},{y},{z},tree\n" for x, y, z in POINTS)
+    (tmp_path / "in.csv").write_text(f"x,y,z,code\n{rows}nan,1,2,tree\n")
+    code, (line,) = run("analyze", tmp_path / "in.csv")
+    assert (code, line["points"]) == (0, 1000)
+    assert line["notices"] == [
+        "in.csv: left out code, which holds text.",
+        "in.csv: left out 1 points that the sensor missed (NaN).",
+    ]
+
+
+def test_classes_and_withheld_points_of_scans(run, tmp_path):
+    import laspy
+
+    las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    las.x, las.y, las.z = np.vstack([POINTS, 2.0 * POINTS]).T
+    las.classification = np.repeat([2, 5], len(POINTS))
+    las.withheld = np.arange(2 * len(POINTS)) == 0
+    las.write(str(tmp_path / "in.las"))
+    for options, count in (
+        (["--classes", "2"], len(POINTS) - 1),
+        (["--classes", "5"], len(POINTS)),
+        (["--classes", "2", "--withheld"], len(POINTS)),
+    ):
+        code, (line,) = run("analyze", tmp_path / "in.las", *options)
+        assert (code, line["points"]) == (0, count)
+        assert any("points of other classes" in notice for notice in line["notices"])
+    code, (line,) = run("analyze", tmp_path / "in.las", "--classes", "ground")
+    assert "no class of LAS" in line["error"]
 
 
 def test_stiffness_of_the_arrays(core, run, tmp_path):
@@ -236,7 +261,7 @@ def test_text_far_from_the_origin_keeps_its_precision(run, tmp_path):
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("1 2 nan\n" + "1 2 3\n" * 200, "1 of 201 points"),
+        ("1 2 nan\n" * 200, "all 200 are without a place"),
         ("1 2 3\n1 2 x\n", "columns of numbers"),
         ("\0\1\2 binary", "columns of numbers"),
     ],
@@ -247,6 +272,18 @@ def test_bad_text(run, tmp_path, text, error):
     code, lines = run("analyze", tmp_path / "in.txt")
     assert code == 1
     assert error in lines[0]["error"]
+
+
+def test_columns_of_text_that_are_given(extension, run, tmp_path):
+    write_text(" ", extra=1)(tmp_path / "a.xyz")
+    code, lines = run("analyze", tmp_path / "a.xyz", "--out", tmp_path / "b.ply", "--columns", "y x z heat")
+    assert (code, lines[0]["points"], lines[0]["notices"]) == (0, 1000, [])
+    table = importlib.import_module(f"{extension.__name__}.core.files").read_points(tmp_path / "b.ply")
+    assert_allclose(table.points, POINTS[:, [1, 0, 2]], atol=1e-6)
+    assert "heat" in table.attributes
+    code, lines = run("analyze", tmp_path / "a.xyz", "--columns", "x y z")
+    assert code == 1
+    assert "3 columns are named, but its first point has 4" in lines[0]["error"]
 
 
 def test_unreadable_files(run, tmp_path):

@@ -6,6 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_object, attribute, everything, grid_points, sphere_points
+from tests.blender.test_panel import draw
 
 NAMES = {"lb_deviation", "lb_compared"}
 
@@ -32,7 +33,7 @@ def test_samples_of_one_surface_have_no_distance(spheres):
     assert attribute(scan, "lb_compared").all()
     assert_allclose(attribute(scan, "lb_deviation"), 0.0, atol=1e-3)
     assert not NAMES & set(plan.data.attributes.keys())
-    assert {name for name, value in everything(plan).items() if value != before[name]} <= {"blocks"}
+    assert {name for name, value in everything(plan).items() if value != before[name]} <= {"blocks", "seen"}
 
 
 def test_objects_are_taken_where_they_stand(spheres):
@@ -104,3 +105,53 @@ def test_needs_one_other_cloud(spheres):
     assert "2 others are selected" in operator.obstacle(bpy.context)
     with pytest.raises(RuntimeError, match="poll"):
         bpy.ops.meshfree.compare()
+
+
+def test_the_reference_is_hidden_and_both_are_named(spheres):
+    plan, scan = spheres
+    bpy.ops.meshfree.compare()
+    assert (plan.hide_get(), plan.hide_render) == (True, True)
+    assert (scan.hide_get(), scan.hide_render) == (False, False)
+    drawn = draw()
+    assert "Scan compared with Plan, which is hidden" in drawn
+    (line,) = [text for text in drawn if text.startswith("Compare Points: ")]
+    assert {"Scan:", "Plan"} <= set(line.split())
+
+
+def test_the_reference_stays_where_that_is_wanted(spheres):
+    plan, _ = spheres
+    bpy.ops.meshfree.compare(hide_reference=False)
+    assert (plan.hide_get(), plan.hide_render) == (False, False)
+    assert "Scan compared with Plan" in draw()
+
+
+def test_it_can_be_compared_again_although_the_reference_is_hidden(spheres):
+    bpy.ops.meshfree.compare()
+    spheres[1].scale = 1.1, 1.1, 1.1
+    assert bpy.ops.meshfree.compare() == {"FINISHED"}
+    assert_allclose(attribute(spheres[1], "lb_deviation"), 0.1, atol=5e-3)
+
+
+def test_swap_compares_the_other_way_round_and_back(spheres):
+    plan, scan = spheres
+    scan.scale = 1.1, 1.1, 1.1
+    bpy.ops.meshfree.compare(greatest=0.3)
+    bpy.ops.meshfree.compare_swap(greatest=scan.meshfree.compared_within)
+    assert bpy.context.object == plan
+    assert bpy.context.selected_objects == [plan]
+    assert [(each.hide_get(), each.hide_render) for each in spheres] == [(False, False), (True, True)]
+    assert_allclose(attribute(plan, "lb_deviation"), -0.1, atol=5e-3)
+    assert plan.meshfree.compared_within == pytest.approx(0.3)
+    assert "Plan compared with Scan, which is hidden" in draw()
+    bpy.ops.meshfree.compare_swap()
+    assert bpy.context.object == scan
+    assert [each.hide_get() for each in spheres] == [True, False]
+
+
+def test_there_is_nothing_to_swap_before_a_comparison(spheres):
+    assert not bpy.ops.meshfree.compare_swap.poll()
+    bpy.ops.meshfree.compare()
+    assert bpy.ops.meshfree.compare_swap.poll()
+    bpy.data.objects.remove(spheres[0])
+    assert not bpy.ops.meshfree.compare_swap.poll()
+    assert "Swap" not in draw()

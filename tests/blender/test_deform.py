@@ -16,6 +16,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.blender.clouds import add_group, add_object, attribute, everything, grid_points, local_points
+from tests.blender.conftest import MODULE
 from tests.blender.test_panel import draw
 from tests.blender.test_smooth import key_points, shown_points
 
@@ -74,6 +75,11 @@ def move_points(obj, chosen, shift):
     obj.data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).reshape(-1))
     obj.data.update()
     bpy.context.view_layer.update()
+
+
+def curves_of(obj):
+    """Return the F-curves of an object."""
+    return importlib.import_module(f"{MODULE}.operators.objects.animation").curves(obj)
 
 
 def displacement(obj):
@@ -621,6 +627,57 @@ class TestTakingOver:
         assert_allclose(shown_points(strip), seen, atol=1e-6)
         lift(empty, 0.5)  # from there on
         assert_allclose(displacement(strip)[is_end(seen), 2], 0.5, atol=1e-4)
+
+    def test_apply_of_animated_handles_stays(self, strip, capfd):
+        empty = bind()
+        animate(empty)
+        empty["note"] = 1.0
+        empty.keyframe_insert('["note"]', frame=1)
+        bpy.context.scene.frame_set(3)
+        seen = shown_points(strip)
+        capfd.readouterr()
+        assert bpy.ops.meshfree.deform_apply() == {"FINISHED"}
+        assert 'keyframes that moved "Cloud Handle" were removed' in capfd.readouterr().out
+        for frame in (1, 2, 3, 4):
+            bpy.context.scene.frame_set(frame)
+            assert_allclose(shown_points(strip), seen, atol=1e-6)
+        assert [curve.data_path for curve in curves_of(empty)] == ['["note"]']  # which moves nothing
+
+    def test_apply_that_keeps_the_keyframes(self, strip):
+        empty = bind()
+        animate(empty)
+        bpy.context.scene.frame_set(3)
+        seen = shown_points(strip)
+        assert bpy.ops.meshfree.deform_apply(keep_keyframes=True) == {"FINISHED"}
+        assert_allclose(shown_points(strip), seen, atol=1e-6)
+        bpy.context.scene.frame_set(1)
+        assert_allclose(shown_points(strip)[is_end(seen), 2], 0.0, atol=1e-4)
+
+    def test_apply_leaves_an_action_that_others_use(self, strip):
+        empty = bind()
+        animate(empty)
+        empty["note"] = 1.0
+        empty.keyframe_insert('["note"]', frame=1)
+        action = empty.animation_data.action
+        other = bpy.data.objects.new("Other", None)
+        other.animation_data_create().action = action
+        if hasattr(action, "slots"):  # Blender 4.4 on
+            other.animation_data.action_slot = action.slots[0]
+        bpy.context.scene.frame_set(3)
+        bpy.ops.meshfree.deform_apply()
+        assert [curve.data_path for curve in curves_of(empty)] == ['["note"]']
+        assert len(curves_of(other)) == 4
+
+    def test_apply_of_animated_handles_is_undone_as_one_step(self, strip):
+        empty = bind()
+        animate(empty)
+        bpy.context.scene.frame_set(3)
+        bpy.ops.ed.undo_push(message="Animated")
+        name, before = empty.name, everything(strip)
+        bpy.ops.meshfree.deform_apply("EXEC_DEFAULT", True)
+        bpy.ops.ed.undo()
+        assert everything(bpy.data.objects["Cloud"]) == before
+        assert len(curves_of(bpy.data.objects[name])) == 3
 
     def test_apply_of_handles_moved_themselves(self, strip):
         ends = is_end(local_points(strip))

@@ -97,6 +97,7 @@ RUNS = [
     (shared, "analyze", {}),
     (colored, "show_surface", {}),
     (colored, "mesh_surface", {}),
+    (colored, "iso_lines_to_curves", {}),
     (compared, "compare", {}),
     (handled, "spectrum", {"count": 5}),
     (handled, "principal_curvatures", {}),

@@ -31,6 +31,45 @@ class TestHarmonicField:
         assert_allclose(attribute(strip, "lb_field"), expected, atol=0.08)
         assert shown(strip) == "lb_field"
 
+    def test_two_ends_in_two_clicks(self, strip):
+        x = local_points(strip)[:, 0]
+        for role, end in (("LOW", x < 0.45), ("HIGH", x > 5.45)):
+            strip.data.vertices.foreach_set("select", end)
+            bpy.ops.meshfree.group_from_selection(role=role, action="ADD")
+        bpy.ops.meshfree.harmonic_field(low=2.0, high=4.0)
+        assert_allclose(attribute(strip, "lb_field"), 2.0 + 2.0 * np.clip((x - 0.4) / 5.1, 0.0, 1.0), atol=0.04)
+
+    def test_two_ends_and_a_value_between(self, strip):
+        x = local_points(strip)[:, 0]
+        add_group(strip, "Low", x < 0.45)
+        add_group(strip, "High", x > 5.45)
+        add_group(strip, "Value", (x > 2.85) & (x < 3.05), weight=0.9)
+        bpy.ops.meshfree.harmonic_field()
+        field = attribute(strip, "lb_field")
+        assert_allclose(field[(x > 2.85) & (x < 3.05)], 0.9, atol=1e-6)
+        assert (field.min(), field.max()) == (0.0, 1.0)
+
+    def test_a_group_of_another_name_counts_alone(self, strip):
+        """As scripts of earlier versions mean it."""
+        x = local_points(strip)[:, 0]
+        add_group(strip, "Low", x > 5.45)
+        add_group(strip, "High", (x > 2.0) & (x < 3.0))
+        add_group(strip, "Mine", x < 0.45, weight=0.25)
+        strip.vertex_groups["Mine"].add(np.flatnonzero(x > 5.45).tolist(), 0.75, "REPLACE")
+        bpy.ops.meshfree.harmonic_field(group="Mine")
+        assert_allclose(attribute(strip, "lb_field"), 0.25 + 0.5 * np.clip((x - 0.4) / 5.1, 0.0, 1.0), atol=0.01)
+
+    def test_one_end_alone(self, strip):
+        add_group(strip, "High", range(50))
+        before = everything(strip)
+        with pytest.raises(RuntimeError, match='Only the vertex group "High".*Assign points to "Low", too'):
+            bpy.ops.meshfree.harmonic_field()
+        assert everything(strip) == before
+
+    def test_no_values_at_all(self, strip):
+        with pytest.raises(RuntimeError, match="no points with given values.*Assign to Low.*Assign to High"):
+            bpy.ops.meshfree.harmonic_field()
+
     def test_weights_as_values_zero_included(self, strip):
         x = local_points(strip)[:, 0]
         add_group(strip, "Value", x < 0.45, weight=0.0)

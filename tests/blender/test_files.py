@@ -1,6 +1,8 @@
 """Import and export of point files: coordinates of any size, attributes, colors, undo, errors, and the menus."""
 
 import importlib
+import types
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -66,6 +68,21 @@ def write_e57(path, points):
     path.write_bytes(e57_files.seal(e57_files.make_e57((fields, len(points), e57_files.pose((0, 1, 0, 0), low)))))
 
 
+def ptx_head(columns, rows, turn, place):
+    """Return the lines before the points of a scan, whose axes are the rows of `turn`."""
+    place = " ".join(f"{value:.0f}" for value in place)
+    axes = [" ".join(f"{value:g}" for value in axis) for axis in turn]
+    return [str(columns), str(rows), place, *axes, *(f"{axis} 0" for axis in axes), f"{place} 1"]
+
+
+def write_ptx(path, points):
+    """From a scanner whose axes are turned by a quarter, with as many rays that hit nothing."""
+    low = np.floor(points.min(axis=0))
+    turned = (points - low)[:, [1, 0, 2]] * (1.0, -1.0, 1.0)
+    rows = [f"{x:.3f} {y:.3f} {z:.3f} 0.25\n0 0 0 0.5" for x, y, z in turned]
+    path.write_text("\n".join([*ptx_head(len(points), 2, ((0, 1, 0), (-1, 0, 0), (0, 0, 1)), low), *rows]))
+
+
 WRITERS = {
     "a.ply": write_file,
     "a.obj": write_obj,
@@ -73,6 +90,7 @@ WRITERS = {
     "a.pts": lambda path, points: write_text(path, points, head=str(len(points))),
     "a.csv": lambda path, points: write_text(path, points, ",", "x,y,z"),
     "a.txt": lambda path, points: write_text(path, points, "\t"),
+    "a.ptx": write_ptx,
     "a.npy": np.save,
     "a.npz": lambda path, points: np.savez(path, points=points),
     "a.pcd": write_pcd,
@@ -182,6 +200,38 @@ class TestSeveralFiles:
         assert everywhere() == before
 
 
+class TestClassesAndWithheldPoints:
+    @pytest.fixture
+    def path(self, tmp_path):
+        """A scan of ground, trees and noise, of which every tenth point is withheld."""
+        import laspy
+
+        las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+        las.x, las.y, las.z = sphere_points().T
+        las.classification, las.withheld = np.arange(1000) % 3 + 5, np.arange(1000) % 10 == 0
+        las.write(str(tmp_path / "a.las"))
+        return tmp_path / "a.las"
+
+    def test_withheld_ones_are_left_out(self, path):
+        assert len(run_import(path).data.vertices) == 900
+
+    def test_or_kept_by_choice(self, path):
+        obj = run_import(path, withheld=True)
+        assert_array_equal(attribute(obj, "withheld"), np.arange(1000) % 10 == 0)
+
+    def test_classes_by_choice(self, path):
+        obj = run_import(path, classes="5, 7")
+        assert len(obj.data.vertices) < 900
+        assert set(attribute(obj, "classification")) == {5, 7}
+
+    def test_what_is_no_class_is_told(self, path):
+        with pytest.raises(RuntimeError, match="'ground' is no class of LAS"):
+            run_import(path, classes="ground")
+        with pytest.raises(RuntimeError, match="no points of the classes 2. Choose some of 5"):
+            run_import(path, classes="2")
+        assert not bpy.data.objects
+
+
 class TestColumns:
     def test_become_attributes(self, tmp_path):
         rows = np.column_stack([sphere_points(), np.arange(1000), np.tile([255, 0, 51], (1000, 1)), sphere_points()])
@@ -208,6 +258,49 @@ class TestColumns:
             table = read_file(tmp_path / "b.csv")
             assert set(table.attributes) == names
             assert table.colors is None
+
+    def test_by_the_names_that_are_given(self, tmp_path):
+        (tmp_path / "a.xyz").write_text("1 2 3 4 255 0 51 9\n" * 9)
+        obj = run_import(tmp_path / "a.xyz", columns="heat y x z r g b -")
+        assert local_points(obj)[0].tolist() == [3.0, 2.0, 4.0]
+        assert attribute(obj, "heat").tolist() == [1.0] * 9
+        assert obj.data.color_attributes.active_color.data[0].color_srgb[2] == pytest.approx(0.2, abs=1e-3)
+        again = run_import(tmp_path / "a.xyz", columns="z y x ...")
+        assert local_points(again)[0].tolist() == [3.0, 2.0, 1.0]
+        assert not again.data.color_attributes
+
+    @pytest.mark.parametrize(
+        ("name", "columns", "text"),
+        [
+            ("a.xyz", "x y z", "3 columns are named, but its first point has 4"),
+            ("a.xyz", "x y z r g", "5 columns are named, but its first point has 4"),
+            ("a.xyz", "x y heat -", "do not name z"),
+            ("a.xyz", "x y z X", "name x more than once"),
+            ("a.npy", "x y z", "names its columns itself. Give Columns only with .xyz"),
+        ],
+    )
+    def test_wrong_names_leave_nothing(self, tmp_path, name, columns, text):
+        (tmp_path / "a.xyz").write_text("1 2 3 4\n" * 9)
+        np.save(tmp_path / "a.npy", SURVEY)
+        before = everywhere()
+        with pytest.raises(RuntimeError, match=text):
+            bpy.ops.meshfree.import_points(filepath=str(tmp_path / name), columns=columns)
+        assert everywhere() == before
+
+    def test_are_asked_for_where_text_is_chosen(self, extension):
+        importing = importlib.import_module(f"{MODULE}.operators.files.importing")
+        asks = importing.MESHFREE_OT_import_points.asks.fget
+        chosen = types.SimpleNamespace(sequence=False)
+        for names, text in (
+            (["a.xyz"], 1),
+            (["b.CSV"], 1),
+            ([""], 1),
+            (["a.ply", "b.txt"], 1),
+            (["a.ply"], 0),
+            (["a.ptx"], 0),
+        ):
+            chosen._chosen = lambda names=names: [Path(name) for name in names]
+            assert ("columns" in asks(chosen)) == text
 
     def test_results_come_back_as_results(self, tmp_path):
         obj = add_object(sphere_points())
@@ -245,6 +338,24 @@ def test_up_axis(tmp_path):
     obj = run_import(tmp_path / "a.csv", up="Y")
     assert_allclose(local_points(obj)[0], [1.0, -3.0, 2.0])
     assert_allclose(attribute(obj, "normal")[0], [0.0, 0.0, 1.0])
+
+
+def selected_points(obj):
+    """Which points an object has selected, as the tools of the extension and Edit Mode take them."""
+    return importlib.import_module(f"{MODULE}.operators.tools.select").selection(obj)
+
+
+@pytest.mark.parametrize("kind", ["MESH", "POINTCLOUD"] if bpy.app.version >= (4, 5, 0) else ["MESH"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_an_import_selects_the_objects_and_none_of_their_points(tmp_path, name, kind):
+    WRITERS[name](tmp_path / name, SURVEY)
+    obj = run_import(tmp_path / name, kind=kind)
+    assert bpy.context.selected_objects == [obj]
+    assert not selected_points(obj).any()
+    if kind == "MESH":
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert obj.data.total_vert_sel == 0
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 @pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="Blender makes point clouds of meshes from 4.5 on")
@@ -312,7 +423,7 @@ def test_laser_scans_are_imported(extension, tmp_path, name):
         ("a.xyz", b"", "there are none"),
         ("a.csv", b"x,y,z\n", "there are none"),
         ("a.pts", b"5\n1 2 3\n", "announces 5 points, but 1 lines follow"),
-        ("a.obj", b"v 1 2 nan\n", "1 of 1 points"),
+        ("a.obj", b"v 1 2 nan\n", "all 1 are without a place"),
     ],
 )
 def test_broken_files_leave_nothing(tmp_path, name, data, text):
@@ -437,7 +548,21 @@ class TestMenus:
         ours = handlers.pop("MESHFREE_FH_points")
         assert ours.bl_import_operator == "meshfree.import_points"
         extensions = set(ours.bl_file_extensions.split(";"))
-        assert extensions == {".xyz", ".pts", ".csv", ".txt", ".npy", ".npz", ".pcd", ".las", ".laz", ".e57"}
+        assert extensions == {
+            ".xyz",
+            ".pts",
+            ".ptx",
+            ".csv",
+            ".txt",
+            ".npy",
+            ".npz",
+            ".pcd",
+            ".las",
+            ".laz",
+            ".e57",
+            ".splat",
+            ".spz",
+        }
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
 
@@ -490,15 +615,20 @@ class TestPlacesOfScanners:
         expected = (places - obj["lb_offset"])[:, [1, 0, 2]] * (-1.0, 1.0, 1.0) + (1000.0, 0.0, 0.0) + obj["lb_offset"]
         assert_allclose(read_file(tmp_path / "a.ply").attributes["scanner"], expected, rtol=0.0, atol=1e-3)
 
-    def test_normals_are_oriented_by_them(self, tmp_path):
+    @pytest.mark.parametrize("name", ["a.e57", "a.ptx"])
+    def test_normals_are_oriented_by_them(self, tmp_path, name):
         """Half of a plane is seen from above, the other half from below."""
         x, y = (values.ravel() for values in np.meshgrid(np.arange(40.0), np.arange(20.0)))
-        scans = []
+        scans, lines = [], []
         for side, place in ((0.0, (20.0, 10.0, 50.0)), (100.0, (120.0, 10.0, -50.0))):
-            points = np.stack([x + side, y, np.zeros(x.size)], axis=1)
-            scans.append((e57_files.points(points - place), x.size, e57_files.pose((1, 0, 0, 0), place)))
-        (tmp_path / "a.e57").write_bytes(e57_files.seal(e57_files.make_e57(*scans)))
-        obj = run_import(tmp_path / "a.e57")
+            points = np.stack([x + side, y, np.zeros(x.size)], axis=1) - place
+            scans.append((e57_files.points(points), x.size, e57_files.pose((1, 0, 0, 0), place)))
+            lines += [*ptx_head(x.size, 1, np.eye(3), place), *("{:g} {:g} {:g} 0".format(*point) for point in points)]
+        if name == "a.ptx":
+            (tmp_path / name).write_text("\n".join(lines))
+        else:
+            (tmp_path / name).write_bytes(e57_files.seal(e57_files.make_e57(*scans)))
+        obj = run_import(tmp_path / name)
         bpy.ops.meshfree.orient_normals(method="ATTRIBUTE", source="scanner", holds="POSITIONS")
         assert_allclose(attribute(obj, "lb_normal")[:, 2], np.repeat([1.0, -1.0], x.size), atol=1e-3)
 

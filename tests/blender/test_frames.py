@@ -88,6 +88,35 @@ def test_first_frame_and_step_can_be_changed(folder, modifiers):
     check_frames(obj, {9: 0, 10: 0, 12: 0, 13: 1, 15: 1, 16: 2, 40: 2})
 
 
+def test_frames_follow_the_numbers_of_files_by_choice(tmp_path):
+    for number, name in enumerate(("scan_1", "scan_2", "scan_5")):
+        np.save(tmp_path / f"{name}.npy", frame_points(number))
+    obj = run_import(tmp_path, ("scan_2.npy",), numbers=True)
+    check_frames(obj, {-3: 0, 1: 0, 2: 1, 3: 1, 4: 1, 5: 2, 6: 2, 90: 2})
+    other = run_import(tmp_path, ("scan_2.npy",))  # beside it, by the same nodes
+    check_frames(other, {1: 0, 2: 1, 3: 2})
+    check_frames(obj, {3: 1, 5: 2})
+
+
+def test_followed_numbers_move_with_the_first_frame_and_step(tmp_path, modifiers):
+    for number, name in enumerate(("a100b", "a101b", "a104b")):
+        np.save(tmp_path / f"{name}.npy", frame_points(number))
+    obj = run_import(tmp_path, ("a100b.npy",), numbers=True)
+    check_frames(obj, {99: 0, 100: 0, 101: 1, 103: 1, 104: 2})
+    modifiers.set_input(obj.modifiers["Mesh-Free Sequence"], "First Frame", 1)
+    modifiers.set_input(obj.modifiers["Mesh-Free Sequence"], "Frame Step", 2)
+    obj.update_tag()
+    check_frames(obj, {1: 0, 2: 0, 3: 1, 8: 1, 9: 2})
+
+
+def test_numbers_beyond_the_frames_of_blender_are_told(tmp_path):
+    for number in (1_694_000_000, 1_694_000_010):
+        np.save(tmp_path / f"scan_{number}.npy", frame_points(0))
+    with pytest.raises(RuntimeError, match="beyond Blender's last frame 1,048,574. Turn off Follow Numbers"):
+        run_import(tmp_path, ("scan_1694000000.npy",), numbers=True)
+    assert not bpy.data.objects
+
+
 def test_two_sequences_do_not_mix(folder):
     first = run_import(folder)
     second = run_import(folder, ("scan_11.npy", "scan_10.npy"))

@@ -5,6 +5,7 @@ Seeds go through all pairs of an operator and an object in turn, with other sett
 are pairs try all.
 """
 
+import importlib
 import itertools
 import os
 import tempfile
@@ -14,10 +15,12 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_group, add_object, everything, grid_points, sphere_points
+from tests.blender.conftest import MODULE
+from tests.blender.splats import add_splats, bar_splats
 
 CASES = int(os.environ.get("MESHFREE_CASES", "150"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))  # seed
-LEFT_OUT = {"escape", "add_preset", "apply_preset"}  # that lives in windows; these are about the user's own presets
+LEFT_OUT = {"add_preset", "apply_preset"}  # these are about the user's own presets
 
 
 def sphere():
@@ -229,6 +232,19 @@ def as_cloud(obj):
         bpy.ops.meshfree.convert()
 
 
+def of_splats(*names):
+    """Selected objects of splats, the last one active."""
+
+    def made():
+        objects = [add_splats(bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1), name) for name in names]
+        for obj in objects:
+            obj.select_set(True)
+        objects[0].rotation_euler.x = 0.4
+        return objects[-1]
+
+    return made
+
+
 OBJECTS = {
     "sphere": sphere,
     "film": film,
@@ -277,6 +293,8 @@ OBJECTS = {
     "infinite": odd_points(lambda points: np.where(points > 0.95, np.inf, points)),
     "huge": odd_points(lambda points: 1e30 * points),
     "tiny": odd_points(lambda points: 1e-20 * points),
+    "splats": of_splats("Splats"),
+    "splats beside others": of_splats("Splats", "Others"),
     "light": of_type(lambda: bpy.data.lights.new("Light", "POINT")),
     "armature": of_type(lambda: bpy.data.armatures.new("Armature")),
     "curve": of_type(lambda: bpy.data.curves.new("Curve", "CURVE")),

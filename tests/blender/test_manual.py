@@ -15,7 +15,21 @@ PAGES = sorted(DOCS.glob("operators/*.md"))
 ROW = re.compile(r"^\| \*(?P<label>.+?)\* \| `(?P<name>\w+)` \| (?P<default>.*?) \| (?P<meaning>.*) \|$", re.MULTILINE)
 UNITS = {"PERCENTAGE": " %", "DISTANCE": " m", "ANGLE": "°"}
 # Of the object's settings: what no panel draws, and results, which the page of the analysis tells.
-KEPT = {"name", "spacing", "spacing_of", "deform", "stages", "fingerprint", "metric", "settings_used"}
+KEPT = {
+    "name",
+    "notices",
+    "own_material",
+    "compared_with",
+    "compared_within",
+    "spacing",
+    "spacing_of",
+    "slopes_of",
+    "deform",
+    "stages",
+    "fingerprint",
+    "metric",
+    "settings_used",
+}
 RESULTS = {"total_area", "point_count", "subset_count", "component_count", "boundary_count", "left_out_count"}
 BINDING = {"name", "is_bound", "matrix", "handle_items", "binding_id", "point_count", "fingerprint"}
 BINDING |= {"groups_used", "settings_used"}
@@ -26,8 +40,7 @@ def read(path):
 
 
 def operators():
-    names = [name for name in dir(bpy.ops.meshfree) if name != "escape"]  # which nobody presses
-    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in names}
+    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in dir(bpy.ops.meshfree)}
 
 
 def sections(text):

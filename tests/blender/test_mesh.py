@@ -40,6 +40,7 @@ def test_sphere(obj):
     after = everything(obj)
     assert {name for name in after if after[name] != before[name]} == {"blocks", "seen"}  # a new object, and hidden
     assert obj.hide_get()
+    assert obj.hide_render
     assert bpy.context.object == made
     assert bpy.context.selected_objects == [made]
     assert not made.modifiers  # nothing was on show

@@ -12,7 +12,7 @@ from tests.blender.test_display import display_points
 from tests.blender.test_panel import draw
 
 POINT_CLOUDS = pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
-ROLES = ("Handle", "Anchor", "Fixed", "Source", "Value", "Boundary")
+ROLES = ("Handle", "Anchor", "Fixed", "Source", "Low", "High", "Value", "Boundary")
 
 
 @pytest.fixture
@@ -169,7 +169,7 @@ class TestGroupColors:
     @pytest.fixture
     def grouped(self, cloud):
         for number, role in enumerate(ROLES):
-            add_group(cloud, role, np.arange(100 * number, 100 * number + 50))
+            add_group(cloud, role, np.arange(75 * number, 75 * number + 50))
         return cloud
 
     def colors(self, module, obj):
@@ -191,7 +191,7 @@ class TestGroupColors:
         assert radii.max() == pytest.approx(1.1 * grouped.meshfree.spacing)
         colors = self.colors(module, grouped)
         assert set(colors) == set(ROLES)
-        assert len(set(colors.values())) == 6
+        assert len(set(colors.values())) == 8
         assert module("ui.display").shown_attribute(grouped) == ""
         grouped.meshfree.show_groups = False
         assert not grouped.modifiers
@@ -310,7 +310,7 @@ class TestGroupColors:
         grouped.meshfree.show_groups = shown
         texts = draw()
         assert "Assign to Handles" in texts
-        assert texts.count("50") == 6
+        assert texts.count("50") == 8
 
 
 class TestSeveral:
@@ -496,6 +496,7 @@ class TestConverting:
 
     def test_there_and_back(self, ready, module):
         display, result = module("ui.display"), module("operators.objects.result")
+        ready.meshfree.point_shape = "DOTS"
         material, values = display.find_material(ready), attribute(ready, "lb_eigenvector_002")
         eigenvalues, points = list(ready["lb_eigenvalues"]), local_points(ready)
         for target in ("POINTCLOUD", "MESH"):

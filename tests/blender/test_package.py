@@ -1,16 +1,21 @@
 """The zip: its content, its manifest, the bundled wheels, and that nothing stays behind when it is switched off."""
 
+import html
+import importlib
 import json
+import posixpath
 import re
 import subprocess
 import sys
 import tomllib
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import pytest
 
+import manual_pages
 import package
 
 
@@ -25,12 +30,63 @@ def manifest():
     return package.read_manifest()
 
 
+def manual():
+    """Names of the pages of the manual in the zip."""
+    pages = [path.relative_to(manual_pages.DOCS) for path in manual_pages.sources()]
+    return {f"manual/{page.with_suffix('.html').as_posix()}" for page in pages}
+
+
+def test_links_of_the_manual_lead_to_its_pages(packed):
+    assert len(manual()) > 30
+    text = {name: packed.read(name).decode() for name in manual()}
+    links = [(name, link) for name, page in text.items() for link in re.findall(r'href="([^"]+)"', page)]
+    assert len(links) > 100
+    for name, link in links:
+        if link.startswith("http"):
+            continue
+        place, _, part = link.partition("#")
+        target = posixpath.normpath(posixpath.join(posixpath.dirname(name), place)) if place else name
+        assert target in text, (name, link)
+        assert not part or f'id="{part}"' in text[target], (name, link)
+
+
+def test_the_manual_holds_all_words_of_its_pages(packed):
+    """Without their code, tables and pictures: nothing of the marks is left, and no paragraph."""
+    for path in manual_pages.sources():
+        name = f"manual/{path.relative_to(manual_pages.DOCS).with_suffix('.html').as_posix()}"
+        page = html.unescape(re.sub(r"<[^>]+>", "", packed.read(name).decode().partition("<body>")[2]))
+        text = path.read_text(encoding="utf-8")
+        text = re.sub(r"^```.*?^```$|^\|[-| ]+\|$|!\[[^]]*\]\([^)]*\)", "", text, flags=re.MULTILINE | re.DOTALL)
+        text = re.sub(r"\[([^]]+)\]\([^)]+\)", r"\1", text)
+        wanted = re.findall(r"\w{4,}", text)
+        assert [word for word in wanted if word not in page] == [], path.name
+        assert "](" not in page
+        assert "**" not in re.sub(r"<pre>.*?</pre>", "", page)
+
+
+def test_the_preferences_open_the_manual(extension):
+    opened = importlib.import_module(f"{extension.__name__}.ui.preferences").MANUAL
+    assert opened.is_file()
+    assert opened.name == manual_pages.START
+    texts = []
+    button = SimpleNamespace(url="")
+
+    def operator(idname, text, icon):
+        texts.append((idname, text))
+        return button
+
+    preferences = bpy.context.preferences.addons[extension.__name__].preferences
+    type(preferences).draw(SimpleNamespace(layout=SimpleNamespace(operator=operator)), bpy.context)
+    assert texts == [("wm.url_open", "Open the Manual")]
+    assert button.url == opened.as_uri()
+
+
 def test_zip_holds_the_package_of_this_tree_and_nothing_else(packed, manifest):
     sources = [package.ROOT / name for name in package.PACKAGE]
     files = [path for source in sources for path in ([source] if source.is_file() else source.rglob("*.py"))]
     wheels = {f"wheels/{name}" for name in package.wheel_names(package.this_platform())}
     names = {path.relative_to(package.ROOT).as_posix() for path in files}
-    assert sorted(packed.namelist()) == sorted(names | wheels)
+    assert sorted(packed.namelist()) == sorted(names | wheels | manual())
     for name in names - {"blender_manifest.toml"}:
         assert packed.read(name) == (package.ROOT / name).read_bytes(), f"{name} changed since the zip was built"
 

@@ -1,5 +1,8 @@
 """Selecting points and assigning them to groups, in Edit Mode and in Object Mode."""
 
+import importlib
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -107,6 +110,70 @@ def test_what_the_group_held_before(obj, action, count):
     assert (in_group(obj, "Source") == expected).all()
 
 
+def test_assigning_twice_by_the_panel_keeps_the_first_set(obj):
+    first = selected(obj)
+    press("VALUE")
+    choose(obj, lambda points: points[:, 2] < -0.95)
+    second = selected(obj)
+    press("VALUE")
+    assert (in_group(obj, "Value") == (first | second)).all()
+    press("VALUE", remove=True)
+    assert (in_group(obj, "Value") == first).all()
+
+
+def press(role, remove=False):
+    """Press the button of a role in the panel."""
+    entries = [settings for name, settings in draw_points() if name == "meshfree.group_from_selection"]
+    (entry,) = [item for item in entries if item["role"] == role and (item["action"] == "REMOVE") == remove]
+    assert bpy.ops.meshfree.group_from_selection(**entry) == {"FINISHED"}
+
+
+def draw_points():
+    """Draw the panel of points, and return its buttons with their settings."""
+    buttons = []
+
+    class Layout:
+        enabled = True
+
+        def operator(self, name, **_):
+            settings = SimpleNamespace()
+            buttons.append((name, vars(settings)))
+            return settings
+
+        def __getattr__(self, name):
+            return lambda *_, **__: self
+
+    panel = SimpleNamespace(layout=Layout())
+    bpy.types.MESHFREE_PT_points.draw(panel, bpy.context)
+    return buttons
+
+
+def test_what_a_group_held_is_not_gone_without_a_word(obj, capfd):
+    bpy.ops.meshfree.group_from_selection(role="VALUE")
+    choose(obj, lambda points: points[:, 2] < -0.98)
+    count = np.count_nonzero(selected(obj))
+    bpy.ops.meshfree.group_from_selection(role="VALUE")
+    assert f'Cloud: {count:,} points are in the group "Value", in place of ' in capfd.readouterr().out
+
+
+def test_a_point_has_one_of_the_given_values(obj):
+    chosen = selected(obj)
+    for role in ("VALUE", "LOW", "HIGH"):
+        bpy.ops.meshfree.group_from_selection(role=role, action="ADD")
+        for name in {group.name for group in obj.vertex_groups}:
+            assert (in_group(obj, name) == (chosen & (name == role.title()))).all()
+
+
+def test_the_number_in_the_panel_counts_all_members(extension, obj):
+    members = importlib.import_module(f"{extension.__name__}.operators.objects.counting").members
+    count = np.count_nonzero(selected(obj))
+    bpy.ops.meshfree.group_from_selection(role="VALUE", weight=0.0)
+    assert members(obj, "Value").count == members(obj, "Value", glance=True).count == count > 5
+    obj.data.vertices.foreach_set("select", np.zeros(1200, dtype=bool))
+    bpy.ops.meshfree.select_group(name="Value")
+    assert np.count_nonzero(selected(obj)) == count
+
+
 def test_nothing_selected(obj):
     obj.data.vertices.foreach_set("select", np.zeros(1200, dtype=bool))
     with pytest.raises(RuntimeError, match="No points.*are selected"):
@@ -118,6 +185,55 @@ def test_an_attribute_of_that_name(obj):
     obj.data.attributes.new("Handle", "FLOAT", "POINT")
     with pytest.raises(RuntimeError, match='attribute named "Handle".*share'):
         bpy.ops.meshfree.group_from_selection(role="HANDLE")
+
+
+class TestSelectPoint:
+    """What a click does: the point in front, though others behind it are nearer to the mouse."""
+
+    @pytest.fixture
+    def edited(self, obj):
+        obj.rotation_euler, obj.location = (0.3, 0.2, 0.1), (1.0, 2.0, 3.0)
+        obj.data.vertices.foreach_set("select", np.arange(1200) < 3)
+        bpy.context.view_layer.update()
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_mode(type="VERT")
+        yield obj
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    def chosen(self, obj):
+        obj.update_from_editmode()
+        return np.flatnonzero(selected(obj)).tolist()
+
+    def test_the_near_side(self, edited):
+        matrix = np.array(edited.matrix_world)
+        for x, y in np.random.default_rng(2).uniform(-0.6, 0.6, (20, 2)):
+            bpy.ops.meshfree.select_point(eye=(1.0 + x, 2.0 + y, 9.0), direction=(0.0, 0.0, -1.0))
+            (index,) = self.chosen(edited)
+            place = np.array(edited.data.vertices[index].co) @ matrix[:3, :3].T
+            assert place[2] > 0.4
+            assert np.hypot(place[0] - x, place[1] - y) < 0.15
+
+    def test_one_more_and_one_less(self, edited):
+        ray = {"eye": (1.0, 2.0, 9.0), "direction": (0.0, 0.0, -1.0)}
+        bpy.ops.meshfree.select_point(**ray, extend=True)
+        (new,) = set(self.chosen(edited)) - {0, 1, 2}
+        bpy.ops.meshfree.select_point(**ray, extend=True)
+        assert self.chosen(edited) == [0, 1, 2]
+        bpy.ops.meshfree.select_point(**ray)
+        assert self.chosen(edited) == [new]
+
+    def test_nothing_there(self, edited):
+        with pytest.raises(RuntimeError, match="No point is seen along the ray"):
+            bpy.ops.meshfree.select_point(eye=(20.0, 2.0, 9.0), direction=(0.0, 0.0, -1.0))
+        assert self.chosen(edited) == [0, 1, 2]
+
+    def test_hidden_points_are_seen_through(self, edited):
+        ray = {"eye": (1.0, 2.0, 9.0), "direction": (0.0, 0.0, -1.0)}
+        bpy.ops.meshfree.select_point(**ray)
+        (front,) = self.chosen(edited)
+        bpy.ops.mesh.hide()
+        bpy.ops.meshfree.select_point(**ray)
+        assert self.chosen(edited) not in ([front], [])
 
 
 def test_hidden_points_are_never_selected(obj, mode):

@@ -30,6 +30,15 @@ def off_sphere(points):
     return np.sqrt(np.mean((np.linalg.norm(points, axis=1) - 1.0) ** 2))
 
 
+def test_the_new_shape_key_is_the_active_one():
+    obj = add_object(rough_sphere())
+    for name in ("Smooth", "Smooth.001"):
+        bpy.ops.meshfree.smooth()
+        assert obj.active_shape_key.name == name
+    bpy.ops.meshfree.mode_shape()
+    assert obj.active_shape_key.name == "Mode 2"
+
+
 @pytest.mark.parametrize("target", ["SHAPE_KEY", "IN_PLACE"])
 def test_smoothing_is_that_of_core(core, target):
     obj = add_object(rough_sphere())

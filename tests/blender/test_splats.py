@@ -287,6 +287,15 @@ class TestDisplay:
         spread = np.einsum("nka,nkb->nab", offsets, offsets) / 12  # that of a ball of radius 2 is 4 / 3
         np.testing.assert_allclose(spread, 4.0 / 3.0 * rest.covariances, atol=1e-5)
 
+    def test_corners_hold_only_what_shows(self, core, rest, tmp_path):
+        bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)))
+        evaluated = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        geometry = evaluated.evaluated_geometry() if hasattr(evaluated, "evaluated_geometry") else None
+        drawn = geometry.mesh if geometry else evaluated.data
+        names = {layer.name for layer in drawn.attributes if layer.domain == "POINT"}
+        assert {"position", "radiance:base"} <= names
+        assert not [name for name in names if name.startswith(("ply_", ".splat_", "radiance:sh_"))]
+
     def test_results_and_splats_are_shown_in_turn(self, core, rest, tmp_path):
         bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)))
         obj = bpy.context.object

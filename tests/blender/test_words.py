@@ -8,10 +8,10 @@ import pytest
 # Words that stay small within a label, and names that are not written as others are.
 SMALL = {"a", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "the", "to", "with"}
 # These change nothing in the scene.
-NO_UNDO = {"export_eigenvalues", "export_operator", "export_points", "export_splats", "stop", "escape"}
-UNLOGGED = {"stop", "escape"}  # nothing to repeat
-# A button beside its menu, as with all presets of Blender; and what hears Esc.
-HIDDEN = {"add_preset", "escape"}
+NO_UNDO = {"export_eigenvalues", "export_operator", "export_points", "export_splats", "stop"}
+UNLOGGED = {"stop"}  # nothing to repeat
+# A button beside its menu, as with all presets of Blender.
+HIDDEN = {"add_preset"}
 # Numbers that may have any sign and size: values given by the user, the matrix of an object and its eigenvalues.
 ANY_SIZE = re.compile(r"\.(low|high|range_low|range_high|metric|matrix|rest)$")
 # Lengths, areas and angles by their name, which Blender shows with a unit.

@@ -14,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from core import PointCloudError
-from core.files import read_points, write_points
+from core.files import LasChoices, parse_classes, read_points, write_points
 
 ROOT = Path(__file__).parents[2]
 COUNT = 500
@@ -244,3 +244,116 @@ def test_a_small_file_of_many_equal_points(tmp_path):
     las.write(str(tmp_path / "a.laz"))
     assert (tmp_path / "a.laz").stat().st_size < 60_000
     assert len(read_points(tmp_path / "a.laz").points) == 200_000
+
+
+def write_flagged(path, point_format=6, withheld=(False, True, False, False, True), classes=(2, 2, 5, 7, 18)):
+    """Write points at the heights 0, 1, ..., with flags and classes."""
+    las = laspy.LasData(laspy.LasHeader(point_format=point_format, version="1.4" if point_format >= 6 else "1.2"))
+    las.x = las.y = las.z = np.arange(float(len(classes)))
+    las.classification, las.withheld = np.array(classes), np.array(withheld)
+    las.synthetic = las.key_point = np.ones(len(classes), bool)  # which say nothing against a point
+    las.write(str(path))
+
+
+class TestWhatIsChosen:
+    @pytest.mark.parametrize("point_format", [0, 3, 6, 7])
+    @pytest.mark.parametrize("name", ["a.las", "a.laz"])
+    def test_withheld_points_are_left_out(self, tmp_path, name, point_format):
+        write_flagged(tmp_path / name, point_format)
+        table = read_points(tmp_path / name)
+        assert table.points[:, 2].tolist() == [0.0, 2.0, 3.0]
+        assert table.attributes["classification"].tolist() == [2, 5, 7]
+        assert len(table.notices) == 1
+        assert "left out 2 withheld points" in table.notices[0]
+
+    def test_or_kept_with_their_flag(self, tmp_path):
+        write_flagged(tmp_path / "a.las")
+        table = read_points(tmp_path / "a.las", las=LasChoices(withheld=True))
+        assert table.points[:, 2].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+        assert table.attributes["withheld"].tolist() == [0, 1, 0, 0, 1]
+        assert "2 points are withheld" in table.notices[0]
+
+    def test_without_any_nothing_is_told(self, tmp_path):
+        write_flagged(tmp_path / "a.las", withheld=np.zeros(5, bool))
+        table = read_points(tmp_path / "a.las")
+        assert ("withheld" in table.attributes, table.notices) == (False, [])
+
+    def test_classes(self, tmp_path):
+        write_flagged(tmp_path / "a.las")
+        table = read_points(tmp_path / "a.las", las=LasChoices(parse_classes("2, 5")))
+        assert table.points[:, 2].tolist() == [0.0, 2.0]
+        assert "left out 1 points of other classes" in table.notices[1]
+
+    def test_classes_in_many_blocks(self, tmp_path):
+        count = 2**17 + 10
+        classes = np.arange(count) % 7
+        write_flagged(tmp_path / "a.las", 7, np.arange(count) % 10 == 0, classes)
+        table = read_points(tmp_path / "a.las", las=LasChoices(parse_classes("3-4")))
+        kept = np.flatnonzero(np.isin(classes, [3, 4]) & (np.arange(count) % 10 > 0))
+        assert_array_equal(table.points[:, 0], kept)
+        assert_array_equal(table.attributes["classification"], classes[kept])
+
+    def test_colors_go_with_their_points(self, tmp_path):
+        las = laspy.LasData(laspy.LasHeader(point_format=2, version="1.2"))
+        las.x = las.y = las.z = np.arange(3.0)
+        las.red, las.withheld = np.array([65535, 256, 0]), np.array([False, True, False])
+        las.write(str(tmp_path / "a.las"))
+        assert read_points(tmp_path / "a.las").colors[:, 0].tolist() == [1.0, 0.0]
+
+    def test_when_nothing_is_left_it_says_what_there_is(self, tmp_path):
+        write_flagged(tmp_path / "a.las")
+        with pytest.raises(PointCloudError, match="no points of the classes 9. Choose some of 2 .1 points., 5"):
+            read_points(tmp_path / "a.las", las=LasChoices(parse_classes("9")))
+        write_flagged(tmp_path / "a.las", withheld=np.ones(5, bool))
+        with pytest.raises(PointCloudError, match="no points but 5 withheld points"):
+            read_points(tmp_path / "a.las")
+
+    @pytest.mark.parametrize(
+        ("text", "classes"), [("", []), (" ", []), ("2 5", [2, 5]), ("2,5; 9", [2, 5, 9]), ("3-5 2", [2, 3, 4, 5])]
+    )
+    def test_classes_are_given_as_text(self, text, classes):
+        assert sorted(parse_classes(text)) == classes
+
+    @pytest.mark.parametrize("text", ["ground", "256", "5-3", "-1", "2.5", "\u0662"])
+    def test_what_is_no_class_is_told(self, text):
+        with pytest.raises(PointCloudError, match="is no class of LAS"):
+            parse_classes(text)
+
+
+class TestDegrees:
+    PLACES = np.array([[-94.683, 31.037, 39.0], [-94.66, 31.04, 78.0], [-94.67, 31.047, 50.0]])
+
+    def write(self, path, details, places):
+        header = laspy.LasHeader(point_format=6, version="1.4")
+        header.offsets, header.scales = places[0], np.full(3, 1e-6)
+        header.vlrs.extend(details)
+        las = laspy.LasData(header)
+        las.x, las.y, las.z = places.T
+        las.write(str(path))
+
+    def words(self, text):
+        return laspy.vlrs.known.WktCoordinateSystemVlr(text)
+
+    def keys(self, model):
+        detail = laspy.vlrs.known.GeoKeyDirectoryVlr()
+        detail.parse_record_data(struct.pack("<8H", 1, 1, 0, 1, 1024, 0, 1, model))
+        return detail
+
+    def test_are_told_by_the_file(self, tmp_path):
+        wide = self.PLACES * (1.0, 1.0, 0.0)  # nobody could tell by the numbers
+        for detail, degrees in (
+            (self.words('GEOGCS["WGS 84"]'), True),
+            (self.words('COMPD_CS["a", PROJCS["b", GEOGCS["WGS 84"]]]'), False),
+            (self.words('GEOGCRS["WGS 84"]'), True),
+            (self.keys(2), True),
+            (self.keys(1), False),
+        ):
+            self.write(tmp_path / "a.las", [detail], wide)
+            table = read_points(tmp_path / "a.las")
+            assert table.degrees == degrees
+            assert sum("are degrees" in notice for notice in table.notices) == degrees
+
+    def test_are_not_what_is_beyond_them(self, tmp_path):
+        self.write(tmp_path / "a.las", [self.keys(2)], 10.0 * self.PLACES)
+        table = read_points(tmp_path / "a.las")
+        assert (table.degrees, table.notices) == (False, [])

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from core import PointCloudError
 from core.files import PointTable, read_points, write_mesh
+from core.files.polygons import triangles
 
 FAR = np.array([446_000.0, 4_000_000.0, 120.0])
 # A cube whose top is one square, whose sides are squares, and whose bottom is two triangles.
@@ -39,13 +40,48 @@ def faces_of_ply(path):
 
 
 def test_ply(tmp_path):
-    write_mesh(tmp_path / "a.ply", cube(CORNERS + FAR), [SQUARES, TRIANGLES])
+    assert write_mesh(tmp_path / "a.ply", cube(CORNERS + FAR), [SQUARES]) == []
     table = read_points(tmp_path / "a.ply")
     assert_array_equal(table.points, CORNERS + FAR)
     assert_array_equal(table.attributes["height"], CORNERS[:, 2])
     assert_allclose(table.colors, cube().colors)
-    assert table.notices == ["a.ply: left out 7 face elements. Only points are read."]
-    assert faces_of_ply(tmp_path / "a.ply") == [*SQUARES.tolist(), *TRIANGLES.tolist()]
+    assert table.notices == ["a.ply: left out 5 face elements. Only points are read."]
+    assert faces_of_ply(tmp_path / "a.ply") == SQUARES.tolist()
+
+
+def records_of_ply(path):
+    """Read the lists after the vertices all at once, as long as the first of them: how trimesh reads binary files."""
+    head, data = path.read_bytes().split(b"end_header\n", 1)
+    sizes = {"float": 4, "double": 8, "uchar": 1}
+    lines = [line.split() for line in head.decode("ascii").splitlines()]
+    [[_, _, vertices], [_, _, faces]] = [line for line in lines if line[0] == "element"]
+    row = sum(sizes[line[1]] for line in lines if line[0] == "property" and line[1] != "list")
+    lists = data[int(vertices) * row :]
+    rows = np.frombuffer(lists, [("count", "u1"), ("corners", "<i4", lists[0])])
+    assert len(rows) == int(faces)
+    assert (rows["count"] == lists[0]).all()
+    return rows["corners"]
+
+
+def test_a_ply_of_quads_and_triangles_has_lists_of_one_length(tmp_path):
+    """Its triangles are the cube: their volume by the divergence theorem."""
+    notices = write_mesh(tmp_path / "a.ply", cube(), [SQUARES, np.zeros((0, 5), int), TRIANGLES])
+    assert "divided into triangles" in notices[0]
+    faces = records_of_ply(tmp_path / "a.ply")
+    assert faces.shape == (12, 3)
+    assert np.linalg.det(CORNERS[faces]).sum() / 6.0 == pytest.approx(1.0)
+    write_mesh(tmp_path / "b.ply", cube(), [SQUARES])
+    assert records_of_ply(tmp_path / "b.ply").tolist() == SQUARES.tolist()
+
+
+def test_quads_are_divided_along_their_shorter_diagonal(tmp_path):
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.0], [3.0, 0.0, 0.0], [1.0, -0.2, 0.0]])
+    for turn in range(4):
+        quads = np.roll([[0, 1, 2, 3]], turn, axis=1)
+        found = triangles(quads, points)
+        assert all({1, 3} <= set(face) for face in found.tolist())
+        areas = np.cross(points[found[:, 1]] - points[found[:, 0]], points[found[:, 2]] - points[found[:, 0]])[:, 2]
+        assert areas.max() < 0.0  # both as the quad is turned
 
 
 def test_obj(tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import core
 from benchmarks.samplings import (
@@ -18,7 +19,7 @@ from benchmarks.samplings import (
 )
 from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
-from core.geometry.noise import noise_level, project_points
+from core.geometry.noise import near_misfit, noise_level, project_points
 from core.geometry.sheets import fit_sheets
 from core.options import LaplacianOptions
 
@@ -43,8 +44,14 @@ CLEAN = {
 
 def measured(points):
     """The mean noise as the operator measures it."""
-    surface, nearest = fit_sheets(find_nearest(points))
-    return noise_level(nearest, surface.misfit).mean()
+    fitted = fit_sheets(find_nearest(points))
+    near = near_misfit(fitted.nearest)
+    return noise_level(fitted.nearest, near, fitted.mixed.misfit, fitted.quadrics.misfit).mean()
+
+
+def projected(points, method, noise):
+    """All of some points, projected."""
+    return project_points(cKDTree(points), np.arange(len(points)), method, noise)
 
 
 def off_sphere(points):
@@ -89,13 +96,13 @@ class TestLevel:
 
 class TestProjection:
     def test_quadrics_bring_the_points_back(self, noisy):
-        once = project_points(noisy, "quadric", LEVEL)
+        once = projected(noisy, "quadric", LEVEL)
         assert off_sphere(once) < 0.35 * off_sphere(noisy)
-        assert off_sphere(project_points(once, "quadric", LEVEL)) < 0.9 * off_sphere(once)
+        assert off_sphere(projected(once, "quadric", LEVEL)) < 0.9 * off_sphere(once)
 
     def test_planes_too_but_they_cut_the_bend(self):
         noisy = 3.0 * noisy_sphere(COUNT, 0.5)
-        flat = project_points(noisy, "plane", LEVEL) / 3.0
+        flat = projected(noisy, "plane", LEVEL) / 3.0
         assert off_sphere(flat) < 0.7 * off_sphere(noisy / 3.0)
         radius = np.linalg.norm(flat, axis=1)
         assert radius.mean() < 1.0 - 3e-3
@@ -103,14 +110,19 @@ class TestProjection:
     @pytest.mark.parametrize("method", ["quadric", "plane"])
     def test_points_of_a_plane_stay_where_they_are(self, method):
         points = square_random(800)
-        np.testing.assert_allclose(project_points(points, method, np.full(800, 0.1)), points, atol=1e-9)
+        np.testing.assert_allclose(projected(points, method, np.full(800, 0.1)), points, atol=1e-9)
 
     def test_a_quadric_hardly_moves_clean_points(self):
         points = torus_points(3000)
         spacing = np.sqrt(4.0 * np.pi**2 * 0.4 / 3000)
-        assert (
-            np.linalg.norm(project_points(points, "quadric", np.full(3000, 0.3)) - points, axis=1).max() < 0.1 * spacing
-        )
+        moved = projected(points, "quadric", np.full(3000, 0.3)) - points
+        assert np.linalg.norm(moved, axis=1).max() < 0.1 * spacing
+
+    @pytest.mark.parametrize("method", ["quadric", "plane"])
+    def test_some_points_go_where_they_go_with_all(self, noisy, method):
+        rows, level = np.arange(5, COUNT, 7), np.linspace(0.0, 0.6, COUNT)
+        some = project_points(cKDTree(noisy), rows, method, level)
+        np.testing.assert_allclose(some, projected(noisy, method, level)[rows], atol=1e-12)
 
 
 class TestOperator:

@@ -203,7 +203,7 @@ def claim(packed, length, data=b""):
         (make_pcd("ascii", xyz())[:-400], "point 29.: . numbers where|ends after"),
         (make_pcd("binary", xyz())[:-1], "ends after 299 of the 300 points"),
         (make_pcd("binary", xyz(points=np.full((9, 3), np.nan))), "has no points"),
-        (make_pcd("binary", xyz(points=np.full((9, 3), np.inf))), "not finite"),
+        (make_pcd("binary", xyz(points=np.full((9, 3), np.inf))), "all 9 are without a place .NaN or inf"),
     ],
 )
 def test_broken_files(tmp_path, data, text):

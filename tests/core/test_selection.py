@@ -130,3 +130,32 @@ class TestOppositeEnds:
         for rows, direction in zip((one, other), directions, strict=True):
             angle = np.arccos(np.clip(sphere.points[rows] @ direction, -1.0, 1.0))
             assert angle.max() < np.arccos(1.0 - 2.0 * share) + 0.15  # the area of a cap, 2 pi (1 - cos angle)
+
+
+class TestFrontPoint:
+    """The point that one sees, and not one behind it."""
+
+    RAYS = np.random.default_rng(3).uniform(-0.65, 0.65, (200, 2))
+
+    def picked(self, points, reach):
+        return [core.front_point(points, [x, y, 5.0], [0.0, 0.0, -1.0], reach) for x, y in self.RAYS]
+
+    def test_on_the_near_side_of_a_sphere(self):
+        points = random_sphere(3000)
+        picked = points[self.picked(points, 2.0 * np.sqrt(4.0 * np.pi / 3000))]
+        assert (picked[:, 2] > 0.3).all()
+        assert np.linalg.norm(picked[:, :2] - self.RAYS, axis=1).mean() < 0.04
+
+    def test_of_a_surface_that_is_seen_at_a_slant_the_point_under_the_ray(self):
+        flat = np.column_stack([np.mgrid[-1:1:60j, -1:1:60j].reshape(2, -1).T, np.zeros(3600)])
+        slant = flat * [1.0, 1.0, 0.0] + 1.5 * flat[:, :1] * [0.0, 0.0, 1.0]
+        for index in (1000, 1830, 2500):
+            assert core.front_point(slant, slant[index] + [0.0, 0.0, 5.0], [0.0, 0.0, -2.0], 0.1) == index
+
+    def test_a_direction_of_no_length(self):
+        with pytest.raises(core.PointCloudError, match="has no length"):
+            core.front_point([[0.0, 0.0, 1.0]], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
+
+    def test_nothing_behind_the_eye_far_from_the_ray_or_without_a_place(self):
+        points = np.array([[0.0, 0.0, 9.0], [3.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0]])
+        assert core.front_point(points, [0.0, 0.0, 5.0], [0.0, 0.0, -1.0], 0.5) == -1

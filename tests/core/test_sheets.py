@@ -8,6 +8,7 @@ import core
 from benchmarks.samplings import (
     closed_plate,
     grid_points,
+    noisy_sphere,
     parallel_sheets,
     random_sphere,
     sausage,
@@ -60,7 +61,7 @@ class TestFitSheets:
     def parallel(cls):
         points, sheet, _ = parallel_sheets(30)
         nearest = find_nearest(points)
-        surface, kept = fit_sheets(nearest)
+        surface, kept = fit_sheets(nearest)[:2]
         return nearest, surface, kept, sheet
 
     def test_no_neighbor_across_is_kept_and_all_others_are(self, parallel):
@@ -82,10 +83,24 @@ class TestFitSheets:
         sheet = np.repeat([0, 1], 900)
         points = np.column_stack([30.0 * rng.random((1800, 2)), 1.5 * sheet])
         nearest = find_nearest(points)
-        surface, kept = fit_sheets(nearest)
+        surface, kept = fit_sheets(nearest)[:2]
         across = (sheet[nearest.index] != sheet[:, None]) & (nearest.weight > 0.0)
         assert np.count_nonzero(kept.weight[across]) < 0.05 * np.count_nonzero(across)
         assert np.mean(np.abs(surface.normals[:, 2]) > 0.99) > 0.95
+
+    @pytest.mark.parametrize("share", [0.0, 0.02, 1.0])
+    def test_where_some_points_moved_it_is_the_same_as_anew(self, share):
+        points = np.concatenate([noisy_sphere(1500, 0.3), noisy_sphere(1500, 0.3) * 1.04])
+        rng = np.random.default_rng(1)
+        moved = points + 0.01 * rng.normal(size=points.shape) * (rng.random((len(points), 1)) < share)
+        anew = fit_sheets(find_nearest(moved))
+        again = fit_sheets(find_nearest(moved), fit_sheets(find_nearest(points)))
+        assert np.any(anew.nearest.weight != find_nearest(moved).weight)
+        np.testing.assert_array_equal(again.nearest.weight, anew.nearest.weight)
+        for name in ("normals", "height", "misfit"):
+            for which in ("quadrics", "mixed"):
+                found, wanted = (getattr(getattr(sheets, which), name) for sheets in (again, anew))
+                np.testing.assert_allclose(found, wanted, atol=1e-12, err_msg=name)
 
     @pytest.mark.parametrize("points", [random_sphere(2000), torus_points(2000)], ids=["sphere", "torus"])
     def test_a_single_sheet_keeps_all(self, points):
@@ -179,7 +194,7 @@ class TestOrientation:
 class TestLabels:
     def test_parallel_sheets_are_two(self):
         points, sheet, _ = parallel_sheets(30)
-        surface, nearest = fit_sheets(find_nearest(points))
+        surface, nearest = fit_sheets(find_nearest(points))[:2]
         label = label_sheets(nearest, surface.normals, np.zeros(len(points), dtype=int))
         assert len(np.unique(label)) == 2
         assert len({(a, b) for a, b in zip(label.tolist(), sheet.tolist(), strict=True)}) == 2

@@ -114,6 +114,8 @@ def make_e57(count=30):
     return e57_files.make_e57((fields, count, pose), (other, 30, pose), sizes=(300, 41))
 
 
+PTX_HEAD = b"1\n30\n5 6 7\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n5 6 7 1\n"
+
 GOOD = {
     "ascii.ply": make_ply("ascii"),
     "little.ply": make_ply("little"),
@@ -124,6 +126,7 @@ GOOD = {
     "semicolon.csv": b"x;y;z\n" + make_rows("{};{};{}").replace(".", ",").encode(),
     "tab.txt": make_rows("{}\t{}\t{}", " // tree").encode(),
     "scan.pts": 2 * (b"30\n" + make_rows("{} {} {}", " -99 255 0 0").encode()),
+    "scan.ptx": 2 * (PTX_HEAD + make_rows("{} {} {}", " 0.25 255 0 0").encode()),
     "thing.obj": b"o Thing\n" + make_rows("v {} {} {}", " 1 0 0").encode() + b"f 1 2 3\nf 4//2 5//2 6//2\n",
     "array.npy": make_array(),
     "plain.npz": make_archive(make_array(), zipfile.ZIP_STORED),
@@ -279,13 +282,29 @@ HUGE = 2 * ("element camera 999999999999999\n" + 400 * "property double a\n")
         ("a.ply", ply_head("ascii", 1) + b"1 2 " + b"9" * 300 + b"x\n", "'9{100}...'. Correct"),
         ("a.ply", ply_head("ascii", 1) + b"1 " * 100_000, "line of 100,000 characters or more, which is no point. Exp"),
         ("a.ply", ply_head("ascii", 1) + b"1 2 1e300\n", "1 of 1 points .* beyond 1e.30, the first of them is point 1"),
-        ("a.ply", ply_head(LITTLE, 1, "float") + b"\x01\x00\xa0\x7f" * 3, "1 of 1 points .* not finite"),
+        (
+            "a.ply",
+            ply_head(LITTLE, 1, "float") + b"\x01\x00\xa0\x7f" * 3,
+            "all 1 are without a place .NaN.. Export it again",
+        ),
         ("a.xyz", b"1 2 3\n1_0 2 3\n", "line 2 has '1_0' where a number"),
         ("a.xyz", "1 2 3\n٣ 2 3\n".encode(), "line 2 has '٣' where a number"),
         ("a.xyz", b"1 2 3\n4\0 5 6\n", "line 2 has '4.x00' where a number"),
         ("a.xyz", b"1 2 3\n4 5 6//c 7\n8 9", "line 3 has 2 columns only"),
         ("a.xyz", b"1 2 3\n4 5 1e300\n", "1 of 2 points .* beyond 1e.30, the first of them is point 2"),
-        ("a.csv", "x,y,z\n1,2,3\n".encode("utf-16"), "there are none"),
+        ("a.csv", "x,y,z\n1,2,3\n".encode("utf-16-le"), "there are none"),
+        ("a.ptx", b"1 2 3\n", "is no PTX file"),
+        ("a.ptx", PTX_HEAD.replace(b"30", b"3") + b"1 2 3 0\n1 2 3 0", "announces 3 points in scan 1, but 2 follow"),
+        ("a.ptx", PTX_HEAD.replace(b"30", b"999999999") + b"1 2 3 0\n", "announces 999999999 points in scan 1, but 1"),
+        (
+            "a.ptx",
+            PTX_HEAD.replace(b"30", b"1") + b"1 2 3 0\n4 5 6 0\n",
+            "line 12: '4 5 6 0' begins no scan: scan 1 has",
+        ),
+        ("a.ptx", PTX_HEAD.replace(b"30", b"2") + b"1 2 3 0\n4 x 6 0\n", "scan 1, near line 12: could not convert"),
+        ("a.ptx", PTX_HEAD.replace(b"30", b"2") + b"1 2 3 0\n4 5 6\n", "scan 1, near line 12: the number of columns"),
+        ("a.ptx", PTX_HEAD.replace(b"30", b"1") + b"1 2\n", "has 2 numbers a point in scan 1"),
+        ("a.ptx", PTX_HEAD.replace(b"30", b"1") + b"0 0 0 0\n", "has no points"),
         ("a.xyz", b"1 " * 10_000_000, "line of 100,000 characters or more"),
         ("a.csv", b"1 2 3\n" + b"1," * 100_000, "line of 100,000 characters or more"),
         ("a.txt", b"\n" * 200_000, "there are none"),
@@ -343,6 +362,7 @@ LARGE = {
     "lines.xyz": lambda: b"1 2 3\n" + 500_000 * b"1\n",
     "empty.xyz": lambda: b"1 2 3\n" + 300_000 * b"\n" + b"1 2 x",
     "last.pts": lambda: b"30001\n" + 30_000 * ROWS,
+    "last.ptx": lambda: PTX_HEAD.replace(b"30", b"30001") + 30_000 * ROWS,
     "last.obj": lambda: 30_000 * (b"v " + ROWS) + b"v 1 2 x\n",
     **{f"noise{suffix}": lambda: NOISE for suffix in READABLE},
     "claim.pcd": lambda: make_pcd("binary").replace(b"POINTS 30", b"POINTS 99999999999") + NOISE,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ui.value_range import fit_range, histogram
+from ui.value_range import all_zero, fit_range, histogram
 
 CONTINUOUS = ("VIRIDIS", "MAGMA", "COOL_WARM", "CYCLIC")
 VALUES = np.append(np.linspace(-1.0, 3.0, 401), 1000.0)
@@ -86,6 +86,28 @@ def test_automatic_maps(values, name):
 def test_range_of_special_values(values, low, high):
     coverage = 100.0 if np.isnan(values.astype(float)).any() else 98.0
     assert fit_range(values, coverage=coverage)[1:] == pytest.approx((low, high))
+
+
+def test_ranges_of_distances_begin_at_zero():
+    values = np.append(np.linspace(0.5, 8.0, 99), 100.0)
+    assert fit_range(values, coverage=98.0, from_zero=True)[1:] == (0.0, fit_range(values, coverage=98.0)[2])
+    assert fit_range(values, mode="DATA", from_zero=True)[1] == 0.5  # by choice
+    assert fit_range(-values, coverage=98.0, from_zero=True)[1:] == fit_range(-values, coverage=98.0)[1:]
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        (np.zeros(5), True),
+        (np.array([0.0, 1e-30]), False),
+        (np.empty(0), False),
+        (np.zeros(5, np.int32), False),
+        (np.zeros(5, bool), False),
+        (np.array([0.0, np.nan]), False),
+    ],
+)
+def test_nothing_but_zeros_is_no_range(values, expected):
+    assert all_zero(values) == expected
 
 
 def test_histogram_counts_every_value_near_the_range():

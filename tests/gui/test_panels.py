@@ -12,6 +12,10 @@ import os
 folders = bpy.utils.preset_paths("meshfree_laplacian")
 sorted(name for folder in folders for name in os.listdir(folder) if name.endswith(".py"))
 """
+COLORED = """
+shading = view3d()[0].spaces.active.shading
+shading.type, shading.color_type = "SOLID", "VERTEX"  # quick to draw, and as good as colored for the legend
+"""
 INFO_LOG = """
 area = next(area for area in main_window().screen.areas if area.type == "PROPERTIES")
 area.type = "INFO"
@@ -107,7 +111,7 @@ class TestView:
         gui.python("bpy.context.view_layer.objects.active = bpy.data.objects['Cloud']")
         gui.python("bpy.ops.meshfree.spectrum(count=5)")
         settings = "bpy.data.objects['Cloud'].meshfree"
-        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        gui.python(COLORED)
         gui.python(f"{settings}.histogram = {settings}.plot_eigenvalues = False")
 
         def drawn():
@@ -127,6 +131,35 @@ class TestView:
         gui.wait_until("view3d()[0].spaces.active.local_view is None")
         gui.wait_for(lambda: drawn() == pytest.approx(shown, rel=0.1), "the legend is drawn as before")
 
+    def test_the_mouse_drags_the_legend(self, gui):
+        add_sphere(gui)
+        gui.python("bpy.ops.meshfree.analyze(); bpy.ops.ed.undo_push(message='Analyzed')")
+        gui.python(COLORED)
+        place = "list(bpy.data.objects['Cloud'].meshfree.legend_place)"
+
+        def drawn():
+            return colors(gui.pixels(corner(gui)))
+
+        gui.wait_for(lambda: drawn() > 1000, "the legend is drawn")
+        x, y, _, height = corner(gui)
+        gui.shot("legend_in_its_corner")
+        gui.drag((x + 80, y + height - 60), (x - 320, y - 200))
+        gui.wait_until(f"{place}[0] < 0.7")
+        gui.wait_for(lambda: drawn() < 100, "the legend has left its corner")
+        assert gui.python(f"{place}[1]") > 0.3
+        gui.shot("legend_dragged")
+        gui.key("ctrl+z")
+        gui.wait_until(f"{place} == [1.0, 0.0]")
+        gui.wait_for(lambda: drawn() > 1000, "undo brings it back")
+
+    def test_the_legend_is_there_where_colors_are(self, gui):
+        add_sphere(gui)
+        gui.python("bpy.ops.meshfree.analyze()")
+        gui.python(COLORED)
+        gui.wait_for(lambda: colors(gui.pixels(corner(gui))) > 1000, "the legend is drawn")
+        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        gui.wait_for(lambda: colors(gui.pixels(corner(gui))) < 100, "no legend without colors")
+
     def test_the_active_object_outside_of_the_local_view(self, gui):
         add_sphere(gui)
         gui.python("other = add_object(sphere_points(300) + (3.0, 0.0, 0.0), 'Other')")
@@ -140,6 +173,32 @@ class TestView:
         gui.settle()  # no error in Python is seen, says the fixture
         gui.key("KP_Divide")
         gui.wait_until("view3d()[0].spaces.active.local_view is None")
+
+
+class TestGroupColors:
+    """Group Colors in Edit Mode."""
+
+    @pytest.mark.parametrize("opened", ["MESHFREE_PT_points"], indirect=True)
+    def test_undo_leaves_them_as_they_were(self, opened):
+        shown = "bpy.context.object.meshfree.show_groups and len(bpy.context.object.modifiers)"
+        groups = "bpy.context.object.vertex_groups.keys()"
+        opened.point_at_view()
+        opened.key("Tab", "alt+a")
+        opened.wait_until("bpy.context.object.mode == 'EDIT'")
+        opened.python("bpy.context.object.meshfree.show_groups = True")
+        opened.point_at_view()
+        opened.key("a")
+        opened.press("meshfree.group_from_selection(role='ANCHOR'")
+        opened.wait_until(f"{groups} == ['Anchor']")
+        opened.point_at_view()
+        for _ in range(3):
+            opened.key("ctrl+z")
+            assert opened.python(shown) == 1
+        assert opened.python(groups) == []
+        for _ in range(3):
+            opened.key("ctrl+shift+z")
+            assert opened.python(shown) == 1
+        assert opened.python(groups) == ["Anchor"]
 
 
 class TestSidebar:
@@ -170,6 +229,24 @@ class TestSidebar:
         # As Blender writes why a button is disabled, some time after the mouse came to rest.
         gui.wait_for(lambda: red(gui.pixels(around)) > 100, "red words in a tooltip")
         assert not gui.python("bpy.ops.meshfree.separate_by_segment.poll()")
+
+    def test_a_notice_stays_until_it_is_dismissed(self, gui):
+        add_sphere(gui, 500)
+        gui.python("bpy.context.object.data.vertices[0].co = (0.0, 0.0, 9.0)")
+        gui.python("bpy.ops.ed.undo_push(message='One far away')")
+        gui.open_tab()
+        gui.press("meshfree.analyze")
+        gui.wait_until(ANALYZED, 60)
+        gui.wait_until(f"not {WORKING}")
+        notices = "[told.text for told in bpy.context.object.meshfree.notices]"
+        told = gui.python(notices)
+        assert told
+        gui.shot("notices")
+        gui.press("meshfree.dismiss", across=0.79)
+        gui.wait_until(f"len({notices}) == {len(told) - 1}")
+        gui.point_at_view()
+        gui.key("ctrl+z")
+        gui.wait_until(f"{notices} == {told!r}")
 
     def test_the_info_log_has_the_words_of_scripts(self, gui):
         add_sphere(gui, 500)

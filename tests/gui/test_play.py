@@ -106,6 +106,14 @@ class TestAnalysis:
         assert gui.python("view3d()[0].spaces.active.shading.type") == "MATERIAL"
         gui.wait_for(lambda: colored(gui.pixels(middle)) > gray + 20000, "the points are colored", 240)
 
+    def test_where_there_is_no_material_preview(self, gui):
+        add_sphere(gui)
+        gui.python("bpy.context.scene.render.engine = 'BLENDER_WORKBENCH'")
+        gui.open_tab()
+        gui.press("meshfree.analyze")
+        gui.wait_until(ANALYZED, 60)
+        assert gui.python("view3d()[0].spaces.active.shading.type") == "SOLID"
+
 
 class TestJobs:
     """Work that goes on while the window stays alive, and what ends it."""
@@ -120,6 +128,21 @@ class TestJobs:
     @pytest.mark.parametrize("job", ["Analyze Points", "Smooth Points"], indirect=True)
     def test_escape(self, job):
         job.shot("working")
+        job.key("Escape")
+        finish(job, 5)
+        assert job.python(UNCHANGED)
+
+    def test_keys_of_what_runs_beside_it(self, job):
+        """The first Esc ends the drag that began meanwhile, the second one the work."""
+        place = job.python("list(bpy.context.object.location)")
+        job.point_at_view()
+        job.key("g")
+        x, y = job.view_center()
+        job.move(x + 90, y + 40)
+        assert job.python("list(bpy.context.object.location)") != place
+        job.key("Escape")
+        assert job.python("list(bpy.context.object.location)") == place
+        assert job.python(WORKING) == ["MESHFREE_OT_analyze"]
         job.key("Escape")
         finish(job, 5)
         assert job.python(UNCHANGED)

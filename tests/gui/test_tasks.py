@@ -112,6 +112,25 @@ class TestSelection:
 class TestPicked:
     """Tools that begin at a point that one clicks."""
 
+    def test_a_click_takes_the_point_in_front(self, gui):
+        add_sphere(gui, 3000)
+        gui.python("bpy.ops.meshfree.show_surface(); bpy.ops.ed.undo_push(message='Surface')")
+        gui.key("KP_1", "Home", "Tab", "alt+a")
+        gui.wait_until("bpy.context.object.mode == 'EDIT'")
+        for x, z in ((0.0, 0.0), (0.4, 0.3), (-0.5, 0.2), (-0.2, -0.6), (0.3, -0.4)):
+            gui.click(*gui.python(f"on_screen(({x}, -1.0, {z}))"))
+            gui.settle()
+            (picked,) = gui.python(SELECTED)
+            place = gui.python(f"points[{picked}]")
+            assert place[1] < -0.3
+            assert abs(place[0] - x) + abs(place[2] - z) < 0.2
+        # Seen through, where Blender takes the nearest on the screen.
+        gui.python("view3d()[0].spaces.active.shading.type = 'SOLID'")
+        gui.python("view3d()[0].spaces.active.shading.show_xray = True")
+        behind = gui.python("next(i for i in np.argsort(-points[:, 1]) if np.hypot(*points[i, [0, 2]]) < 0.5)")
+        gui.click(*gui.python(f"on_screen(points[{behind}])"))
+        assert gui.python(SELECTED) == [behind]
+
     @pytest.mark.parametrize(("name", "attribute", "there"), PICKED)
     def test_a_clicked_point_is_the_source(self, gui, name, attribute, there):
         add_sphere(gui, 1500)

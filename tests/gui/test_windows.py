@@ -94,6 +94,32 @@ def opened(gui):
     return gui
 
 
+class TestDrag:
+    """A handle that is dragged, with a rest in which the exact result is begun to be prepared."""
+
+    def test_esc_ends_the_drag(self, gui):
+        add_sphere(gui, 20000)  # too many to be solved for at each move
+        gui.python(PART)
+        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        gui.open_tab()
+        gui.press("meshfree.deform_bind", across=0.75)
+        gui.wait_until("bpy.context.object.name == 'Cloud Handle'", 90)
+        finish(gui)
+        place = gui.python("[list(row) for row in bpy.context.object.matrix_world]")
+        gui.point_at_view()
+        gui.key("g")
+        x, y = gui.view_center()
+        gui.move(x + 60, y - 60)
+        gui.wait_until(f"{MOVED} > 0.05")
+        gui.wait_until(BINDING)
+        gui.key("Escape")
+        assert gui.python(WORKING) == []
+        assert gui.python("[list(row) for row in bpy.context.object.matrix_world]") == place
+        gui.wait_until(f"{MOVED} == 0.0")
+        gui.wait_until("not live._jobs")
+        assert gui.python(MOVED) == 0.0
+
+
 class TestTwoWindows:
     """What is done in one window is seen in the other, and ends with neither."""
 
@@ -126,7 +152,7 @@ class TestTwoWindows:
         else:
             start(gui, "Smooth Points")
             gui.open_second()
-        gui.wait_until(f"all('MESHFREE_OT_escape' in names for names in {HEARING})")
+        gui.wait_until(f"any('MESHFREE_OT_smooth' in names for names in {HEARING})")
         gui.shot("work_in_two_windows")
         gui.point_at_second()
         gui.key("Escape")
@@ -209,6 +235,37 @@ class TestOpenedFile:
         opened.search("Mesh-Free Update")
         opened.wait_until(f"{MOVED} > 0.25", 60)
         assert opened.python("live.trouble(bpy.data.objects['Cloud'])") == ""
+
+
+class TestApply:
+    """Apply asks before keyframes of handles are lost."""
+
+    PRESS = """
+area, region, _ = view3d()
+with bpy.context.temp_override(window=main_window(), area=area, region=region):
+    bpy.ops.meshfree.deform_apply("INVOKE_DEFAULT")
+"""
+    SAME = "everything(bpy.data.objects['Cloud']) == pose and handle.animation_data is not None"
+
+    def test_esc_and_return(self, bound):
+        bound.python(ANIMATED)
+        bound.python("bpy.context.scene.frame_set(6)")
+        bound.wait_until(f"not live._jobs and {MOVED} > 0.4")
+        bound.python("bpy.ops.ed.undo_push(message='Pose'); pose = everything(bpy.data.objects['Cloud'])")
+        bound.point_at_view()
+        bound.python(self.PRESS)
+        bound.settle()
+        bound.shot("apply_asks")
+        bound.key("Escape")
+        assert bound.python(self.SAME)
+        bound.point_at_view()
+        bound.python(self.PRESS)
+        bound.key("Return")
+        bound.wait_until("handle.animation_data is None")
+        assert bound.python(MOVED) == 0.0
+        bound.key("Right")  # the next frame
+        bound.wait_until("bpy.context.scene.frame_current == 7")
+        assert bound.python(MOVED) == 0.0
 
 
 class TestBake:

@@ -1,0 +1,162 @@
+"""Lines on a mesh along which values are the same."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components, depth_first_order
+
+from ..arguments import as_array, as_doubles, check_positions, real
+from ..errors import InvalidPointsError, PointCloudError
+
+
+class IsoLine(NamedTuple):
+    """A line along which values are the same.
+
+    Attributes
+    ----------
+    level : float
+        These values.
+    points : ndarray, (k, 3)
+        Corners of the line, one after the other [L].
+    closed : bool
+        Whether it goes on from the last corner to the first.
+    """
+
+    level: float
+    points: np.ndarray
+    closed: bool
+
+
+def iso_lines(vertices, faces, values, levels):
+    """Find the lines on a mesh along which values, linear on each triangle, are those of some levels.
+
+    Parameters
+    ----------
+    vertices : array_like, (n, 3)
+        Places [L].
+    faces : array_like, (m, 3) or (m, 4) int
+        Triangles or quads, by their vertices; quads count as two triangles.
+    values : array_like, (n,)
+        Across triangles with one that is not finite there are no lines.
+    levels : array_like, (l,)
+
+    Returns
+    -------
+    list of IsoLine
+        As long as they can be: they end at the boundary of the mesh, and where more than two faces meet, only.
+
+    Raises
+    ------
+    PointCloudError
+        Arrays of wrong shapes or types, faces of vertices that are not there, or a level that is no number.
+
+    See Also
+    --------
+    mesh_surface : Makes a mesh.
+    values_on_mesh : Carries values to its vertices.
+
+    Examples
+    --------
+    A circle of latitude, where the height is a half:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> mesh = core.mesh_surface(core.build_laplacian(points))
+    >>> (circle,) = core.iso_lines(mesh.vertices, mesh.faces, mesh.vertices[:, 2], [0.5])
+    >>> steps = circle.points - np.roll(circle.points, 1, axis=0)
+    >>> print(circle.closed, (np.linalg.norm(steps, axis=1).sum() / (np.pi * np.sqrt(3))).round(2))
+    True 1.0
+    """
+    vertices, triangles, values, levels = _checked(vertices, faces, values, levels)
+    triangles = triangles[np.isfinite(values[triangles]).all(axis=1)]
+    parts = [_joined(vertices, values, level, _segments(triangles, values > level)) for level in levels]
+    return [line for part in parts for line in part]
+
+
+def _checked(vertices, faces, values, levels):
+    """Return what `iso_lines` takes as arrays, with triangles for faces."""
+    vertices = check_positions(vertices, len(as_array(vertices, "Vertices")), "vertices", "vertex")
+    faces, values = as_array(faces, "Faces"), as_array(values, "Values")
+    if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu":
+        raise InvalidPointsError(
+            f"Faces have the shape {faces.shape} and type {faces.dtype}. Give three or four whole numbers for each."
+        )
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
+        raise InvalidPointsError(
+            f"Faces have vertices from {faces.min()} to {faces.max()}, and there are {len(vertices)}. Count from zero."
+        )
+    if values.shape != (len(vertices),) or values.dtype.kind not in "iufb":
+        raise InvalidPointsError(
+            f"Values have the shape {values.shape} and type {values.dtype}, and there are {len(vertices)} vertices."
+            " Give one real number per vertex."
+        )
+    levels = [real(level) for level in np.atleast_1d(as_array(levels, "Levels")).ravel().tolist()]
+    if not np.isfinite(levels).all():
+        raise PointCloudError(f"The levels are {levels}. Use finite numbers.")
+    triangles = faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+    return vertices, triangles.astype(np.int64), as_doubles(values), levels
+
+
+def _segments(triangles, above):
+    """Return the pieces of a line within triangles, (s, 2, 2) int: two edges each, given by their lower and upper end.
+
+    An edge is cut where one end is above the level and the other one is not.
+    """
+    inside = above[triangles]
+    cut = inside != np.roll(inside, -1, axis=1)
+    crossed = cut.any(axis=1)
+    edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)[crossed], axis=2)
+    return edges[cut[crossed]].reshape(-1, 2, 2)
+
+
+def _joined(vertices, values, level, segments):
+    """Join pieces to lines."""
+    if not len(segments):
+        return []
+    count = len(vertices)
+    key = segments[:, :, 0] * count + segments[:, :, 1]
+    cuts, ends = np.unique(key, return_inverse=True)
+    ends = ends.reshape(key.shape)
+    meeting = np.bincount(ends.ravel())[ends] > 2  # where faces meet that are more than two, each piece ends alone
+    ends[meeting] = len(cuts) + np.arange(np.count_nonzero(meeting))
+    cuts = np.concatenate([cuts, key[meeting]])
+    low, high = np.divmod(cuts, count)
+    share = (level - values[low]) / (values[high] - values[low])
+    places = vertices[low] + share[:, None] * (vertices[high] - vertices[low])
+    order, starts, closed = _walk(ends, len(cuts))
+    return [
+        IsoLine(level, places[line], bool(loop))
+        for line, loop in zip(np.split(order, starts[1:]), closed, strict=True)
+        if len(line)
+    ]
+
+
+def _walk(ends, count):
+    """Order cuts along the lines that pieces, (s, 2) pairs of cuts, make up.
+
+    Returns
+    -------
+    order : ndarray, (count,) int
+        The cuts, line by line.
+    starts : ndarray, (l,) int
+        Where in it each line begins.
+    closed : ndarray, (l,) bool
+    """
+    used = np.unique(ends)
+    pieces = sparse.csr_array((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    degree = np.bincount(ends.ravel(), minlength=count)
+    _, line = connected_components(pieces, directed=False)
+    line = np.unique(line[used], return_inverse=True)[1].reshape(-1)
+    first = used[np.lexsort([degree[used], line])]  # of an open line one of its ends
+    first = first[np.unique(np.sort(line), return_index=True)[1]]
+    # From one more place that leads to the first cut of each line, one after the other, all lines are walked along.
+    both = sparse.vstack([pieces + pieces.T, sparse.csr_array((1, count), dtype=bool)])
+    both = sparse.hstack([both, sparse.csr_array((count + 1, 1), dtype=bool)], format="lil")
+    both[count, first] = True
+    order = depth_first_order(both.tocsr(), count, directed=True, return_predecessors=False)[1:]
+    begins = np.flatnonzero(np.isin(order, first))
+    return order, begins, degree[order[begins]] == 2

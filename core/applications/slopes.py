@@ -1,0 +1,142 @@
+"""Slopes of values along the surface, by which a point tells of what lies around it."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arguments import as_array, as_doubles, check_positions
+from ..blocks import blocks, on_all_cores
+from ..errors import InvalidPointsError
+from ..geometry import Discs, frames
+from .gradients import lifted_inverse
+
+_COUNT = 12  # neighbours: two rings of an even sample
+_ROUND = 0.01  # of `lifted_inverse`
+_RIDGE = 0.01  # holds curvatures back where neighbours hardly tell them, in their own terms
+_TOLD = 0.1  # of what neighbours tell about slopes, what is left beside curvatures at least, or these count as zero
+_UNFIT = 14.0  # one by the share of the squared rises that a fit with as many coefficients may miss, to be of use
+_BLOCK = 1 << 13  # points at one time
+
+
+class Slopes:
+    """Finds by how much values change along the surface, again and again for the same points.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Coordinates [L].
+    discs : Discs
+        How the surface lies, and as far as which slopes are to hold; those of radius 0 are unknown.
+
+    Raises
+    ------
+    InvalidPointsError
+        Points of the wrong shape or type, or not finite.
+
+    See Also
+    --------
+    surface_discs : Finds the discs.
+
+    Notes
+    -----
+    A quadratic function of the tangent plane through the value at the point is fitted to the nearest neighbours, which
+    count the less the farther they are, and the less the higher they lie above that plane: those a radius above it do
+    not count, such as the other side of a thin wall. As far as it fits badly its slope is made less steep where that
+    would leave the range of their values within the disc, like a limiter of finite volumes: noise, peaks and jumps do
+    not swing. Halfway to a neighbour, slopes of both then give values that differ by terms of third order.
+
+    Examples
+    --------
+    The height above the equator of a sphere climbs by one per length there, and not at all at the poles:
+
+    >>> import numpy as np
+    >>> import core
+    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
+    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
+    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> slopes = core.Slopes(points, core.surface_discs(points)).of(z)
+    >>> print(slopes[abs(z) < 0.1].mean(axis=0).round(1) + 0.0)
+    [0. 0. 1.]
+    """
+
+    def __init__(self, points, discs: Discs):
+        given = as_array(points, "Points")
+        self._points = check_positions(given, len(given) if given.ndim else 0, "points", "point")
+        self._points -= self._points.mean(axis=0) if len(self._points) else 0.0
+        self._discs = discs
+        found = range(1, min(_COUNT, max(len(self._points) - 1, 0)) + 2)  # the point itself first
+        self._near = cKDTree(self._points).query(self._points, k=found, workers=-1)[1].astype(np.int32)
+
+    def of(self, values):
+        """Return the slopes of values, (n,), as vectors in the tangent planes, (n, 3) [1/L].
+
+        Values that are not finite count as unknown, and have none.
+        """
+        given = as_array(values, "Values")
+        if given.shape != (len(self._points),) or given.dtype.kind not in "iufb":
+            raise InvalidPointsError(
+                f"Values have the shape {given.shape} and type {given.dtype}, and there are {len(self._points)} points."
+                " Give one real number per point."
+            )
+        values, slopes = as_doubles(given), np.zeros(self._points.shape)
+
+        def find(rows):
+            slopes[rows] = self._found(rows, values)
+
+        on_all_cores(find, blocks(len(values), _BLOCK))
+        return slopes
+
+    def _found(self, rows, values):
+        """Return the slopes at some points."""
+        near, radii = self._near[rows], self._discs.radii[rows, None]
+        axes = frames(self._discs.normals[rows])
+        step = (self._points[near] - self._points[rows, None]) @ axes
+        height, *flat = np.moveaxis(np.divide(step, radii[:, :, None], out=step, where=radii[:, :, None] > 0.0), 2, 0)
+        rise = values[near] - values[rows, None]
+        counts = np.isfinite(rise) & (np.abs(height) < 1.0) & (radii > 0.0)
+        rise = np.where(counts, rise, 0.0)
+        slope = _fit(flat, np.where(counts, height, 1.0), rise)
+        return np.einsum("nac,nc->na", axes[:, :, 1:], np.divide(slope, radii, out=slope, where=radii > 0.0))
+
+
+def _fit(flat, height, rise):
+    """Fit quadratic functions to rises from points to their neighbours, (n, k); return their slopes, limited, (n, 2).
+
+    Neighbours are given by their two steps in the tangent plane and their height above it, (n, k) each in radii.
+    """
+    across, along = flat
+    squared = across**2 + along**2
+    weight = np.divide((1.0 - height**2) ** 2, squared + height**2, out=np.zeros_like(height), where=squared > 0.0)
+    weight *= np.divide(squared, squared + height**2, out=np.zeros_like(height), where=squared > 0.0)
+    terms = np.stack([across, along, 0.5 * across**2, across * along, 0.5 * along**2], axis=1)
+    weighted = weight[:, None] * terms
+    inner, sums = weighted @ terms.transpose(0, 2, 1), weighted @ rise[:, :, None]
+    bent = inner[:, 2:, 2:]
+    bent = bent + (_RIDGE * np.trace(bent, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None] * np.eye(3)
+    known = np.linalg.solve(bent, np.concatenate([inner[:, 2:, :2], sums[:, 2:]], axis=2))
+    alone = np.concatenate([inner[:, :2, :2], sums[:, :2]], axis=2)
+    left = alone - inner[:, :2, 2:] @ known
+    known *= (_determinant(left) > _TOLD * _determinant(alone))[:, None, None]
+    left = alone - inner[:, :2, 2:] @ known
+    slope = lifted_inverse(left[:, :, :2].transpose(1, 2, 0), _ROUND).transpose(2, 0, 1) @ left[:, :, 2:]
+    found = np.concatenate([slope, known[:, :, 2:] - known[:, :, :2] @ slope], axis=1)
+    missed = rise - (found.transpose(0, 2, 1) @ terms)[:, 0]
+    slope = slope[:, :, 0]
+    return slope * np.maximum(_limit(slope, rise), _freedom(weight, rise, missed))[:, None]
+
+
+def _determinant(sums):
+    """Return the determinants of the first two columns of matrices, (n, 2, 3)."""
+    return sums[:, 0, 0] * sums[:, 1, 1] - sums[:, 0, 1] * sums[:, 1, 0]
+
+
+def _limit(slope, rise):
+    """Return which share of slopes stays within the range of the rises to neighbours, (n,)."""
+    steep = np.hypot(*slope.T)
+    room = np.maximum(np.minimum(rise.max(axis=1), -rise.min(axis=1)), 0.0)
+    return np.divide(room, steep, out=np.ones_like(steep), where=steep > room)
+
+
+def _freedom(weight, rise, missed):
+    """Return how far a fit is to be trusted, (n,): 1 where it misses nothing, 0 and less where it misses much."""
+    total, lost = (np.einsum("nk,nk->n", weight, part**2) for part in (rise, missed))
+    return 1.0 - _UNFIT * np.divide(lost, total, out=np.zeros_like(total), where=total > 0.0)

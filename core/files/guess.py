@@ -1,0 +1,96 @@
+"""What columns without names are, by their numbers: colors, normals, or values of an unknown kind."""
+
+import numpy as np
+
+_COLORS = ("r", "g", "b")
+_SCANNED = ("intensity", *_COLORS)
+_NORMALS = ("nx", "ny", "nz")
+_FULL = 255.0
+_SAMPLE = 10_000  # rows that are looked at first
+_MOST = 30  # columns that are looked at
+_LENGTH = 0.02  # that normals, rounded to a few digits, may differ from 1
+_STEP = 1e-4  # that shares of 255 may differ from whole ones, in a file of a few digits
+
+
+def guess_names(values, unknown):
+    """Name columns that a file does not name.
+
+    Parameters
+    ----------
+    values : ndarray, (n, k)
+    unknown : list of str
+        A name for each, for those that are neither.
+
+    Returns
+    -------
+    list of str
+        r g b, alpha, nx ny nz, intensity, or the given ones.
+    """
+    names = list(unknown)
+    values = values[np.isfinite(values).all(axis=1)]
+    color, normal = _best_pair(_triples(values, _are_colors), _triples(values, _are_normals), values)
+    if normal is not None:
+        names[normal : normal + 3] = _NORMALS
+    if color is not None:
+        names[color : color + 3] = _COLORS
+        alpha = color + 3
+        if alpha < len(names) and alpha != normal and (values[:, alpha] == _FULL).all():
+            names[alpha] = "alpha"
+        if color == 1 and len(names) == len(_SCANNED):
+            names = list(_SCANNED)
+    return names
+
+
+def _triples(values, fits):
+    """Return where three columns fit, or None for nowhere."""
+    sample = values[:: max(len(values) // _SAMPLE, 1)]
+    firsts = range(min(values.shape[1], _MOST) - 2) if len(values) else ()
+    return [
+        None,
+        *(first for first in firsts if fits(sample[:, first : first + 3]) and fits(values[:, first : first + 3])),
+    ]
+
+
+def _best_pair(colors, normals, values):
+    """Choose columns of colors and of normals that explain most; of colors those whose channels differ least.
+
+    What stands beside them differs more: opacities, intensities, labels.
+    """
+    pairs = [
+        (color, normal)
+        for color in colors
+        for normal in normals
+        if color is None or normal is None or abs(color - normal) >= 3
+    ]
+
+    def quality(pair):
+        color, normal = pair
+        explained = (color is not None) + (normal is not None)
+        return explained, -_spread(values, color), color is not None
+
+    return max(pairs, key=quality)
+
+
+def _spread(values, first):
+    if first is None:
+        return 0.0
+    channels = values[:, first : first + 3]
+    alpha = 2.0 * _FULL if (channels == _FULL).all(axis=0).any() else 0.0  # the same everywhere
+    return float(np.ptp(channels, axis=1).mean()) + alpha
+
+
+def _are_colors(values):
+    """Tell whether three columns are whole numbers from 0 to 255, or their shares, and not all 0 or 1."""
+    if not ((values >= 0.0) & (values <= _FULL)).all() or _are_normals(values):
+        return False
+    if values.max() > 1.0:
+        return bool((values == np.round(values)).all())
+    shares = _FULL * values
+    return bool((np.abs(shares - np.round(shares)) < _FULL * _STEP).all() and (shares % _FULL != 0.0).any())
+
+
+def _are_normals(values):
+    """Tell whether three columns are vectors of length 1, but for some that are zero or missing."""
+    lengths = np.linalg.norm(values, axis=1)
+    there = lengths > 0.0
+    return bool(2 * there.sum() > len(values) and (np.abs(lengths[there] - 1.0) < _LENGTH).all())

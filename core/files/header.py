@@ -1,0 +1,100 @@
+"""The names of the columns of a text, from the lines before its rows."""
+
+import re
+from collections import Counter
+
+from .cells import is_comment
+from .lines import is_number
+from .names import find_places, is_known
+
+_MARKS = "#/%! "
+_MOST_DIGITS = 15  # of a number of a point
+
+
+def find_names(rows, numeric) -> list:
+    """Find the names of the columns in the lines before the first row.
+
+    Parameters
+    ----------
+    rows : Rows
+    numeric : list of int
+        Indices of the columns that hold numbers.
+
+    Returns
+    -------
+    list of str or None
+        None for those without a name; fewer than there are columns if a list of any length follows; empty if no line
+        names them.
+    """
+    usual = []
+    for line in reversed(rows.before):
+        for names in _split(line, rows.delimiter):
+            names = _fit(names, is_comment(line), rows, numeric)
+            found = find_places(names, numeric) if names else None
+            if found and found.sure:
+                return names
+            usual = usual or names
+    return usual
+
+
+def _split(line, delimiter):
+    """Yield the words of a line that may be names, by all that could separate them."""
+    body = line.strip(" \r\n").lstrip(_MARKS) if is_comment(line) else line.strip(" \r\n")
+    bodies = [body.partition(":")[2], body] if is_comment(line) and ":" in body else [body]
+    for text in bodies:
+        for separator in dict.fromkeys((delimiter or ",", ",", ";", "\t", "|", None)):
+            parts = text.split(separator) if separator else _closed(text).split()
+            names = [name.strip().strip("\"'").strip() for name in parts]
+            if len(names) > 2:
+                yield names
+
+
+def _closed(text):
+    """Return text with its brackets closed up to the words before them, so that white space divides names alone."""
+    return re.sub(r"\s*([\[(])([^\])]*)", lambda match: match[1] + "_".join(match[2].split()), text)
+
+
+def _fit(names, marked, rows, numeric):
+    """Return names of columns if they can be those of the rows; otherwise none."""
+    if any(map(is_number, names)):
+        return []
+    width, full = rows.width, len(names)
+    lists = next((index for index, name in enumerate(names) if "[]" in name), None)  # of any length, at the end
+    names = names[:lists]
+    while len(names) > width and not names[-1]:
+        names, full = names[:-1], full - 1
+    known = [name for name in names if name and is_known(name)]
+    if full == width and lists is None:
+        return _distinct(names) if known or not marked else []
+    if marked and lists is None and len(known) < len(names):
+        return []
+    if len(names) == width - 1 and (0 not in numeric or counts(rows)):  # R gives no name to those of rows
+        names = [None, *names]
+    if lists is None:
+        names = [*names[:width], *[None] * (width - len(names))]
+    found = find_places(names, numeric)
+    return _distinct(names) if found and found.sure else []
+
+
+def counts(rows, index=0) -> bool:
+    """Tell whether a column counts the rows."""
+    words = [row[index] for row in rows.sample if index < len(row)]
+    if len(words) < 3 or not all(word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS for word in words):
+        return False
+    first = int(words[0])
+    return [int(word) for word in words] == [*range(first, first + len(words))]
+
+
+def unnamed(index) -> str:
+    """Return what a column without a name is called, by its number in the file."""
+    return f"column_{index + 1}"
+
+
+def _distinct(names):
+    """Number names that come again."""
+    seen, result = Counter(), []
+    for index, name in enumerate(names):
+        name = unnamed(index) if name == "" else name
+        seen[name] += 1
+        result.append(f"{name}_{seen[name]}" if name and seen[name] > 1 else name)
+    return result

@@ -1,0 +1,165 @@
+"""Which columns of a text are x y z, and which others are read by which names."""
+
+from typing import NamedTuple
+
+from ..errors import InvalidPointsError
+from .cells import is_numeric, kinds, split_row
+from .header import counts, find_names, unnamed
+from .lines import brief
+from .names import find_places, is_other
+
+_SKIPPED, _REST = "-", "..."  # among names that a user gives
+_GIVE = "If that is wrong, give the names of all columns in Columns at the import"
+_MOST_DIGITS = 15  # of a number of points
+
+
+class Layout(NamedTuple):
+    """The columns of a text.
+
+    Attributes
+    ----------
+    names : list of str or None
+        None for columns without a name.
+    places : list of int
+        Indices of x y z.
+    others : list of int
+        Indices of other columns that are read.
+    notices : list of str
+    announced : int or None
+        How many points the line before them says there are.
+    degrees : bool
+        Whether x and y are angles.
+    """
+
+    names: list
+    places: list
+    others: list
+    notices: list
+    announced: int | None = None
+    degrees: bool = False
+
+    def label(self, index):
+        """Return the name of a column, or one by its number in the file."""
+        return self.names[index] or unnamed(index)
+
+
+def given_layout(columns, rows) -> Layout:
+    """Return the layout that a user gives.
+
+    Parameters
+    ----------
+    columns : str
+        Names in the order of the file, separated by white space or commas; "-" for a column to leave out, "..." at the
+        end for all that follow.
+    rows : Rows
+
+    Raises
+    ------
+    InvalidPointsError
+        x, y or z is missing, a name comes twice, or the file has another number of columns.
+    """
+    names = columns.replace(",", " ").split()
+    all_told = names[-1] != _REST
+    names = [None if name == _SKIPPED else name for name in names[: len(names) - (not all_told)]]
+    lower = [name and name.lower() for name in names]
+    missing = [axis for axis in "xyz" if axis not in lower]
+    twice = [name for name in lower if name and lower.count(name) > 1]
+    if missing or twice:
+        problem = f"do not name {' '.join(missing)}" if missing else f"name {twice[0]} more than once"
+        raise InvalidPointsError(f"{rows.path}: the columns {brief(columns)!r} {problem}. Name x y z once each.")
+    width = len(rows.sample[0])
+    if len(names) > width or (len(names) < width and all_told):
+        raise InvalidPointsError(
+            f"{rows.path}: {len(names)} columns are named, but its first point has {width}. Write {_SKIPPED} for a"
+            f" column to leave out, and {_REST} at the end for all that follow."
+        )
+    numeric, textual, empty = kinds(rows)
+    places = [lower.index(axis) for axis in "xyz"]
+    others = [index for index in (*numeric, *empty) if index < len(names) and names[index] and index not in places]
+    texts = [names[index] for index in textual if index < len(names) and names[index] and index not in places]
+    return Layout(names, places, others, _tell_texts(texts, rows.path))
+
+
+def find_layout(rows, usual) -> Layout:
+    """Find the layout of a text by its names, or by what columns hold.
+
+    Parameters
+    ----------
+    rows : Rows
+    usual : dict of int to tuple of str
+        Names for numbers of columns, where the text has none.
+
+    Raises
+    ------
+    InvalidPointsError
+        The names tell that no three columns are places.
+    """
+    numeric, textual, empty = kinds(rows)
+    names = find_names(rows, numeric)
+    found = find_places(names, numeric) if names else None
+    notices = []
+    if found:
+        places = found.indices
+        notices += _tell_places(found, names, rows.path)
+    else:
+        if names:
+            _refuse_others(names, rows.path)
+        names = [*usual.get(rows.width, [None] * rows.width)]
+        places = _first_places(rows, numeric)
+    shortest = min(map(len, rows.sample))
+    read = [index for index in numeric if index < len(names) and (names[index] or index < shortest)]
+    sparse = [index for index in empty if index < len(names) and names[index] not in (None, unnamed(index))]
+    others = [index for index in sorted(read + sparse) if index not in places]
+    layout = Layout(names, places, others, notices, _announced(rows), bool(found and found.degrees))
+    notices += _tell_texts([layout.label(index) for index in textual if index < len(names)], rows.path)
+    if len(read) < len(numeric):
+        notices.append(
+            f"{rows.path.name}: left out {len(numeric) - len(read)} columns or more at the end, which have no names."
+        )
+    passed = [line.strip() for line in rows.before if _is_odd_row(line, rows.delimiter)]
+    if passed:
+        notices.append(f"{rows.path.name}: passed over {brief(repr(passed[0]))}, which stands before the first point.")
+    return layout
+
+
+def _is_odd_row(line, delimiter):
+    """Tell whether a line before the first point holds numbers, but is neither a point nor their number."""
+    words = split_row(line, delimiter)
+    return len(words) > 1 and is_numeric(words)
+
+
+def _tell_places(found, names, path):
+    """Tell which columns are x y z, unless they are called so."""
+    told = ", ".join(names[index] for index in found.indices)
+    notices = []
+    if not found.sure:
+        notices.append(f"{path.name}: no names tell which columns are x y z. Took {brief(told)} for them. {_GIVE}.")
+    elif not found.plain:
+        notices.append(f"{path.name}: took {brief(told)} for x y z.")
+    return notices
+
+
+def _refuse_others(names, path):
+    """Refuse a file with names of columns that are no places, if there are too few others; a title has none of them."""
+    told = [name for name in names if name]
+    if any(map(is_other, told)):
+        raise InvalidPointsError(
+            f"{path} has no x y z among its columns {brief(', '.join(told))}. Give the names of all columns in Columns"
+            " at the import, with x y z among them."
+        )
+
+
+def _first_places(rows, numeric):
+    """Return the first three columns of numbers; not one before them that counts the points, as they do not."""
+    counted = len(numeric) > 3 and counts(rows, numeric[0]) and not counts(rows, numeric[1])
+    return numeric[1:4] if counted else numeric[:3]
+
+
+def _tell_texts(texts, path):
+    return [f"{path.name}: left out {brief(', '.join(texts))}, which holds text."] if texts else []
+
+
+def _announced(rows):
+    """Return the number of points that the last line before them tells, if it does."""
+    word = rows.before[-1].strip().lstrip("#/%! ") if rows.before else ""
+    return int(word) if word.isdecimal() and len(word) <= _MOST_DIGITS else None

@@ -1,0 +1,153 @@
+"""PTX, rasters of rays as scanners by Leica export them: scans one after another, each with its place and matrix."""
+
+from itertools import chain, islice
+
+import numpy as np
+
+from ..errors import InvalidPointsError
+from .lines import brief, is_number, read_text
+from .table import SCANNER, from_columns
+
+_HEAD = 10  # lines: columns, rows, the scanner's place and axes, and four rows of a matrix
+_MOST_DIGITS = 9  # of a number of columns or rows
+_NAMES = ("x", "y", "z", "intensity", "r", "g", "b")
+_WIDTHS = (3, 4, 6, 7)  # numbers of a point
+_UNKNOWN = 0.5  # intensity of rays that hit nothing
+
+
+def holds_ptx(blocks) -> bool:
+    """Tell whether a text begins as PTX does, whatever the file is called."""
+    return _parse([*islice(_filled(blocks), _HEAD)]) is not None
+
+
+def read_ptx(path):
+    """Read a PTX file: the points of all scans, where their matrices put them, without rays that hit nothing.
+
+    Each point gets the place of its scanner as a vector, and the number of its scan, if there are several.
+
+    Returns
+    -------
+    PointTable
+
+    Raises
+    ------
+    InvalidPointsError
+        It is no PTX file, or announces another number of points than it has; the text says where.
+    """
+    scans, missed = [], 0
+    lines = enumerate(chain.from_iterable(read_text(path)), start=1)
+    lines = ((number, line) for number, line in lines if line.strip())
+    while head := [*islice(lines, _HEAD)]:
+        values, center, misses = _read_scan(lines, head, len(scans), path)
+        scans.append((values, center))
+        missed += misses
+    return _join(scans, missed, path)
+
+
+def _filled(blocks):
+    return filter(str.strip, chain.from_iterable(blocks))
+
+
+def _parse(lines):
+    """Return the number of points, the scanner's place and the matrix that the first lines of a scan tell, or None."""
+    words = [line.split() for line in lines]
+    if [len(row) for row in words] != [1, 1, 3, 3, 3, 3, 4, 4, 4, 4]:
+        return None
+    sizes = [row[0] for row in words[:2]]
+    if not all(word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS for word in sizes):
+        return None
+    if not all(is_number(word) for row in words[2:] for word in row):
+        return None
+    matrix = np.array(words[6:], dtype=np.float64)
+    if matrix[:, 3].tolist() != [0.0, 0.0, 0.0, 1.0] or not np.isfinite(matrix).all():
+        return None
+    return int(sizes[0]) * int(sizes[1]), np.array(words[2], dtype=np.float64), matrix
+
+
+def _read_scan(lines, head, number, path):
+    """Read a scan: its points, (n, k), where its matrix puts them, the scanner's place, the number of missed rays."""
+    found = _parse([line for _, line in head])
+    if found is None and number:
+        raise InvalidPointsError(
+            f"{path}, line {head[0][0]}: {brief(head[0][1])!r} begins no scan: scan {number} has more points than its"
+            " columns and rows announce, or the file is cut off. Export it again."
+        )
+    if found is None:
+        raise InvalidPointsError(
+            f"{path} is no PTX file: it does not begin with two counts, the scanner's place and axes, and a matrix"
+            " of 4 rows. Export it again."
+        )
+    count, place, matrix = found
+    values = _read_rows(lines, count, number, path)
+    missed = _missed(values)
+    values = values[~missed]
+    values[:, :3] = values[:, :3] @ matrix[:3, :3] + matrix[3, :3]
+    return values, _center(values[:, :3], place, matrix), np.count_nonzero(missed)
+
+
+def _missed(values):
+    """Tell which rays hit nothing: those at 0 0 0, except a single one that has an intensity."""
+    missed = (values[:, :3] == 0.0).all(axis=1)
+    if values.shape[1] in (4, 7):
+        measured = missed & (values[:, 3] != 0.0) & (values[:, 3] != _UNKNOWN)
+        if np.count_nonzero(measured) == 1:
+            missed &= ~measured
+    return missed
+
+
+def _read_rows(lines, count, number, path):
+    seen = [0]  # the line that numpy read last
+
+    def rows():
+        for seen[0], line in islice(lines, count):
+            yield line
+
+    try:
+        values = np.loadtxt(rows(), ndmin=2, comments=None) if count else np.empty((0, 3))
+    except ValueError as error:
+        raise InvalidPointsError(
+            f"{path}, scan {number + 1}, near line {seen[0]}: {brief(str(error).split('; use')[0])}. All of its"
+            f" {count} points need the same numbers: x y z, intensity, and r g b if there are colors. Export it again."
+        ) from None
+    if len(values) < count:
+        raise InvalidPointsError(
+            f"{path} announces {count} points in scan {number + 1}, but {len(values)} follow. Copy or export it again."
+        )
+    if values.shape[1] not in _WIDTHS:
+        raise InvalidPointsError(
+            f"{path} has {values.shape[1]} numbers a point in scan {number + 1}. PTX has x y z, intensity, and r g b."
+        )
+    return values
+
+
+def _center(points, place, matrix):
+    """Return where the scanner stood: the origin of its own coordinates, which the matrix moves.
+
+    Programs that have moved the points themselves write a matrix that does nothing.
+    """
+    moved = matrix[3, :3]
+    if (matrix == np.eye(4)).all() and len(points):
+        middle = points.mean(axis=0)
+        return min((moved, place), key=lambda center: np.linalg.norm(middle - center))
+    return moved
+
+
+def _join(scans, missed, path):
+    """Return one table of all scans; what a scan lacks is zero, its colors white."""
+    counts = [len(values) for values, _ in scans]
+    total = sum(counts)
+    columns, colored = {}, np.zeros(total, bool)
+    for start, (values, _) in zip(np.cumsum([0, *counts]), scans, strict=False):
+        names = _NAMES if values.shape[1] != 6 else [name for name in _NAMES if name != "intensity"]
+        for name, column in zip(names, values.T, strict=False):
+            columns.setdefault(name, np.zeros(total))[start : start + len(values)] = column
+        colored[start : start + len(values)] = values.shape[1] > 4
+    table = from_columns({name: columns.get(name, np.zeros(0)) for name in columns or "xyz"}, path)
+    if table.colors is not None:
+        table.colors[~colored] = 1.0
+    table.attributes[SCANNER] = np.repeat([center for _, center in scans] or np.empty((0, 3)), counts or 0, axis=0)
+    if len(scans) > 1:
+        table.attributes["scan"] = np.repeat(np.arange(len(scans), dtype=np.int32), counts)
+    if missed:
+        table.notices.append(f"{path.name}: left out {missed} rays that hit nothing (0 0 0).")
+    return table

@@ -1,0 +1,69 @@
+"""The columns that files of Gaussian splats have as trainers write them: their names, and how numbers are coded."""
+
+import numpy as np
+
+PLACES = ("x", "y", "z")
+COLORS = tuple(f"f_dc_{channel}" for channel in range(3))
+OPACITY = "opacity"
+SCALES = tuple(f"scale_{axis}" for axis in range(3))
+ROTATIONS = tuple(f"rot_{number}" for number in range(4))
+NEEDED = (*PLACES, *COLORS, OPACITY, *SCALES, *ROTATIONS)
+REST = "f_rest_"  # the harmonics, channel by channel
+LENGTHS = ("filter_3D",)  # further columns that are lengths: the filter of Mip-Splatting
+_SMALLEST = float(np.finfo(np.float32).tiny)
+_LARGEST = float(np.finfo(np.float32).max)
+_NEAR = 2.0**-25  # half a step of single precision below one
+
+
+def stack(columns, names, dtype=np.float64):
+    """Return columns by their names as one array, (n, k)."""
+    count = len(next(iter(columns.values())))
+    result = np.empty((count, len(names)), dtype)
+    for index, name in enumerate(names):
+        result[:, index] = columns[name]
+    return result
+
+
+def split(names, values) -> dict:
+    """Return an array (n, k) as columns of single precision by their names; the reverse of `stack`."""
+    return {name: np.ascontiguousarray(part, np.float32) for name, part in zip(names, values.T, strict=True)}
+
+
+def rest_names(per_channel, used):
+    """Return the names of the first harmonics of each channel, of which a file has so many."""
+    return [f"{REST}{channel * per_channel + number}" for channel in range(3) for number in range(used)]
+
+
+def decode_scales(logarithms):
+    """Return half axes of their logarithms; zero for what is no number."""
+    with np.errstate(over="ignore"):
+        return np.nan_to_num(np.exp(logarithms), nan=0.0, posinf=_LARGEST)
+
+
+def encode_scales(scales):
+    """Return the logarithms of half axes, of those without a length that of the smallest number."""
+    return np.log(np.maximum(scales, _SMALLEST))
+
+
+def decode_opacities(logits):
+    """Return opacities from 0 to 1 of their logits; zero for what is no number."""
+    with np.errstate(over="ignore"):
+        return np.nan_to_num(1.0 / (1.0 + np.exp(-logits)), nan=0.0)
+
+
+def encode_opacities(opacities):
+    """Return the logits of opacities, finite ones of 0 and 1, too."""
+    inside = np.clip(opacities, _SMALLEST, 1.0 - _NEAR)
+    return np.log(inside) - np.log1p(-inside)
+
+
+def decode_rotations(quaternions):
+    """Return unit quaternions; no turn for those without a length."""
+    length = np.sqrt(np.einsum("nk,nk->n", quaternions, quaternions))[:, None]
+    sound = np.isfinite(length) & (length > 0.0)
+    return np.where(sound, quaternions / np.where(sound, length, 1.0), [1.0, 0.0, 0.0, 0.0])
+
+
+def encode_rotations(rotations):
+    """Return unit quaternions as they are."""
+    return rotations

@@ -1,0 +1,80 @@
+"""Layouts of vertices that are nearly those of trainers: which hold enough for Gaussian splats, and what they lack."""
+
+import numpy as np
+
+from ..files import from_columns
+from .columns import COLORS, NEEDED, OPACITY, PLACES, ROTATIONS, SCALES, encode_opacities, split, stack
+from .harmonics import CONSTANT
+
+_RGB = (("red", "green", "blue"), ("r", "g", "b"))
+_THIN = 1e-3  # of the shorter axis in the plane: how thick a splat without a third axis becomes
+
+
+def hold_enough(names) -> bool:
+    """Whether properties of these names hold enough for splats: sizes, and at least one thing more that splats have.
+
+    Colours and rotations are there or not, but not by halves. Of sizes one or two do: balls, and flat ones.
+    """
+    there = set(names)
+    sizes = [name in there for name in SCALES]
+    halves = [group for group in (COLORS, ROTATIONS) if there.intersection(group) not in (set(), set(group))]
+    marks = there.intersection((OPACITY, COLORS[0], ROTATIONS[0]))
+    return there.issuperset(PLACES) and sizes[0] and sizes[2] <= sizes[1] and not halves and bool(marks)
+
+
+def near_miss(names) -> str:
+    """Return what is missing in a file that seems to hold splats but not enough of them; empty for other files."""
+    if hold_enough(names) or not {COLORS[0], SCALES[0], ROTATIONS[0]}.intersection(names):
+        return ""
+    return f"no {', '.join(name for name in NEEDED if name not in names)}"
+
+
+def completed(columns):
+    """Return the columns as trainers write them, for columns that `hold_enough`, and what was taken for missing ones.
+
+    Returns
+    -------
+    dict of str to ndarray, (n,)
+    list of str
+        What to tell, a clause each.
+    """
+    columns = dict(columns)
+    return columns, [told for add in (_add_colors, _add_opacity, _add_sizes, _add_rotations) if (told := add(columns))]
+
+
+def _add_colors(columns):
+    if COLORS[0] in columns:
+        return ""
+    named = next((names for names in _RGB if columns.keys() >= set(names)), None)
+    if named is None:
+        columns.update(dict.fromkeys(COLORS, np.zeros(len(columns["x"]), np.float32)))
+        return "no colors: splats are gray"
+    table = from_columns({name: columns[name] for name in (*PLACES, *named)}, None)
+    columns.update(split(COLORS, (table.colors[:, :3] - 0.5) / CONSTANT))
+    for name in named:
+        del columns[name]
+    return f"colors by {' '.join(named)}: the same from all sides"
+
+
+def _add_opacity(columns):
+    if OPACITY in columns:
+        return ""
+    columns[OPACITY] = np.full(len(columns["x"]), encode_opacities(1.0), np.float32)
+    return "no opacity: splats are opaque"
+
+
+def _add_sizes(columns):
+    if SCALES[2] in columns:
+        return ""
+    if SCALES[1] not in columns:
+        columns.update(dict.fromkeys(SCALES[1:], columns[SCALES[0]]))
+        return "scale_0 alone: splats are balls"
+    columns[SCALES[2]] = stack(columns, SCALES[:2], np.float32).min(axis=1) + np.float32(np.log(_THIN))
+    return "no scale_2 (2D splats): their third axis is a thousandth of the shorter one"
+
+
+def _add_rotations(columns):
+    if ROTATIONS[0] in columns:
+        return ""
+    columns.update(split(ROTATIONS, np.tile([1.0, 0.0, 0.0, 0.0], (len(columns["x"]), 1))))
+    return "no rotations: ellipsoids lie along the axes of coordinates"

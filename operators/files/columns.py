@@ -1,0 +1,74 @@
+"""Columns of files whose digits single precision would lose: what an object remembers of them."""
+
+import json
+from typing import NamedTuple
+
+import bpy
+
+from ...core.files import Digits, join_digits
+from ..objects.attributes import point_count, read_attribute
+from ..objects.place import COLUMNS
+
+
+class Column(NamedTuple):
+    """How a column is kept in attributes of an object: by what it is put together, and where a second part is."""
+
+    digits: Digits
+    second: str = ""
+
+
+def remember_columns(obj, columns):
+    """Keep on an object how columns are kept, `Column` by the names of attributes, and for how many points."""
+    if columns:
+        kept = {name: {**column.digits._asdict(), "second": column.second} for name, column in columns.items()}
+        obj[COLUMNS] = json.dumps({"points": point_count(obj.data), "columns": kept})
+
+
+def kept_columns(obj) -> dict:
+    """Return how columns of an object are kept, `Column` by the names of attributes."""
+    kept = json.loads(obj.get(COLUMNS, "{}")).get("columns", {})
+    return {name: Column(second=found.pop("second"), digits=Digits(**found)) for name, found in kept.items()}
+
+
+def doubted_columns(obj) -> list:
+    """Return a notice if an object has points of others, by Blender's Join, whose columns may be kept otherwise."""
+    names = [name for name in kept_columns(obj) if name in obj.data.attributes]
+    if not names or point_count(obj.data) <= json.loads(obj[COLUMNS])["points"]:
+        return []
+    return [f"{obj.name} has more points than were imported: {', '.join(names)} may be off by an offset at these"]
+
+
+def known_digits(name):
+    """Return how a column of some name is kept by another object, or None: objects that share that can be joined."""
+    columns = (kept_columns(obj).get(name) for obj in bpy.data.objects)
+    return next((column.digits for column in columns if column is not None), None)
+
+
+def read_columns(obj, names) -> dict:
+    """Read attributes of an object by name, with the digits that they had in the file."""
+    kept = {name: column for name, column in kept_columns(obj).items() if name in names}
+    seconds = {column.second for column in kept.values()}
+    columns = {}
+    for name in names:
+        if name in kept:
+            parts = [read_attribute(obj.data, part) for part in (name, kept[name].second) if part in names]
+            columns[name] = join_digits(parts, kept[name].digits)
+        elif name not in seconds:
+            columns[name] = read_attribute(obj.data, name)
+    return columns
+
+
+def tell_columns(obj) -> list:
+    """Return notices of the columns whose numbers an object keeps otherwise than its file."""
+    return [
+        f"{obj.name}: {_told(name, *column)}; exports write it as it was" for name, column in kept_columns(obj).items()
+    ]
+
+
+def _told(name, digits, second):
+    """Say how a column is kept."""
+    offset = digits.offset if isinstance(digits.offset, list) else [digits.offset]
+    parts = f" in two parts, {name} and {second}" if second else ""
+    less = f" less {', '.join(f'{value:,.15g}' for value in offset)}" if any(offset) else ""
+    steps = f" in steps of {digits.step:,}" if digits.step > 1 else ""
+    return f"{name} has more digits than Blender keeps and is stored{parts}{less}{steps}; exports write it as it was"

@@ -1,0 +1,37 @@
+"""Keyframes of data-blocks, wherever a version of Blender keeps them."""
+
+import bpy
+from bpy_extras import anim_utils
+
+_PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
+PLACE = (*_PLACE, *(f"delta_{name}" for name in _PLACE if name != "rotation_axis_angle"))  # what moves an object
+
+
+def curves(block):
+    """Return the F-curves that animate a data-block: a collection of Blender's, or nothing."""
+    animation = block.animation_data
+    if animation is None or animation.action is None:
+        return ()
+    if not hasattr(animation, "action_slot"):  # before Blender 4.4
+        return animation.action.fcurves
+    bag = animation.action_slot and anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
+    return bag.fcurves if bag else ()
+
+
+def moves_by_keys(obj) -> bool:
+    """Whether keyframes move an object."""
+    return any(curve.data_path in PLACE for curve in curves(obj))
+
+
+def stop_moving(obj):
+    """Remove the keyframes that move an object, from it alone; it stays where it is, and keeps all others."""
+    animation = obj.animation_data
+    if animation.action.users > 1:  # others have the same, or somebody wants it kept
+        animation.action = animation.action.copy()
+    found = curves(obj)
+    for curve in [curve for curve in found if curve.data_path in PLACE]:
+        found.remove(curve)
+    if not (len(found) or animation.drivers or animation.nla_tracks):
+        action = animation.action
+        obj.animation_data_clear()
+        bpy.data.actions.remove(action)

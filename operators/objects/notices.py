@@ -1,0 +1,77 @@
+"""What an object keeps of the notices of tools, until somebody dismisses them or the tool runs again."""
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+
+
+class MESHFREE_PG_notice(bpy.types.PropertyGroup):
+    """What a tool had to tell of an object"""
+
+    tool: StringProperty(name="Tool", description="Label of the tool that told it")
+    text: StringProperty(name="Text", description="What it told")
+    level: EnumProperty(
+        name="Level",
+        description="How much it matters",
+        items=(
+            ("WARNING", "Warning", "Something was guessed, left out or replaced"),
+            ("INFO", "Info", "Figures that one looks at again"),
+        ),
+        default="WARNING",
+    )
+
+
+def keep(obj, tool: str, text: str, level: str = "WARNING"):
+    """Keep a notice of a tool on an object; the same one of another tool, which it says anew, goes."""
+    notices = obj.meshfree.notices
+    _remove(notices, lambda kept: kept.text == text)
+    kept = notices.add()
+    kept.tool, kept.text, kept.level = tool, text, level
+
+
+def forget(obj, tool: str):
+    """Drop what a tool told of an object when it ran before."""
+    _remove(obj.meshfree.notices, lambda kept: kept.tool == tool)
+
+
+def renew(obj, tool: str, texts):
+    """Keep the notices of a tool in place of those of its run before."""
+    forget(obj, tool)
+    for text in texts:
+        keep(obj, tool, text)
+
+
+def _remove(notices, unwanted):
+    for index in reversed(range(len(notices))):
+        if unwanted(notices[index]):
+            notices.remove(index)
+
+
+class MESHFREE_OT_dismiss(bpy.types.Operator):
+    """Take away a notice that was read"""
+
+    bl_idname = "meshfree.dismiss"
+    bl_label = "Dismiss Notice"
+    bl_options = {"REGISTER", "UNDO"}
+
+    index: bpy.props.IntProperty(
+        name="Index", description="Number of the notice, from 0; -1 for all of them", default=-1, min=-1, soft_max=100
+    )
+
+    @classmethod
+    def poll(cls, context):
+        told = context.object is not None and len(context.object.meshfree.notices)
+        if not told:
+            cls.poll_message_set("The active object has no notices. They come with tools and imports")
+        return bool(told)
+
+    def execute(self, context):
+        notices = context.object.meshfree.notices
+        if self.index < 0:
+            notices.clear()
+        elif self.index < len(notices):
+            notices.remove(self.index)
+        return {"FINISHED"}
+
+
+PROPERTY_GROUPS = (MESHFREE_PG_notice,)
+CLASSES = (MESHFREE_OT_dismiss,)

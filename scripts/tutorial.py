@@ -1,0 +1,279 @@
+"""docs/tutorial.md, played in a window word by word, for its test and its pictures.
+
+Every step quotes the words that tell it. Words that tell of something to do and are not played are an error, as are
+steps that the tutorial does not tell; so there is no key that one would have to guess.
+"""
+
+import re
+
+from environments import ROOT
+from window import WindowError
+
+SAMPLE = ROOT / "docs" / "coral.ply"
+CORAL = "bpy.data.objects['coral']"
+HANDLE = "bpy.data.objects['coral Handle']"
+WORKING = "len(main_window().modal_operators)"
+MOVED = f"np.linalg.norm(attribute({CORAL}, 'lb_displacement'), axis=1).max()"
+# Buttons of the top bar, and of the menu *File*, from which others open to the right.
+_FILE, _NEW, _GENERAL, _IMPORT = (46, 14), (70, 38), (300, 37), (80, 311)
+_ORDERS = re.compile(  # words for what is to be done
+    r"\b(press|click|choose|open|switch|drag a|set|delete|move the mouse|start|look at)\b", re.IGNORECASE
+)
+_BROWSER = "next((area for area in main_window().screen.areas if area.type == 'FILE_BROWSER'), None)"
+_MEMBERS = f"""
+def members(name):
+    index = {CORAL}.vertex_groups[name].index
+    return [vertex.index for vertex in {CORAL}.data.vertices if any(item.group == index for item in vertex.groups)]
+"""
+
+
+class Reader:
+    """Reads the steps of the tutorial in their order.
+
+    Parameters
+    ----------
+    text : str
+        The tutorial.
+    """
+
+    def __init__(self, text):
+        told = text.partition("\n## Go on")[0].splitlines()
+        self._text = " ".join(" ".join(line for line in told if not line.startswith(("#", "!["))).split())
+        self._place = 0
+
+    def __call__(self, words):
+        """Go on to the words that tell what is done next."""
+        place = self._text.find(words, self._place)
+        if place < 0:
+            raise WindowError(f"The tutorial does not say {words!r} after {self._text[: self._place][-80:]!r}")
+        self._pass(place)
+        self._place = place + len(words)
+
+    def end(self):
+        """Find nothing more to do."""
+        self._pass(len(self._text))
+
+    def _pass(self, place):
+        passed = self._text[self._place : place]
+        if _ORDERS.search(passed):
+            raise WindowError(f"Nobody plays what the tutorial says: {passed!r}")
+
+
+def import_sample(gui, told, keep):
+    """Step 1: the points in a new file, and the tab."""
+    told("Start with a new file (*File > New > General*)")
+    for place in (_FILE, _NEW, _GENERAL):
+        gui.click(*place)
+    gui.wait_until("bool(bpy.context.window_manager.windows) and 'Cube' in bpy.data.objects")
+    gui.python("bpy.context.scene.eevee.taa_samples = 1")  # drawn without a graphics card
+    told("delete the cube: click it")
+    gui.click(*gui.python("on_screen((0.0, 0.0, 0.0))"))
+    told("press Delete")
+    gui.key("Delete")
+    gui.wait_until("'Cube' not in bpy.data.objects")
+    told("Choose *File > Import > Points*")
+    for place in (_FILE, _IMPORT, _last_entry(gui)):
+        gui.click(*(place(gui) if callable(place) else place))
+    gui.wait_until(f"{_BROWSER} is not None")
+    told("click `coral.ply` in the file browser")
+    x, y, width, height = gui.region("WINDOW", "FILE_BROWSER")
+    for row in range(round(y) + 35, round(y + height), 20):
+        gui.click(x + 50, row)
+        if gui.python(f"{_BROWSER}.spaces.active.params.filename") == SAMPLE.name:
+            break
+    told("press *Import Points*")
+    x, y, width, height = gui.region("EXECUTE", "FILE_BROWSER")
+    gui.click(x + width - 70, y + 0.5 * height)
+    gui.wait_until(f"'coral' in bpy.data.objects and {CORAL}.select_get() and not {WORKING}", 60)
+    gui.wait_until(f"'lb_disc' in {CORAL}.data.attributes")
+    told("Move the mouse over the 3D view")
+    gui.point_at_view()
+    told("press N")
+    gui.key("n")
+    gui.wait_until("view3d()[2].width > 50")
+    told("click the tab *Mesh-Free*")
+    gui.open_tab()
+    told("*coral: 10,000 points*")
+    gui.wait_until(f"len({CORAL}.data.vertices) == 10000")
+    gui.point_at_view()
+    keep("import")
+
+
+def _last_entry(gui):
+    """Return what finds the last entry of the menu that is open beside *Import*."""
+
+    def find(gui):
+        gui.settle()
+        x, y = _IMPORT[0] + 170, _IMPORT[1]
+        column = gui.pixels((x + 40, y, 1, 400)).max(axis=2)[:, 0]
+        dark = column < 45  # the menu, which the view is not; letters are above that
+        below = next(row for row in range(len(dark)) if not dark[row : row + 30].any())
+        return x + 100, y + below - 14
+
+    return find
+
+
+def analyze(gui, told, keep):
+    """Step 2: colors."""
+    told("Press *Analyze Points*")
+    gui.press("meshfree.analyze")
+    gui.wait_until(f"'lb_area' in {CORAL}.data.attributes and not {WORKING}", 240)
+    told(f"{gui.python(f'{CORAL}.meshfree.total_area'):.1f} m²")
+    gui.point_at_view()
+    keep("colors")
+    for words, name in (("Under *Display* press", "lb_area"), ("*Mean Curvature* again", "lb_mean_curvature")):
+        told(words)
+        gui.press(f'meshfree.colormap(attribute="{name}"')
+
+
+def choose(gui, told, keep):
+    """Step 3: groups."""
+    gui.python(_MEMBERS)
+    told("over the view, press Numpad 1")
+    gui.point_at_view()
+    gui.key("KP_1")
+    told("and Tab")
+    gui.key("Tab")
+    gui.wait_until(f"{CORAL}.mode == 'EDIT'")
+    told("Open *Points and Groups*")
+    gui.open_panel("meshfree.select_grow")
+    told("switch on *Group Colors*")
+    gui.press(".meshfree.show_groups")
+    gui.wait_until(f"{CORAL}.meshfree.show_groups")
+    told("press B")
+    gui.point_at_view()
+    gui.key("b")
+    told("drag a box around the right half of the points")
+    _box(gui, (0.2, -2.2), (2.2, 2.2))
+    told("Press *Assign to Anchors*")
+    gui.press("meshfree.group_from_selection(role='ANCHOR'")
+    told("press Alt+A")
+    gui.point_at_view()
+    gui.key("alt+a")
+    told("then B")
+    gui.key("b")
+    told("drag a box around the tip of the arm at the lower left")
+    _box(gui, (-2.2, -1.3), (-1.3, 0.0))
+    told("Press *Assign to Handles*")
+    gui.press("meshfree.group_from_selection(role='HANDLE'")
+    gui.point_at_view()
+    keep("groups")
+    told("Switch *Group Colors* off again")
+    gui.press(".meshfree.show_groups")
+    gui.wait_until(f"not {CORAL}.meshfree.show_groups")
+    told("press Tab")
+    gui.point_at_view()
+    gui.key("Tab")
+    gui.wait_until(f"{CORAL}.mode == 'OBJECT'")
+
+
+def _box(gui, *corners):
+    """Drag a box between two corners, each x and z."""
+    gui.drag(*(gui.python(f"on_screen(({x}, 0.0, {z}))") for x, z in corners))
+
+
+def scroll(gui, steps):
+    """Turn the mouse wheel over the sidebar, downwards if above zero."""
+    x, y, width, height = gui.region("UI")
+    for _ in range(abs(steps)):
+        gui.click(x + 0.4 * width, y + 0.5 * height, "wheel down" if steps > 0 else "wheel up")
+
+
+def _find(gui, press, button):
+    """Press a button of the panel, or open a panel there, wherever one has to scroll to."""
+    for steps in (0, -60, 12, 12, 12, 12, 12):
+        scroll(gui, steps)
+        try:
+            return press(button)
+        except WindowError as error:
+            unseen = error
+    raise unseen
+
+
+def bend(gui, told, keep):
+    """Step 4: bind, move and turn."""
+    told("Open *Bend*")
+    _find(gui, gui.open_panel, ".meshfree.deform.handles")
+    told("press *Bind*")
+    _find(gui, gui.press, "meshfree.deform_bind")
+    gui.wait_until("'coral Handle' in bpy.data.objects", 240)
+    gui.wait_until(f"not {WORKING}")
+    told("Click it to select it")
+    gui.click(*gui.python(f"on_screen({HANDLE}.matrix_world.translation)"))
+    gui.wait_until("bpy.context.object.name == 'coral Handle'")
+    told("Press G, Z and 1, and Return")
+    gui.key("g", "z", "1", "Return")
+    gui.wait_until(f"{MOVED} > 0.9")
+    told("Press R, Y and 60, and Return")
+    gui.key("r", "y", "6", "0", "Return")
+    gui.wait_until(f"{CORAL}.data['lb_pose'][0] == 1.0", 60)
+    gui.settle()
+    keep("bent")
+
+
+def color(gui, told, keep):
+    """Step 5: how far the points went, and what the bent shape is like."""
+    told("Click the coral")
+    gui.click(*gui.python("on_screen((0.0, 0.0, 0.3))"))
+    gui.wait_until("bpy.context.object.name == 'coral'")
+    told("press *Displacement* under *Display*")
+    _find(gui, gui.press, 'meshfree.colormap(attribute="lb_displacement"')
+    gui.point_at_view()
+    keep("display")
+    told("Press *Apply* under *Bend*")
+    _find(gui, gui.press, "meshfree.deform_apply")
+    gui.wait_until(f"{MOVED} == 0.0")
+    told("then *Analyze Points* at the top")
+    _find(gui, gui.press, "meshfree.analyze")
+    gui.wait_until(WORKING)
+    gui.wait_until(f"not {WORKING}", 240)
+    told("and *Mean Curvature* under *Display*")
+    _find(gui, gui.press, 'meshfree.colormap(attribute="lb_mean_curvature"')
+
+
+def render(gui, told, keep):
+    """Step 6: a picture by the camera."""
+    gui.python("rendered = []; bpy.app.handlers.render_complete.append(lambda *_: rendered.append(True))")
+    told("Look at the coral from where you like, with room around it")
+    x, y = gui.view_center()
+    gui.drag((x, y), (x + 60, y - 20), "middle")
+    for _ in range(4):
+        gui.click(x, y, "wheel down")
+    told("press Ctrl+Alt+Numpad 0")
+    gui.key("ctrl+alt+KP_0")
+    gui.wait_until("view3d()[0].spaces.active.region_3d.view_perspective == 'CAMERA'")
+    told("set *Standard* right there")
+    _find(gui, lambda button: _choose_above(gui, button), ".view_settings.view_transform")
+    told("Press *Legend in Renders*")
+    _find(gui, gui.press, "meshfree.legend")
+    told("then F12")
+    gui.point_at_view()
+    gui.key("F12")
+    gui.wait_until("rendered", 240)
+    keep("result")
+
+
+def _choose_above(gui, setting):
+    """Choose an entry of a list that opens where the mouse is: *Standard*, which is two entries before AgX."""
+    x, y = gui.find_button(setting, across=0.7)
+    for step in (-42, 42, -21, 21):
+        gui.click(x, y)
+        gui.click(x, y + step)
+        if gui.python("bpy.context.scene.view_settings.view_transform") == "Standard":
+            return
+    raise WindowError("The list has no entry Standard where it should be")
+
+
+STEPS = (import_sample, analyze, choose, bend, color, render)
+
+
+def play(gui, keep):
+    """Play all steps; `keep` gets the name of each picture that the tutorial has."""
+    gui.open_panels("MESHFREE_PT_display")  # the one that is open before anybody opens or closes some
+    gui.new_file()
+    gui.python("bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'")
+    (gui.folder / SAMPLE.name).write_bytes(SAMPLE.read_bytes())  # where the file browser opens
+    told = Reader((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"))
+    for step in STEPS:
+        step(gui, told, keep)
+    told.end()

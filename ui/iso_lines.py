@@ -1,0 +1,134 @@
+"""Makes a curve object of the iso lines that are shown."""
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty, IntProperty
+
+from .. import core
+from ..operators.objects.attributes import own_positions, read_attribute
+from ..operators.objects.place import OFFSET
+from ..operators.running.application import ApplicationOperator, operator_reader
+from ..operators.tools.mesh import surface_mesh
+from .display import component, label, shown_attribute, shown_range, sloping, step_colors
+
+_COUNT = 10  # of lines, where none are shown
+_UNKNOWN = 1e-6  # share of points without a value, from which on a place has none
+
+
+class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
+    """Make a curve object of the iso lines of what is shown, at the same values, on the faces or through the points"""
+
+    bl_idname = "meshfree.iso_lines_to_curves"
+    bl_label = "Iso Lines to Curves"
+    adjustable = ("count", "thickness")
+    only_active = True
+
+    count: IntProperty(
+        name="Iso Lines",
+        description="How many even steps of the color range have a line in their middle; as many as are shown unless"
+        f" given, or {_COUNT} where none are",
+        default=_COUNT,
+        min=1,
+        soft_max=50,
+        max=1000,
+        options={"SKIP_SAVE"},
+    )
+    thickness: FloatProperty(
+        name="Thickness",
+        description="Radius of tubes along the lines; with 0 they are seen in viewports only",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+
+    def becomes_single(self, obj):
+        return False  # its mesh stays as it is
+
+    def plan(self, context, obj):
+        if not self.properties.is_property_set("count"):
+            self.count = obj.meshfree.iso_lines or _COUNT
+        name, values, (low, high) = _shown(obj)
+        levels = low + (np.arange(self.count) + 0.5) / self.count * (high - low)
+        surface = (
+            _on_faces(obj, values) if obj.type == "MESH" and obj.data.polygons else _on_points(context, obj, values)
+        )
+
+        def compute(progress):
+            vertices, faces, carried = surface(progress)
+            lines = core.iso_lines(vertices, faces, carried, levels)
+            if not lines:
+                raise core.PointCloudError(
+                    f"{label(name)} has no lines at {self.count} values from {levels[0]:g} to {levels[-1]:g}. Let the"
+                    " range reach over the values, or raise the number of lines."
+                )
+            return lines
+
+        return compute
+
+    def write(self, context, obj, result):
+        name = f"{obj.name} Iso Lines"
+        made = bpy.data.objects.new(name, _curve(name, result, self.thickness))
+        for collection in obj.users_collection:
+            collection.objects.link(made)
+        made.matrix_world = obj.matrix_world
+        if OFFSET in obj:
+            made[OFFSET] = obj[OFFSET]
+        levels = len({line.level for line in result})
+        return [f"{made.name}: {len(result):,} lines at {levels:,} values of {label(shown_attribute(obj))}"]
+
+
+def _shown(obj):
+    """Read what an object shows: its attribute's name, the numbers, NaN for unknown ones, and their range."""
+    name, bounds = shown_attribute(obj), shown_range(obj)
+    if bounds is None or step_colors(obj):
+        raise core.PointCloudError(
+            f'"{obj.name}" shows no numbers that change along the surface. Show such an attribute, or one component of'
+            " a vector, under Display first."
+        )
+    values = read_attribute(obj.data, name)
+    (shown,) = sloping(
+        name, values if values.dtype.kind == "f" else values.astype(float), component(name, obj.meshfree)
+    )
+    return name, shown, bounds
+
+
+def _on_faces(obj, values):
+    """Return a function that gives vertices, triangles and values on them."""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    found = own_positions(mesh), triangles.reshape(-1, 3), values
+    return lambda progress: found
+
+
+def _on_points(context, obj, values):
+    """Return a function that gives vertices, faces and values on them, of a mesh that is made of the points."""
+    reading, operator = operator_reader(context, obj)
+
+    def compute(progress):
+        mesh, carrying = surface_mesh(operator(progress), 1.0, progress)
+        known, count = np.isfinite(values), len(mesh.vertices)
+        carried = carrying.interpolate(np.where(known, values, 0.0))[-count:]
+        if not known.all():
+            carried[carrying.interpolate(np.where(known, 0.0, 1.0))[-count:] > _UNKNOWN] = np.nan
+        return reading.local(mesh.vertices), mesh.faces, carried
+
+    return compute
+
+
+def _curve(name, lines, thickness):
+    """Return a curve of straight pieces."""
+    curve = bpy.data.curves.new(name, "CURVE")
+    curve.dimensions = "3D"
+    curve.bevel_depth = thickness
+    for line in lines:
+        spline = curve.splines.new("POLY")
+        spline.points.add(len(line.points) - 1)
+        places = np.column_stack([line.points, np.ones(len(line.points))])
+        spline.points.foreach_set("co", places.astype(np.float32).reshape(-1))
+        spline.use_cyclic_u = line.closed
+    return curve
+
+
+CLASSES = (MESHFREE_OT_iso_lines_to_curves,)

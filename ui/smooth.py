@@ -1,0 +1,93 @@
+"""Slopes of what an object shows along its surface, so that colours run on from one disc to the next."""
+
+import zlib
+
+import numpy as np
+
+from .. import core
+from ..operators.objects.attributes import (
+    DISC,
+    SLOPE,
+    SLOPE_2,
+    SLOPE_OF,
+    own_positions,
+    read_attribute,
+    write_attribute,
+)
+from ..operators.objects.reading import sharing_objects
+from ..operators.running import cache
+
+_BOUNDS = -3e38, 3e38  # of single precision: steeper ones, of huge values on a tiny object, count as these
+
+
+def follow(obj, name, part, columns, spacing):
+    """Keep with the points of an object the slopes of what it shows, if there are discs that can show them.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name, part : str
+        The attribute that is shown, and what of it.
+    columns : sequence of ndarray, (n,)
+        The numbers shown, one or two each point; none where what is shown has no slopes.
+    spacing : float
+        Of the points: the length in which discs are kept.
+    """
+    kept, data = obj.meshfree, obj.data
+    if not _is_writable(data):  # as in Edit Mode: those from before are of use for what was shown before
+        kept.slopes_of = kept.slopes_of if columns and kept.slopes_of.startswith(f"{part} {name} ") else ""
+        return
+    discs, points = _discs(data), own_positions(data)
+    if not columns or discs is None or not np.isfinite(points).all():
+        kept.slopes_of = ""
+        if not any(other.meshfree.slopes_of for other in sharing_objects(obj)):
+            _remove(data, (SLOPE, SLOPE_2, SLOPE_OF))
+        return
+    wanted = f"{part} {name} {_checksum(points, discs, *columns)} {spacing:.6g}"
+    holders = [other for other in (obj, *sharing_objects(obj)) if other.meshfree.slopes_of == wanted]
+    if not holders or SLOPE not in data.attributes:
+        slopes = cache.fetch(cache.content("slopes", points, discs, spacing), lambda: _slopes(points, discs, spacing))
+        _remove(data, (SLOPE, SLOPE_2)[len(columns) :])
+        for kind, values in zip((SLOPE, SLOPE_2), columns, strict=False):
+            write_attribute(data, kind, np.clip(slopes.of(values), *_BOUNDS))
+        write_attribute(data, SLOPE_OF, _as_number(read_attribute(data, name)))
+        for other in sharing_objects(obj):
+            other.meshfree.slopes_of = ""
+    kept.slopes_of = wanted
+
+
+def _is_writable(data):
+    return data.is_editable and data.override_library is None and not getattr(data, "is_editmode", False)
+
+
+def _discs(data):
+    """Read the discs of points, (n, 3), in spacings; None where there are none."""
+    layer = data.attributes.get(DISC)
+    known = layer is not None and (layer.data_type, layer.domain) == ("FLOAT_VECTOR", "POINT")
+    return read_attribute(data, DISC) if known else None
+
+
+def _checksum(*arrays):
+    checksum = 0
+    for array in arrays:
+        checksum = zlib.crc32(np.ascontiguousarray(array), checksum)
+    return f"{checksum:08x}"
+
+
+def _slopes(points, discs, spacing):
+    radii = np.linalg.norm(discs, axis=1)
+    normals = np.divide(
+        discs, radii[:, None], out=np.tile([0.0, 0.0, 1.0], (len(discs), 1)), where=radii[:, None] > 0.0
+    )
+    return core.Slopes(points, core.Discs(normals, radii.astype(np.float64) * spacing))
+
+
+def _as_number(values):
+    """Return values as Blender takes them for numbers: the means of vectors, in single precision."""
+    return values if values.ndim == 1 else sum(values.T) / np.float32(values.shape[1])
+
+
+def _remove(data, names):
+    for name in names:
+        if name in data.attributes:
+            data.attributes.remove(data.attributes[name])

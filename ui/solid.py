@@ -1,0 +1,98 @@
+"""Colours of what an object shows for viewports in Solid, which know no materials: as attributes of its points."""
+
+import numpy as np
+
+from ..operators.objects.attributes import (
+    DISC,
+    SLOPE,
+    SLOPE_2,
+    SOLID,
+    TILT,
+    in_edit_mesh,
+    point_count,
+    read_attribute,
+    write_attribute,
+)
+from . import colormaps
+from .nodes import BEYOND, direction_color
+from .value_range import CLASSES, STEPPED
+
+
+def number_colors(color_map, low, high, settings):
+    """Return a function that gives the linear colours of numbers, (n,) to (n, 4), as a material shows them.
+
+    Parameters as in `nodes.color_by_number`; what is hidden beyond the range is not.
+    """
+    colors = np.array(colormaps.colors(color_map, settings.reverse))
+    margin = 0.5 if color_map in STEPPED else 0.0
+
+    def of(values):
+        if color_map in STEPPED:
+            whole = np.rint(values).astype(int)
+            steps = np.where(whole < 0, 0, 1 + whole % CLASSES) if color_map == "CATEGORICAL" else np.clip(whole, 0, 1)
+            result = colors[steps]
+        else:
+            place = np.clip((values - low) / (high - low), 0.0, 1.0) * (len(colors) - 1)
+            result = np.stack([np.interp(place, range(len(colors)), column) for column in colors.T], axis=1)
+        beyond = (values < low - margin) | (values > high + margin)
+        return np.where(beyond[:, None], BEYOND, result) if settings.outside == "GRAY" else result
+
+    return of
+
+
+def direction_colors(vectors):
+    """Return the linear colours of directions, (n, 3) to (n, 4)."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    red, green, blue, alpha = direction_color((vectors / np.where(length > 0.0, length, 1.0)).T)
+    return np.stack([red, green, blue, np.full(len(red), alpha)], axis=1)
+
+
+def follow(obj, values, colors_of, radius):
+    """Keep the colours of what an object shows with its points, and say which colour attribute is to get them.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    values : ndarray, (n,) or (n, 3)
+        The numbers or directions.
+    colors_of : callable, or None
+        Gives their colours, (n, 4); None where Solid cannot show what is shown.
+    radius : float
+        Of discs, in local lengths.
+
+    Returns
+    -------
+    str
+        The colour attribute that viewports in Solid look at; empty where none is to be changed.
+    """
+    data = obj.data
+    if obj.type != "MESH" or in_edit_mesh(obj) or not data.is_editable or data.override_library is not None:
+        return ""
+    if colors_of is None or not np.isfinite(values).all():
+        _remove(data, SOLID, TILT)
+        return ""
+    write_attribute(data, SOLID, colors_of(values), "FLOAT_COLOR")
+    if SLOPE in data.attributes and SLOPE_2 not in data.attributes and values.ndim == 1:
+        write_attribute(data, TILT, _tilts(data, values, colors_of, radius))
+    else:
+        _remove(data, TILT)
+    if not data.color_attributes.active_color_name:
+        data.color_attributes.active_color_name = SOLID
+    return data.color_attributes.active_color_name
+
+
+def _tilts(data, values, colors_of, radius):
+    """Return by how much colours change where values rise by one, (n, 3), as they do on average across each disc."""
+    steep = np.linalg.norm(read_attribute(data, SLOPE), axis=1)
+    rise = steep * radius * np.linalg.norm(read_attribute(data, DISC), axis=1)
+    some = rise > 1e-6 * max(float(np.ptp(values)), 1e-30)
+    tilts = np.zeros((point_count(data), 3))
+    low, high = values[some] - rise[some], values[some] + rise[some]
+    tilts[some] = (colors_of(high) - colors_of(low))[:, :3] / (high - low)[:, None]
+    return tilts
+
+
+def _remove(data, *names):
+    for name in names:
+        if name in data.attributes:
+            data.attributes.remove(data.attributes[name])

@@ -1,0 +1,66 @@
+"""Texts in panels of any width: Blender cuts the middle out of a line that does not fit."""
+
+import re
+
+import blf
+
+_FONT = 0  # Blender's own
+_MARGIN = 38.0  # around what is in a panel, in units of the user interface
+_TABS = 20.0  # of a sidebar
+_ICON = 20.0
+_WORD = re.compile(r"\S*\d (?:%|[a-zµ]{0,2}m[²³]?)(?!\w)\S*|\S+")  # a number stays with its unit
+_PADDING = 12.0  # of a button beside its text
+_SPLIT = 210.0  # room from which on names stand before settings
+
+
+def draw_text(layout, context, text: str, icon: str = "NONE", taken: float = 0.0):
+    """Draw a text as labels, one below the other, as many as the width of the region asks for.
+
+    What stands beside it in its row, or around it, has `taken` so much of the width, in units of the user interface.
+    """
+    column = layout.column(align=True)
+    for line in wrapped(text, _room(context, taken + (_ICON if icon != "NONE" else 0.0)), _measure(context)):
+        column.label(text=line, icon=icon)
+        icon = "BLANK1" if icon != "NONE" else icon
+
+
+def beside_or_below(layout, context, *texts: str):
+    """Return a row for so many things of the same width, with these texts; a column where one would be cut."""
+    measure = _measure(context)
+    widest = max(map(measure, texts)) + _PADDING * context.preferences.system.ui_scale
+    return (layout.row if len(texts) * widest <= _room(context, 0.0) else layout.column)(align=True)
+
+
+def split_properties(layout, context):
+    """Let names of settings stand before them, or within them where there is no room for that."""
+    layout.use_property_split = _room(context, 0.0) >= _SPLIT * context.preferences.system.ui_scale
+    layout.use_property_decorate = False
+
+
+def wrapped(text: str, room: float, measure) -> list:
+    """Break a text between words into lines that fit into some room, by a function that measures a line."""
+    lines = []
+    for word in _WORD.findall(text):
+        if lines and measure(f"{lines[-1]} {word}") <= room:
+            lines[-1] = f"{lines[-1]} {word}"
+        else:
+            lines.append(word)
+    return lines
+
+
+def _room(context, taken):
+    """Return the pixels that a line of text may take in a region."""
+    region = context.region
+    if region is None:  # without a window there is no end
+        return float("inf")
+    scale = context.preferences.system.ui_scale
+    tabs = _TABS if region.type == "UI" else 0.0
+    left, right = (region.view2d.region_to_view(x, 0.0)[0] for x in (0.0, region.width))  # it may be zoomed
+    return right - left - scale * (_MARGIN + tabs + taken)
+
+
+def _measure(context):
+    """Return a function that gives the width of a text as panels write it, in pixels."""
+    points = context.preferences.ui_styles[0].widget.points
+    blf.size(_FONT, points * context.preferences.system.ui_scale)
+    return lambda text: blf.dimensions(_FONT, text)[0]
