@@ -255,7 +255,7 @@ def render(gui, told, keep):
 
 def _choose_standard(gui, setting):
     """Go through the entries of the list that the mouse is on, by its wheel and Ctrl, to *Standard*."""
-    x, y = gui.find_button(setting, across=0.7)
+    gui.find_button(setting, across=0.7)  # which leaves the mouse there
     for _ in range(6):
         if gui.python("bpy.context.scene.view_settings.view_transform") == "Standard":
             return
