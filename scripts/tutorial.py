@@ -243,7 +243,7 @@ def render(gui, told, keep):
     gui.key("ctrl+alt+KP_0")
     gui.wait_until("view3d()[0].spaces.active.region_3d.view_perspective == 'CAMERA'")
     told("set *Standard* right there")
-    _find(gui, lambda button: _choose_above(gui, button), ".view_settings.view_transform")
+    _find(gui, lambda button: _choose_standard(gui, button), ".view_settings.view_transform")
     told("Press *Legend in Renders*")
     _find(gui, gui.press, "meshfree.legend")
     told("then F12")
@@ -253,15 +253,15 @@ def render(gui, told, keep):
     keep("result")
 
 
-def _choose_above(gui, setting):
-    """Choose an entry of a list that opens where the mouse is: *Standard*, which is two entries before AgX."""
-    x, y = gui.find_button(setting, across=0.7)
-    for step in (-42, 42, -21, 21):
-        gui.click(x, y)
-        gui.click(x, y + step)
+def _choose_standard(gui, setting):
+    """Go through the entries of the list that the mouse is on, by its wheel and Ctrl, to *Standard*."""
+    gui.find_button(setting, across=0.7)  # which leaves the mouse there
+    for _ in range(6):
         if gui.python("bpy.context.scene.view_settings.view_transform") == "Standard":
             return
-    raise WindowError("The list has no entry Standard where it should be")
+        gui.run("xdotool", "keydown", "ctrl", "click", "4", "keyup", "ctrl")
+        gui.settle()
+    raise RuntimeError("The list has no entry Standard")
 
 
 STEPS = (import_sample, analyze, choose, bend, color, render)
