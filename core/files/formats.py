@@ -89,16 +89,23 @@ def read_points(path, columns="", las=LasChoices()) -> PointTable:
 
 def _doubts(table, path):
     """Yield what a user should know about the coordinates of a table."""
-    steps = np.spacing(np.abs(table.points).max(axis=0).astype(np.float32))
+    units = np.ones(3)
     if table.degrees or look_like_degrees(table.points):
         known = "are" if table.degrees else "look like"
         yield (
             f"{path.name}: x and y {known} degrees of longitude and latitude, in which lengths, areas and curvatures"
             " mean nothing. Project the points to meters first."
         )
-        steps[:2] *= _DEGREE
-    if table.single and steps.max() * 8192.0 > np.ptp(table.points, axis=0).max():
-        step = np.spacing(np.float32(np.abs(table.points).max()))
+        units[:2] = _DEGREE
+    if table.single:
+        yield from told_steps(table.points, path, units)
+
+
+def told_steps(points, path, units=1.0):
+    """Yield that points, (n, 3), were kept in single precision, where its steps, in some units, are wide for them."""
+    steps = units * np.spacing(np.abs(points).max(axis=0).astype(np.float32))
+    if steps.max() * 8192.0 > np.ptp(points, axis=0).max():
+        step = np.spacing(np.float32(np.abs(points).max()))
         yield (
             f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in double"
             " precision, or with a shift."

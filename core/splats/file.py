@@ -16,6 +16,7 @@ from ..files import (
     read_vertex_names,
     reading,
     replacing,
+    told_steps,
     write_vertex_columns,
 )
 from . import packed
@@ -172,6 +173,8 @@ def _from_vertices(vertices: PlyVertices, path) -> Splats:
     positions = stack(columns, PLACES)
     check_places(positions, path)
     rest, odd = _harmonic_columns(columns, path)
+    single = [columns[axis].dtype == np.float32 for axis in PLACES]
+    wide = told_steps(positions[:, single], path) if any(single) else ()
     return Splats(
         positions=positions,
         scales=decode_scales(stack(columns, SCALES)),
@@ -179,7 +182,7 @@ def _from_vertices(vertices: PlyVertices, path) -> Splats:
         opacities=decode_opacities(columns[OPACITY].astype(np.float64)),
         colors=stack(columns, COLORS),
         harmonics=stack(columns, rest, np.float32).reshape(len(positions), 3, -1).swapaxes(1, 2),
-        notices=[*vertices.notices, *left_out, *odd],
+        notices=[*vertices.notices, *left_out, *wide, *odd],
         file=SplatFile(columns, vertices.order or "<", tuple(vertices.comments)),
     )
 

@@ -220,6 +220,15 @@ def test_far_away_places_are_written_in_double_precision(tmp_path):
     np.testing.assert_array_equal(core.read_splats(tmp_path / "far.ply").positions, splats.positions)
 
 
+@pytest.mark.parametrize(("kind", "count"), [(np.float32, 1), (np.float64, 0)])
+def test_wide_steps_of_single_precision_are_told(tmp_path, kind, count):
+    columns = splat_files.some_columns(30)
+    columns["y"] = (columns["y"] + 5412893.0).astype(kind)
+    notices = read_as_trained(tmp_path, columns).notices
+    assert len(notices) == count
+    assert all("kept in single precision, in steps of 0.5" in notice for notice in notices)
+
+
 def test_more_harmonics_than_the_file_had_are_written(tmp_path):
     splats = read_as_trained(tmp_path, splat_files.some_columns(20, 3))
     more = np.random.default_rng(2).standard_normal((20, 15, 3)).astype(np.float32)
