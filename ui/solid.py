@@ -85,9 +85,10 @@ def _tilts(data, values, colors_of, radius):
     """Return by how much colours change where values rise by one, (n, 3), as they do on average across each disc."""
     steep = np.linalg.norm(read_attribute(data, SLOPE), axis=1)
     rise = steep * radius * np.linalg.norm(read_attribute(data, DISC), axis=1)
-    some = rise > 1e-6 * max(float(np.ptp(values)), 1e-30)
+    low, high = values - rise, values + rise
+    some = (rise > 1e-6 * max(float(np.ptp(values)), 1e-30)) & (high > low)  # values may differ by rounding alone
+    low, high = low[some], high[some]
     tilts = np.zeros((point_count(data), 3))
-    low, high = values[some] - rise[some], values[some] + rise[some]
     tilts[some] = (colors_of(high) - colors_of(low))[:, :3] / (high - low)[:, None]
     return tilts
 
