@@ -34,17 +34,38 @@ def find_outliers(nearest):
     ndarray, (m,) bool
     """
     surface, result = nearest.quadrics, np.zeros(len(nearest.points), dtype=bool)
+    alone = _Alone(nearest, surface)
     # The first search finds most outliers, each other one what these had hidden.
-    while (new := _off_surface(nearest, surface, result) & ~result).any():
+    while (new := _off_surface(nearest, surface, alone, result) & ~result).any():
         result |= new
         # The quadrics around them go on without them.
         rows = np.flatnonzero(new[nearest.index].any(axis=1))
         nearest = nearest.keep(~result[nearest.index])
         surface = surface.put(rows, fit_quadrics(nearest.points, nearest.index[rows], nearest.weight[rows], rows))
+        alone.forget(rows)
     return result
 
 
-def _off_surface(nearest, surface, known):
+class _Alone:
+    """The quadrics of points without the neighbours off them, fitted where they are asked for, and kept."""
+
+    def __init__(self, nearest, surface):
+        count = len(nearest.points)
+        self.surface, self.scatter, self._known = surface, np.zeros(count), np.zeros(count, dtype=bool)
+
+    def forget(self, rows):
+        """Fit those of some points, whose neighbours are others now, anew when they are asked for."""
+        self._known[rows] = False
+
+    def fit(self, nearest, surface, rows):
+        """Fit those of some points, (k,) int, that are not known, from quadrics through all their neighbours."""
+        rows = rows[~self._known[rows]]
+        fitted, self.scatter[rows] = _let_go(nearest, surface, rows)
+        self.surface = self.surface.put(rows, fitted)
+        self._known[rows] = True
+
+
+def _off_surface(nearest, surface, alone, known):
     """Tell which points lie off the surface, those that are known to among them, (m,) bool."""
     spacing, result = nearest.spacing, known.copy()
     off = _third(_heights(nearest, surface, np.arange(len(spacing))))
@@ -53,10 +74,9 @@ def _off_surface(nearest, surface, known):
     if not len(suspects):
         return result
     witnesses = _witnesses(nearest, suspects)
-    rows = np.unique(witnesses)
-    surface, scatter = _let_go(nearest, surface, rows)
-    scatter = scatter[np.searchsorted(rows, witnesses)]
-    height = _heights(nearest, surface, suspects)
+    alone.fit(nearest, surface, np.unique(witnesses))
+    scatter = alone.scatter[witnesses]
+    height = _heights(nearest, alone.surface, suspects)
     height /= ON * spacing[suspects, None] + _SCATTERS * scatter
     height[sparse[suspects, None] & (scatter > FILLING * spacing[witnesses])] = np.inf
     found = -1
@@ -88,16 +108,35 @@ def _heights(nearest, surface, rows):
 
 
 def _let_go(nearest, surface, rows):
-    """Fit the quadrics of some points again without the neighbours off them, and tell how these scatter, (k,).
+    """Fit the quadrics of some points, (k,) int, again without the neighbours off them, and tell how these scatter.
 
-    The scatter is the standard deviation of normal values with the same median.
+    Returns
+    -------
+    Quadrics
+        Of the k points.
+    scatter : ndarray, (k,)
+        Standard deviation of normal values with the same median.
     """
-    points, index, spacing = nearest.points, nearest.index[rows], nearest.spacing[rows]
-    height, scatter = _scatter(surface, points, rows, index)
-    far = height / np.maximum(_SCATTERS * scatter, ON * spacing)[:, None]
-    weight = nearest.weight[rows] * np.maximum(1.0 - far**2, 1e-3) ** 2
-    surface = surface.put(rows, fit_quadrics(points, index, weight, rows))
-    return surface, _scatter(surface, points, rows, index)[1]
+    points, spacing = nearest.points, nearest.spacing
+    weight = np.empty((len(rows), nearest.index.shape[1]))
+
+    def weigh(part):
+        block = rows[part]
+        height, scatter = _scatter(surface, points, block, nearest.index[block])
+        far = height / np.maximum(_SCATTERS * scatter, ON * spacing[block])[:, None]
+        weight[part] = nearest.weight[block] * np.maximum(1.0 - far**2, 1e-3) ** 2
+
+    parts = blocks(len(rows), _BLOCK)
+    on_all_cores(weigh, parts)
+    index, result = nearest.index[rows], np.empty(len(rows))
+    fitted = fit_quadrics(points, index, weight, rows)
+    surface = surface.put(rows, fitted)
+
+    def measure(part):
+        result[part] = _scatter(surface, points, rows[part], index[part])[1]
+
+    on_all_cores(measure, parts)
+    return fitted, result
 
 
 def _scatter(surface, points, rows, index):

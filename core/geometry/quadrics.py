@@ -179,9 +179,13 @@ def heights_over(quadrics, points, rows, other):
     -------
     ndarray, (k, views)
     """
-    offset = points[other] - points[rows] - quadrics.height[rows]
-    bend = 0.5 * np.einsum("...a,...ab,...b->...", offset, quadrics.shape_operator[rows], offset)
-    return np.einsum("...a,...a->...", offset, quadrics.normals[rows]) + bend
+    x, y, z = (points[other, axis] - (points[:, axis] + quadrics.height[:, axis])[rows] for axis in range(3))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = (
+        [quadrics.shape_operator[:, row, column][rows] for column in range(3)] for row in range(3)
+    )
+    bend = 0.5 * (xx * x**2 + yy * y**2 + zz * z**2) + xy * x * y + xz * x * z + yz * y * z
+    a, b, c = (quadrics.normals[:, axis][rows] for axis in range(3))
+    return a * x + b * y + c * z + bend
 
 
 def frames(normals):
