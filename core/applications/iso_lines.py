@@ -79,7 +79,8 @@ def iso_lines(vertices, faces, values, levels):
 
 def _checked(vertices, faces, values, levels):
     """Return what `iso_lines` takes as arrays, with triangles for faces."""
-    vertices = check_positions(vertices, len(as_array(vertices, "Vertices")), "vertices", "vertex")
+    count = len(np.atleast_1d(as_array(vertices, "Vertices")))
+    vertices = check_positions(vertices, count, "vertices", "vertex")
     faces, values = as_array(faces, "Faces"), as_array(values, "Values")
     if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu":
         raise InvalidPointsError(

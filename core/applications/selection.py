@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ..arguments import real
-from ..errors import PointCloudError
+from ..arguments import as_array, as_doubles, real
+from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from .graph import near_graph
 
@@ -110,16 +110,30 @@ def front_point(points, eye, direction, reach):
     >>> print(points[seen, 2].round(1))
     1.0
     """
-    offset = np.asarray(points, dtype=np.float64) - np.asarray(eye, dtype=np.float64)
-    length = np.linalg.norm(direction)
+    places, eye, direction = _vectors(points, "points", 2), _vectors(eye, "eye", 1), _vectors(direction, "direction", 1)
+    length, reach = np.linalg.norm(direction), real(reach)
     if not 0.0 < length < np.inf:
         raise PointCloudError("The direction of the ray has no length. Give one that is not zero.")
-    axis = np.asarray(direction, dtype=np.float64) / length
-    with np.errstate(invalid="ignore"):
+    if not reach >= 0.0:
+        raise PointCloudError(f"The reach around the ray is {reach!r}. Use a number that is not negative.")
+    axis = direction / length
+    with np.errstate(invalid="ignore", over="ignore"):
+        offset = places - eye
         depth = offset @ axis
         away = np.linalg.norm(offset - depth[:, None] * axis, axis=1)
     near = np.flatnonzero((depth > 0.0) & (away <= reach))
     return int(near[(depth + _OBLIQUE * away)[near].argmin()]) if len(near) else -1
+
+
+def _vectors(given, name, dimensions):
+    """Return one vector, (3,), or several, (n, 3), in double precision; their numbers may be infinite or none."""
+    array = as_array(given, name.capitalize())
+    if array.ndim != dimensions or array.shape[-1] != 3 or array.dtype.kind not in "iuf":
+        wanted = "(n, 3)" if dimensions == 2 else "(3,)"
+        raise InvalidPointsError(
+            f"The {name} have the shape {array.shape} and type {array.dtype}. Give numbers {wanted}."
+        )
+    return as_doubles(array)
 
 
 def opposite_ends(laplacian, share=0.03):

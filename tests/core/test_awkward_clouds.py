@@ -407,6 +407,11 @@ def calls():
     )
     yield core.grow, on, {"chosen": [0], "distance": 0.3}
     yield core.opposite_ends, on, {"share": 0.05}
+    yield core.front_point, {}, {"points": points, "eye": [0, 0, 5], "direction": [0, 0, -1], "reach": 0.1}
+    corners = np.random.default_rng(0).integers(n, size=(40, 3))
+    yield core.iso_lines, {}, {"vertices": points, "faces": corners, "values": low, "levels": [0.0, 0.1]}
+    yield core.Slopes, {"discs": core.surface_discs(points)}, {"points": points}
+    yield core.Slopes(points, core.surface_discs(points)).of, {}, {"values": low}
     yield (
         core.Deformer,
         on,
