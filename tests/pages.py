@@ -17,7 +17,6 @@ NOT_RUN = {
     "blender --command meshfree analyze IN [IN ...] --out FILE | --out-dir DIR [--modes N] [--format FORMAT]": "a form",
     "blender --command meshfree VERB IN [IN ...] --out FILE | --out-dir DIR [options] [--format FORMAT]": "a form",
     "bpy.ops.meshfree.<name>()": "stands for every operator",
-    'bpy.ops.meshfree.smooth("INVOKE_DEFAULT")': "opens a dialog, which needs a window",
     "blender -b FILE -a": "a form, of a command of Blender",
     "pip install laspy lazrs": "changes the environment, from the internet",
     "pip install open3d==0.19.0": "changes the environment, from the internet",

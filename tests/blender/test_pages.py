@@ -13,7 +13,7 @@ import pytest
 from tests.blender.clouds import add_group, add_object, sphere_points
 from tests.blender.splats import bar_splats
 from tests.blender.test_command import run  # noqa: F401
-from tests.pages import NOT_RUN, ROOT, snippets
+from tests.pages import ROOT, snippets
 from tests.splat_files import write_ply
 
 VERB = ["blender", "--command", "meshfree"]
@@ -122,10 +122,3 @@ def test_verbs_have_the_options_and_choices_of_the_table(extension, capsys, verb
     for option, choices in re.findall(r"(--[\w-]+)(?: ([A-Z]+(?:\\\|[A-Z]+)+))?", options):
         assert re.search(rf"{option}\b", told), option
         assert all(re.search(rf"\b{choice}\b", told) for choice in choices.split(r"\|")), choices
-
-
-def test_calls_that_are_not_run_name_operators_and_settings():
-    calls = [re.fullmatch(r"bpy\.ops\.meshfree\.(\w+)\((.*)\)", text) for text in NOT_RUN]
-    for call in filter(None, calls):
-        known = {item.identifier for item in getattr(bpy.ops.meshfree, call[1]).get_rna_type().properties}
-        assert set(re.findall(r"(\w+)=", call[2])) <= known
