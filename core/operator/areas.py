@@ -15,7 +15,7 @@ from ..options import LaplacianOptions
 from .curvature import kernel_integral, uneven
 from .images import mirror, own_images
 
-_FLOOR = 0.5  # least area in units of the density area; keeps the ratios of Theorem 1's (A1) bounded
+_FLOOR = 0.5  # least area in units of that of the Voronoi cell: all stay positive
 _DEGREES = 100, 50  # of the polynomials of two rounds: the second makes up for what the floor changed in the first
 _WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] can tell from zero
 _EVEN = 1e-9  # changes of h, as a share, that are none

@@ -59,7 +59,7 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         name="Bandwidth",
         description="How far the kernel of each point reaches",
         items=(
-            ("ADAPTIVE", "Adaptive", "As far as uneven spacing demands and curvature permits, point by point"),
+            ("ADAPTIVE", "Adaptive", "As far as the widest gaps between the points around demand, point by point"),
             ("LOCAL", "Local", "Follows the spacing of the points alone"),
             ("GLOBAL", "Global", "The same for all points, as in the paper: for even samples"),
         ),
@@ -97,7 +97,7 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         name="Areas",
         description="How the area of each point is computed",
         items=(
-            ("FAST", "Fast", "Regularized towards the density of the points, with a lower bound"),
+            ("FAST", "Fast", "From the Voronoi cells of the points, so that the kernel integrates to one"),
             ("REGULARIZED", "Regularized", "Least squares with regularization, equation 7 of the paper"),
             ("CONSTRAINED", "Constrained", "The same with positive areas only, equation 8 of the paper"),
             ("UNIFORM", "Uniform", "The mean area for every point: only for even samples"),

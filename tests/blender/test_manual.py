@@ -1,14 +1,10 @@
 """The manual says what the code does: each operator, each setting with its default, examples that run."""
 
-import math
 import re
 from pathlib import Path
 
 import bpy
-import numpy as np
 import pytest
-
-from tests.blender.clouds import add_group, add_object, sphere_points
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = sorted(DOCS.glob("operators/*.md"))
@@ -143,29 +139,3 @@ def test_page(path):
     assert "**How.**" in text
     assert "## Limits" in text
     assert "```python" in text
-
-
-def examples():
-    """Examples in Python on all pages."""
-    for path in sorted(DOCS.rglob("*.md")):
-        for number, code in enumerate(re.findall(r"^```python\n(.*?)^```", read(path), re.MULTILINE | re.DOTALL), 1):
-            yield pytest.param(code, id=f"{path.stem}-{number}")
-
-
-@pytest.mark.parametrize("code", list(examples()))
-def test_example(code, tmp_path, monkeypatch):
-    """It runs with a selected cloud that has a boundary, and the groups that the tools look for."""
-    if "POINTCLOUD" in code and bpy.app.version < (4, 5, 0):
-        pytest.skip("Blender imports no Point Cloud objects before 4.5")
-    monkeypatch.chdir(tmp_path)
-    points = sphere_points(1600)
-    points = points[points[:, 2] > 0.0]
-    np.savetxt("scan.xyz", points)
-    obj = add_object(points)
-    obj.select_set(True)
-    along = points[:, 0]
-    groups = {"Handle": along > 0.9, "Anchor": along < -0.8, "Low": along < -0.8, "High": along > 0.9}
-    for name, members in {**groups, "Source": along > 0.95, "Value": along > 0.9}.items():
-        add_group(obj, name, members)
-    exec(compile(code, "example", "exec"), {"__name__": "example"})
-    assert math.isfinite(bpy.context.object.meshfree.total_area)

@@ -1,0 +1,124 @@
+"""What the pages tell to type with Blender works, on small files and clouds of the names that they give."""
+
+import importlib
+import re
+import shlex
+from dataclasses import replace
+from itertools import pairwise
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.clouds import add_group, add_object, sphere_points
+from tests.blender.splats import bar_splats
+from tests.blender.test_command import run  # noqa: F401
+from tests.pages import ROOT, snippets
+from tests.splat_files import write_ply
+
+VERB = ["blender", "--command", "meshfree"]
+COMMANDS = [one for one in snippets("blender") if shlex.split(one.text)[:3] == VERB]
+OTHERS = [one for one in snippets("blender") if one not in COMMANDS]
+COLUMNS = ["x", "y", "z", "nx", "ny", "nz", "picked", "foot", "head"]
+TABLE = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
+ROWS = re.findall(r"^\| `([\w-]+)` \| \[.*?\| (.*`--.*) \|$", TABLE, re.MULTILINE)
+
+
+def named(found):
+    return pytest.mark.parametrize("snippet", found, ids=lambda snippet: snippet.id)
+
+
+def open_sphere(count=1200, seed=0):
+    """Points of the upper half of a sphere, with a boundary."""
+    points = sphere_points(count, seed)
+    return points[points[:, 2] > -0.2]
+
+
+def columns(points):
+    """Columns of a file, with groups and normals."""
+    tip, foot = points[:, 0] > 0.9, points[:, 0] < -0.8
+    values = [*points.T, *points.T, tip, foot, tip]
+    return dict(zip(COLUMNS, np.float32(values), strict=True))
+
+
+@pytest.fixture
+def folder(core, tmp_path, monkeypatch):
+    """The working folder, with all files that the commands name."""
+    monkeypatch.chdir(tmp_path)
+    scan = open_sphere()
+    for name in ("scan", "plan"):
+        write_ply(tmp_path / f"{name}.ply", columns(scan))
+    table = columns(scan)
+    np.savetxt("scan.csv", np.column_stack(list(table.values())), delimiter=",", header=",".join(table), comments="")
+    around = np.linspace(0.0, 2.0 * np.pi, 40)[:-1]
+    np.savetxt("seam.xyz", np.column_stack([0.8 * np.cos(around), 0.8 * np.sin(around), 0.6 + 0.0 * around]))
+    for name in ("days", "frames", "scans"):
+        (tmp_path / name).mkdir()
+        for number in (1, 2):
+            write_ply(tmp_path / name / f"{name}_{number}.ply", columns(scan * [1.0, 1.0, 1.0 + 0.02 * number]))
+    write_las(tmp_path / "first.las", scan)
+    bar = bar_splats(core)
+    small = replace(bar, positions=np.float32(0.4 * bar.positions), scales=np.float32(0.4 * bar.scales))
+    for name in ("guitar", "a", "b"):
+        core.write_splats(tmp_path / f"{name}.ply", small)
+    [handles] = snippets("json")
+    (tmp_path / "bend.json").write_text(handles.text)
+    return tmp_path
+
+
+def write_las(path, points):
+    """By the laspy that the extension brings."""
+    import laspy
+
+    las = laspy.LasData(laspy.LasHeader(point_format=7, version="1.4"))
+    las.header.scales = [1e-6] * 3
+    las.xyz = points
+    las.write(path)
+
+
+@named(COMMANDS)
+def test_command(run, folder, snippet):  # noqa: F811
+    words = shlex.split(snippet.text)[3:]
+    code, lines = run(*words)
+    assert code == 0, lines
+    for option, output in pairwise(words):
+        if option == "--out":
+            assert (folder / output).is_file()
+        elif option == "--out-dir":
+            assert len(list((folder / output).iterdir())) == len(lines) > 1
+
+
+@named(OTHERS)
+def test_background(folder, snippet):
+    *_, option, code = shlex.split(snippet.text)
+    assert option == "--python-expr"
+    exec(code, {})
+    assert bpy.context.object.meshfree.total_area > 0.0
+
+
+@named(snippets("bpy"))
+def test_code(folder, snippet):
+    """It runs with a selected cloud that has a boundary, and the groups that the tools look for."""
+    if "POINTCLOUD" in snippet.text and bpy.app.version < (4, 5, 0):
+        pytest.skip("Blender imports no Point Cloud objects before 4.5")
+    points = sphere_points(1600)
+    points = points[points[:, 2] > 0.0]
+    np.savetxt("scan.xyz", points)
+    obj = add_object(points)
+    obj.select_set(True)
+    along = points[:, 0]
+    groups = {"Handle": along > 0.9, "Anchor": along < -0.8, "Low": along < -0.8, "High": along > 0.9}
+    for name, members in {**groups, "Source": along > 0.95, "Value": along > 0.9}.items():
+        add_group(obj, name, members)
+    exec(compile(snippet.text, snippet.id, "exec"), {"__name__": "example", "bpy": bpy})
+    assert np.isfinite(bpy.context.object.meshfree.total_area)
+
+
+@pytest.mark.parametrize(("verb", "options"), ROWS)
+def test_verbs_have_the_options_and_choices_of_the_table(extension, capsys, verb, options):
+    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
+    assert command.run([verb, "--help"]) == 0
+    told = capsys.readouterr().out
+    for option, choices in re.findall(r"(--[\w-]+)(?: ([A-Z]+(?:\\\|[A-Z]+)+))?", options):
+        assert re.search(rf"{option}\b", told), option
+        assert all(re.search(rf"\b{choice}\b", told) for choice in choices.split(r"\|")), choices

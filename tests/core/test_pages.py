@@ -1,0 +1,60 @@
+"""What the pages tell to type without Blender works: code, make, modules. And nothing is left to no test."""
+
+import importlib.util
+import re
+import shlex
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from benchmarks.samplings import fibonacci_sphere
+from tests.pages import NOT_RUN, ROOT, snippets, typed
+
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+RUN = {"core", "make", "bpy", "blender", "json"}  # the last three by tests/blender/test_pages.py
+
+
+def by_name(kind):
+    return pytest.mark.parametrize("snippet", snippets(kind), ids=lambda snippet: snippet.id)
+
+
+def test_every_snippet_is_run_or_listed_and_every_listed_one_is_on_a_page():
+    assert {one.text for one in typed() if one.kind not in RUN} <= set(NOT_RUN)
+    assert set(NOT_RUN) <= {one.text for one in typed()}
+
+
+@by_name("core")
+def test_code(snippet):
+    points = fibonacci_sphere(800)
+    exec(compile(snippet.text, snippet.id, "exec"), {"points": points, "values": points[:, 2], "np": np})
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+@by_name("make")
+def test_make_knows_what_to_do(snippet):
+    for name in re.findall(r"\b([A-Z]+)=", snippet.text):
+        assert f"$({name})" in MAKEFILE, f"the Makefile reads no {name}"
+    done = subprocess.run(
+        ["make", "--dry-run", "-C", ROOT, *shlex.split(snippet.text)[1:]], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("text", [text for text in NOT_RUN if "python -m" in text])
+def test_modules_and_the_variables_that_they_read_are_there(text):
+    found = importlib.util.find_spec(text.split()[-1])
+    assert found, text
+    sources = [path.read_text(encoding="utf-8") for path in (ROOT / "benchmarks").rglob("*.py")]
+    for name in re.findall(r"(\w+)=", text):
+        assert any(f'"{name}"' in source for source in sources), name
+
+
+def test_snippets_are_found_in_every_form():
+    found = {(one.page.name, one.text.splitlines()[0], one.kind) for one in typed()}
+    assert ("README.md", "make test", "make") in found
+    assert ("README.md", "bpy.ops.meshfree.analyze(modes=30)", "bpy") in found
+    assert ("install.md", "blender --command meshfree --help", "blender") in found
+    assert ("legend.md", "import bpy", "bpy") in found
+    assert ("ablation.md", "MESHFREE_ZOO=folder python -m benchmarks.ablation", "python") in found

@@ -1,0 +1,85 @@
+"""What the README and the manual tell to type: commands, calls and code, with what no test runs, and why."""
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
+_FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_INDENTED = re.compile(r"(?<=\n\n) {4}.*\n(?:\n* {4}.*\n)*")
+_INLINE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
+_SHELL = r"(?:[A-Z_]+=\S+ )*(make|blender|python|pip) \S.*"
+_TYPED = re.compile(rf"{_SHELL}|bpy\.ops\.\w+\..*")
+
+SLOW = "takes minutes to hours; test_pages.py of the core looks for the module"
+NOT_RUN = {
+    "blender --command meshfree analyze IN [IN ...] --out FILE | --out-dir DIR [--modes N] [--format FORMAT]": "a form",
+    "blender --command meshfree VERB IN [IN ...] --out FILE | --out-dir DIR [options] [--format FORMAT]": "a form",
+    "bpy.ops.meshfree.<name>()": "stands for every operator",
+    "blender -b FILE -a": "a form, of a command of Blender",
+    "pip install laspy lazrs": "changes the environment, from the internet",
+    "pip install open3d==0.19.0": "changes the environment, from the internet",
+    "python -m benchmarks.awkward": SLOW,
+    "python -m benchmarks.holes": SLOW,
+    "python -m benchmarks.orientation": SLOW,
+    "MESHFREE_ZOO=folder python -m benchmarks.ablation": SLOW,
+    "MESHFREE_ZOO=folder python -m benchmarks.real_shapes": SLOW,
+    "MESHFREE_ZOO=folder MESHFREE_RAW=folder python -m benchmarks.meshes": SLOW,
+}
+
+
+class Snippet(NamedTuple):
+    """Something to type: its page, its text, and what it is typed into."""
+
+    page: Path
+    text: str
+    kind: str
+
+    @property
+    def id(self):
+        """The page with the first line that is not an import."""
+        lines = [line for line in self.text.splitlines() if line and not line.startswith(("import ", "from "))]
+        return f"{self.page.stem}: {lines[0][:60]}"
+
+
+def snippets(kind):
+    """All different snippets of a kind on the pages, but for those that are not run."""
+    return list(dict.fromkeys(one for one in typed() if one.kind == kind and one.text not in NOT_RUN))
+
+
+def typed():
+    """All that the pages tell to type, in their order."""
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for language, code in _FENCED.findall(text):
+            yield Snippet(page, code, _kind(code) if language == "python" else language)
+        text = _FENCED.sub("", text)
+        for block in _INDENTED.findall(text):
+            for one in _parts(re.sub(r"^ {4}", "", block, flags=re.MULTILINE)):
+                yield Snippet(page, one, _kind(one))
+        for code in _INLINE.findall(_INDENTED.sub("", text)):
+            if _TYPED.fullmatch(code):
+                yield Snippet(page, code, _kind(code))
+
+
+def _parts(block):
+    """Commands of the shell line by line, without comments, and what stands beside them; all else whole."""
+    parts = block.split("\n\n")
+    if not any(re.match(_SHELL, part) for part in parts):
+        return [block]
+    return [one.rstrip() for part in parts for one in (_lines(part) if re.match(_SHELL, part) else [part])]
+
+
+def _lines(commands):
+    return [line.split("  #")[0] for line in commands.splitlines()]
+
+
+def _kind(text):
+    """What is typed: make, blender, python or pip in a shell, json, or Python with core or with bpy."""
+    command = re.match(_SHELL, text)
+    if command:
+        return command[1]
+    if text.startswith("{"):
+        return "json"
+    return "core" if re.search(r"^(from|import) core\b", text, re.MULTILINE) else "bpy"
