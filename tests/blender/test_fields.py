@@ -160,5 +160,7 @@ class TestGeodesicDistance:
         nodes = strip.modifiers[0].node_group and bpy.data.materials[0].node_tree.nodes
         assert nodes["Iso Lines"].inputs[1].default_value == 12.0
         [line] = [node for node in nodes if node.type == "MATH" and node.operation == "COMPARE"]
-        middle, width = line.inputs[1].default_value, line.inputs[2].default_value
+        even, share = (socket.links[0].from_node for socket in line.inputs[2].links[0].from_node.inputs[:2])
+        middle, width = line.inputs[1].default_value, max(node.inputs[1].default_value for node in (even, share))
+        assert (even.operation, share.operation) == ("MINIMUM", "MULTIPLY")  # of which one is 0
         assert 0.0 < middle - width < middle + width < 1.0  # none where the range is left
