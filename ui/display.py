@@ -37,7 +37,8 @@ def is_in_solid(obj) -> bool:
 def draws_faces(obj) -> bool:
     """Whether viewports draw faces of an object, those of a mesh or discs, and no dots."""
     modifier = find_display(obj)
-    discs = modifier is not None and get_input(modifier, DISCS) and draws_discs(obj)
+    known = modifier is not None and has_input(modifier.node_group, DISCS)
+    discs = known and get_input(modifier, DISCS) and draws_discs(obj)
     return obj.type == "MESH" and bool(discs or obj.data.polygons)
 
 

@@ -439,6 +439,8 @@ def _color(obj, name, values):
 def _follow_in_solid(obj, values, colors_of):
     """Let viewports in Solid show the colors of values, which a function gives; those of the mesh without one."""
     modifier = find_display(obj)
+    if not has_input(modifier.node_group, SOLID_NAME):  # of an earlier version, until it shows something else
+        return
     name = solid.follow(obj, values, colors_of if draws_faces(obj) else None, get_input(modifier, "Radius"))
     set_input(modifier, SOLID_NAME, name)
 

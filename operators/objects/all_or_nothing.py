@@ -67,6 +67,7 @@ class _State:
             obj.matrix_basis = self._place
         for item in [item for item in obj.modifiers if item.name not in self._modifiers]:
             obj.modifiers.remove(item)
+        _put_values(obj.meshfree, self._settings)  # before inputs, which follow settings
         there = [name for name in self._modifiers if name in obj.modifiers]
         for index, name in enumerate(there):
             put_inputs(obj.modifiers[name], self._modifiers[name])
@@ -77,7 +78,6 @@ class _State:
         for name, value in self._own.items():
             if name not in obj or _plain(obj[name]) != value:
                 obj[name] = value
-        _put_values(obj.meshfree, self._settings)
         obj.active_shape_key_index = self._key
 
 

@@ -7,7 +7,7 @@ from mathutils import Euler, Matrix
 from mathutils.bvhtree import BVHTree
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import add_group, add_object, attribute, local_points, sphere_points
+from tests.blender.clouds import CORNERS, add_group, add_object, attribute, local_points, sphere_points
 
 
 @pytest.fixture
@@ -27,14 +27,15 @@ def drawn(obj):
 def test_each_point_is_a_disc_about_its_tangent_plane(obj):
     assert bpy.ops.meshfree.show_surface() == {"FINISHED"}
     offset = drawn(obj) - local_points(obj)[:, None]
-    assert offset.shape[1] == 9  # its middle and eight corners, a little below
+    assert offset.shape[1] == CORNERS  # middle, six corners a little below, and the middle of the cone below
     normals = attribute(obj, "lb_disc") / np.linalg.norm(attribute(obj, "lb_disc"), axis=1)[:, None]
     assert np.abs(np.einsum("ij,ij->i", normals, local_points(obj))).min() > 0.98
     height = np.einsum("ijk,ik->ij", offset, normals)
     size = np.linalg.norm(offset - height[:, :, None] * normals[:, None], axis=2)
-    assert_allclose(np.sort(size, axis=1)[:, 1:], size.max(axis=1)[:, None] * np.ones(8), rtol=1e-3)
-    assert_allclose(np.sort(size, axis=1)[:, 0], 0.0, atol=1e-5)
-    assert_allclose(height, -0.25 * np.cos(np.pi / 8.0) * size, atol=1e-5)
+    assert_allclose(np.sort(size, axis=1)[:, 2:], size.max(axis=1)[:, None] * np.ones(6), rtol=1e-3)
+    assert_allclose(np.sort(size, axis=1)[:, :2], 0.0, atol=1e-5)
+    depth = 0.25 * np.cos(np.pi / 6.0) * size.max(axis=1)
+    assert_allclose(np.sort(height, axis=1), depth[:, None] * [-2.0, *6 * [-1.0], 0.0], atol=1e-5)
 
 
 def sizes(obj):
@@ -47,14 +48,14 @@ def sizes(obj):
 def test_discs_are_those_of_core_at_the_default_size(obj, core):
     bpy.ops.meshfree.show_surface()
     radii = core.surface_discs(local_points(obj)).radii
-    assert_allclose(sizes(obj), 1.1 * radii / np.cos(np.pi / 8.0), rtol=1e-3)
+    assert_allclose(sizes(obj), 1.1 * radii / np.cos(np.pi / 6.0), rtol=1e-3)
 
 
 def test_discs_keep_the_scale_of_the_object_out(obj, core):
     obj.scale = 2.0, 2.0, 2.0
     bpy.context.view_layer.update()
     bpy.ops.meshfree.show_surface()
-    assert_allclose(sizes(obj), 1.1 * core.surface_discs(local_points(obj)).radii / np.cos(np.pi / 8.0), rtol=1e-3)
+    assert_allclose(sizes(obj), 1.1 * core.surface_discs(local_points(obj)).radii / np.cos(np.pi / 6.0), rtol=1e-3)
 
 
 def test_point_shape_and_point_size_answer_at_once(obj):
@@ -68,7 +69,7 @@ def test_point_shape_and_point_size_answer_at_once(obj):
     assert len(obj.evaluated_get(graph).to_mesh().vertices) == 0
     bpy.ops.meshfree.show_surface()
     assert obj.meshfree.point_shape == "DISCS"
-    assert drawn(obj).shape[1] == 9
+    assert drawn(obj).shape[1] == CORNERS
 
 
 def test_results_color_the_discs(obj, extension):
@@ -77,10 +78,10 @@ def test_results_color_the_discs(obj, extension):
     bpy.ops.meshfree.colormap(attribute="lb_area")
     assert extension.ui.display.shown_attribute(obj) == "lb_area"
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
-    assert len(mesh.vertices) == 9 * 600
+    assert len(mesh.vertices) == CORNERS * 600
     values = np.empty(len(mesh.vertices), np.float32)
     mesh.attributes["lb_area"].data.foreach_get("value", values)
-    assert_allclose(values.reshape(600, 9), np.repeat(attribute(obj, "lb_area")[:, None], 9, axis=1))
+    assert_allclose(values.reshape(600, CORNERS), np.repeat(attribute(obj, "lb_area")[:, None], CORNERS, axis=1))
 
 
 def test_a_point_that_was_added_since_is_still_seen(obj):
@@ -117,7 +118,7 @@ def test_a_closed_cloud_shows_no_hole_from_any_side(count):
 
 def test_an_analysis_finds_discs_too(obj):
     bpy.ops.meshfree.analyze()
-    assert drawn(obj).shape[1] == 9
+    assert drawn(obj).shape[1] == CORNERS
     bpy.ops.meshfree.show_surface()
     normals = attribute(obj, "lb_disc")
     bpy.ops.meshfree.analyze()
@@ -288,7 +289,7 @@ class TestImport:
     @pytest.mark.parametrize("up", ["Z", "Y"])
     def test_a_scan_looks_like_a_surface_at_first_sight(self, tmp_path, up, place):
         obj = self.run(tmp_path, sphere_points(600) * (1.0, 2.0, 3.0) + place, up=up)
-        assert drawn(obj).shape == (600, 9, 3)
+        assert drawn(obj).shape == (600, CORNERS, 3)
         found = attribute(obj, "lb_disc")
         bpy.ops.meshfree.show_surface()
         expected = attribute(obj, "lb_disc")
@@ -341,8 +342,8 @@ class TestImport:
         obj = add_object(sphere_points(600))
         bpy.ops.meshfree.show_surface()
         turned = -attribute(obj, "lb_disc")
-        obj.data.attributes["lb_disc"].data.foreach_set("vector", turned.astype(np.float32).ravel())
-        bpy.ops.meshfree.export_points(filepath=str(tmp_path / "again.ply"))
-        bpy.ops.meshfree.import_points(filepath=str(tmp_path / "again.ply"))
+        names = "x y z lb_disc_x lb_disc_y lb_disc_z"  # as files of version 0.2 have them
+        np.savetxt(tmp_path / "again.xyz", np.hstack([local_points(obj), turned]), header=names)
+        bpy.ops.meshfree.import_points(filepath=str(tmp_path / "again.xyz"))
         assert bpy.context.object.name == "again"
         assert_allclose(attribute(bpy.context.object, "lb_disc"), turned, atol=1e-6)
