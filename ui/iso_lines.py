@@ -21,17 +21,17 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
     bl_idname = "meshfree.iso_lines_to_curves"
     bl_label = "Iso Lines to Curves"
     adjustable = ("count", "thickness")
+    at_zero = {"count": "As Shown"}
     only_active = True
 
     count: IntProperty(
         name="Iso Lines",
-        description="How many even steps of the color range have a line in their middle; as many as are shown unless"
-        f" given, or {_COUNT} where none are",
-        default=_COUNT,
-        min=1,
+        description="How many even steps of the color range have a line in their middle; 0 for as many as are shown,"
+        f" or {_COUNT} where none are",
+        default=0,
+        min=0,
         soft_max=50,
         max=1000,
-        options={"SKIP_SAVE"},
     )
     thickness: FloatProperty(
         name="Thickness",
@@ -45,10 +45,9 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
         return False  # its mesh stays as it is
 
     def plan(self, context, obj):
-        if not self.properties.is_property_set("count"):
-            self.count = obj.meshfree.iso_lines or _COUNT
+        count = self.count or obj.meshfree.iso_lines or _COUNT
         name, values, (low, high) = _shown(obj)
-        levels = low + (np.arange(self.count) + 0.5) / self.count * (high - low)
+        levels = low + (np.arange(count) + 0.5) / count * (high - low)
         surface = (
             _on_faces(obj, values) if obj.type == "MESH" and obj.data.polygons else _on_points(context, obj, values)
         )
@@ -58,7 +57,7 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
             lines = core.iso_lines(vertices, faces, carried, levels)
             if not lines:
                 raise core.PointCloudError(
-                    f"{label(name)} has no lines at {self.count} values from {levels[0]:g} to {levels[-1]:g}. Let the"
+                    f"{label(name)} has no lines at {count} values from {levels[0]:g} to {levels[-1]:g}. Let the"
                     " range reach over the values, or raise the number of lines."
                 )
             return lines
