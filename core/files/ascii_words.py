@@ -4,9 +4,23 @@ import re
 import unicodedata
 from itertools import chain, count
 
-_LETTERS = str.maketrans(  # where leaving out an accent does not do
+LETTERS = str.maketrans(  # where leaving out an accent does not do
     {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss", "æ": "ae", "Æ": "Ae", "œ": "oe"}
-    | {"Œ": "Oe", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D", "ð": "d", "Ð": "D", "þ": "th", "Þ": "Th"}
+    | {
+        "Œ": "Oe",
+        "ø": "o",
+        "\u0131": "i",
+        "İ": "I",
+        "Ø": "O",
+        "ł": "l",
+        "Ł": "L",
+        "đ": "d",
+        "Đ": "D",
+        "ð": "d",
+        "Ð": "D",
+        "þ": "th",
+        "Þ": "Th",
+    }
 )
 
 
@@ -32,6 +46,6 @@ def ascii_words(names) -> list:
 
 def _ascii_word(name):
     """Return a name without accents, and _ in place of what is no letter, digit or sign of ASCII."""
-    composed = unicodedata.normalize("NFKC", name).translate(_LETTERS)
+    composed = unicodedata.normalize("NFKC", name).translate(LETTERS)
     letters = "".join(letter for letter in unicodedata.normalize("NFKD", composed) if not unicodedata.combining(letter))
     return re.sub("[^!-~]+", "_", letters) or "_"

@@ -5,7 +5,7 @@ from collections import Counter
 
 from .cells import is_comment
 from .lines import is_number
-from .names import find_places, is_known
+from .names import find_places, is_known, is_other, is_place
 
 _MARKS = "#/%! "
 _MOST_DIGITS = 15  # of a number of a point
@@ -37,16 +37,27 @@ def find_names(rows, numeric) -> list:
     return usual
 
 
-def _split(line, delimiter):
-    """Yield the words of a line that may be names, by all that could separate them."""
-    body = line.strip(" \r\n").lstrip(_MARKS) if is_comment(line) else line.strip(" \r\n")
+def _split(line, delimiter, least=3):
+    """Yield the words of a line that may be names, so many at least, by all that could separate them."""
+    body = _unmarked(line.strip(" \r\n").lstrip(_MARKS) if is_comment(line) else line.strip(" \r\n"))
     bodies = [body.partition(":")[2], body] if is_comment(line) and ":" in body else [body]
     for text in bodies:
         for separator in dict.fromkeys((delimiter or ",", ",", ";", "\t", "|", None)):
             parts = text.split(separator) if separator else _closed(text).split()
             names = [name.strip().strip("\"'").strip() for name in parts]
-            if len(names) > 2:
+            if len(names) >= least:
                 yield names
+
+
+def _unmarked(text):
+    """Return text without a mark of comments before it: any that does not come again, as what separates names does."""
+    mark = re.match(r"(rem\s|[^\w\s\"',|]+)\s*", text, re.IGNORECASE)
+    return text[mark.end() :] if mark and text.count(mark[1]) == 1 else text
+
+
+def names_places(line, delimiter) -> bool:
+    """Tell whether a line names two coordinates or more."""
+    return any(sum(map(is_place, names)) > 1 for names in _split(line, delimiter, least=2))
 
 
 def _closed(text):
@@ -68,7 +79,8 @@ def _fit(names, marked, rows, numeric):
         return _distinct(names) if known or not marked else []
     if marked and lists is None and len(known) < len(names):
         return []
-    if len(names) == width - 1 and (0 not in numeric or counts(rows)):  # R gives no name to those of rows
+    nameless = len(names) == width - 1 and not is_other(names[0])
+    if nameless and (0 not in numeric or counts(rows)):  # R gives no name to those of rows
         names = [None, *names]
     if lists is None:
         names = [*names[:width], *[None] * (width - len(names))]

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from ..errors import InvalidPointsError
 from .cells import is_numeric, kinds, split_row
-from .header import counts, find_names, unnamed
+from .header import counts, find_names, names_places, unnamed
 from .lines import brief
 from .names import find_places, is_other
 
@@ -97,6 +97,8 @@ def find_layout(rows, usual) -> Layout:
     numeric, textual, empty = kinds(rows)
     names = find_names(rows, numeric)
     found = find_places(names, numeric) if names else None
+    if found and not found.sure:  # what counts the points is no guess at a place
+        found = find_places(names, [index for index in numeric if not counts(rows, index)]) or found
     notices = []
     if found:
         places = found.indices
@@ -116,9 +118,18 @@ def find_layout(rows, usual) -> Layout:
         notices.append(
             f"{rows.path.name}: left out {len(numeric) - len(read)} columns or more at the end, which have no names."
         )
-    passed = [line.strip() for line in rows.before if _is_odd_row(line, rows.delimiter)]
+    passed = [
+        line.strip()
+        for line in rows.before
+        if _is_odd_row(line, rows.delimiter) or (not any(names) and names_places(line, rows.delimiter))
+    ]
     if passed:
         notices.append(f"{rows.path.name}: passed over {brief(repr(passed[0]))}, which stands before the first point.")
+    if rows.sample[0] == [str(index) for index in range(rows.width)] and not any(names):
+        notices.append(
+            f"{rows.path.name}: its first row, {' '.join(rows.sample[0])}, is read as a point. Delete it from the file"
+            " if it numbers the columns."
+        )
     return layout
 
 

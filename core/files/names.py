@@ -4,6 +4,8 @@ import re
 import unicodedata
 from typing import NamedTuple
 
+from .ascii_words import LETTERS
+
 
 class _System(NamedTuple):
     """Words for coordinates that go together."""
@@ -16,8 +18,23 @@ class _System(NamedTuple):
 _HEIGHTS = (
     {"z"},
     {"elevation", "elev", "ele", "el"},
-    {"height", "hgt", "ht", "hoehe", "h", "gelaendehoehe", "zed", "hae"},
-    {"altitude", "alt", "altitud", "altura", "hauteur", "altezza", "cota", "quota", "level", "rl", "up", "u"},
+    {
+        "height",
+        "hgt",
+        "ht",
+        "hoehe",
+        "h",
+        "gelaendehoehe",
+        "zed",
+        "hae",
+        "hoogte",
+        "hoyde",
+        "hojde",
+        "hoejd",
+        "wysokosc",
+    },
+    {"altitude", "alt", "altitud", "altura", "hauteur", "altezza", "cota", "quota", "level", "rl", "up", "u"}
+    | {"elevacion", "elevacao", "elevazione", "kot", "nap", "vyska"},
     {"depth", "tiefe"},
 )
 _DEGREES = _System(
@@ -28,8 +45,10 @@ _DEGREES = _System(
 _SYSTEMS = (  # the surest first
     _System({"x"}, {"y"}, _HEIGHTS),
     _System(
-        {"easting", "eastings", "east", "e", "rechtswert", "rechts", "rw", "ostwert", "ost", "este", "est", "utme"},
-        {"northing", "northings", "north", "n", "hochwert", "hoch", "hw", "nordwert", "nord", "norte", "utmn"},
+        {"easting", "eastings", "east", "e", "rechtswert", "rechts", "rw", "ostwert", "ost", "este", "est", "utme"}
+        | {"leste", "oost", "wschod", "saga"},
+        {"northing", "northings", "north", "n", "hochwert", "hoch", "hw", "nordwert", "nord", "norte", "utmn"}
+        | {"noord", "polnoc", "yukari"},
         _HEIGHTS,
     ),
     _DEGREES,
@@ -39,7 +58,7 @@ _SYSTEMS = (  # the surest first
 _ANY = set().union(*(words for system in _SYSTEMS for words in (system.x, system.y, *system.z)))
 _FILLERS = re.compile(  # words that say nothing of what is measured: where, in which system, in which unit
     r"(points?|pts?|p|pos|positions?|locations?|loc|vertex|vertices|vert|cent(er|re)|centroid|mean|wert"
-    r"|grid|map|local|world|global|utm\d*s?|epsg|ecef|geo|gps|gnss|wgs\d*|gk|mga\d*"
+    r"|grid|map|local|world|global|utm\d*s?|epsg|ecef|geo|gps|gnss|wgs\d*|gk|mga\d*|rd|eov"
     r"|msl|asl|tvd(ss)?|nn|nhn|ue|ueber|navd\d*|ellipsoidal|ellipsoid|ellps|ell|orthometric|ortho"
     r"|m|mm|cm|km|ft|usft|feet|met(er|re)s?|deg|degrees?|dd)"
 )
@@ -48,7 +67,7 @@ _JOINED = re.compile(  # without a space as well
 )
 _OTHERS = re.compile(  # of columns that are no places
     r"(.*(id|number|nummer|index|name|time|zeit|date|datum|stamp|code|class|colou?r|norm(al)?|intensity|ance|ivity)"
-    r"|no|nos|nr|num|nbr|label|idx|key|station|sta|pkt|punkt|track|line|ring|channel|beam|row|col|column"
+    r"|no|nos|nr|num|nbr|label|idx|key|station|sta|pkt|punkt|punto|ponto|track|line|ring|channel|beam|row|col|column"
     r"|[dfnuvw][xyz]|t|s|sec|secs|seconds?|hour|min|utc|sod|epoch|week|tow"
     r"|classification|desc|description|layer|remarks?|comments?|type|status|flags?|group|cluster|segment|object"
     r"|i|int|intensit(aet|e)|amplitude|returns?|scalar|rgba?|r|g|b|a|red|green|blue|alpha|normals"
@@ -56,7 +75,6 @@ _OTHERS = re.compile(  # of columns that are no places
     r"|speed|velocity|vel|gyro|rotation|rot|size|scale|width|length)"
 )
 _BRACKETS = re.compile(r"[\[(<{].*?([\])>}]|$)")
-_SPELLED = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue"})
 _ABOUT_COLORS = ("color", "colour", "rgb", "rgba", "diffuse")
 _TRIPLES = {
     "r,g,b": ("r", "g", "b"),
@@ -78,7 +96,7 @@ class Places(NamedTuple):
 
 def _words(text):
     """Return the words of a name that say something, in lower case and without accents."""
-    text = unicodedata.normalize("NFKD", text.translate(_SPELLED)).encode("ascii", "ignore").decode()
+    text = unicodedata.normalize("NFKD", text.translate(LETTERS)).encode("ascii", "ignore").decode()
     text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text).lower())
     return [word for word in re.findall(r"[a-z0-9]+", text) if not _FILLERS.fullmatch(word)]
 
@@ -103,6 +121,11 @@ def is_other(name) -> bool:
     """Tell whether a name is known as one of what is no place: a number, a time, a color and so on."""
     words = _words(_BRACKETS.sub(" ", name))
     return not words or (not _place(name) and any(_OTHERS.fullmatch(word) for word in words))
+
+
+def is_place(name) -> bool:
+    """Tell whether a name is a word for a coordinate."""
+    return bool(_place(name))
 
 
 def is_known(name) -> bool:

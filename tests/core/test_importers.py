@@ -625,3 +625,54 @@ def test_obj(tmp_path, colors, faces, end):
     check(table, Columns([], [], colors=BYTES / 255.0 if colors in ("bytes", "shares") else None), {})
     assert ("left out r, g, b, for line 4 has 3 columns only" in told(table)) == (colors == "some")
     assert ("faces" in told(table)) == bool(faces)
+
+
+NORTHINGS = [f"{5_400_000 + 1.5 * i} {400_000 + 0.7 * i * i} {300 + 0.25 * (i % 3)}" for i in range(6)]
+
+
+@pytest.mark.parametrize(
+    ("names", "separator", "counted"),
+    [
+        ("; Y X Z", " ", False),
+        ("* Y X Z", " ", False),
+        ("REM Y X Z", " ", False),
+        ("--id Y X Z", " ", True),
+        (";y;x;z", ";", True),
+        ("Punto,Norte,Este,Elevación", ",", True),
+        ("Ponto,Norte,Leste,Elevação", ",", True),
+        ("Nr,Noord,Oost,Hoogte", ",", True),
+        ("Punt,RD-Y,RD-X,NAP", ",", True),
+        ("Nord,Øst,Høyde", ",", False),
+        ("Północ,Wschód,Wysokość", ",", False),
+        ("No,Yukar\u0131,Sağa,Kot", ",", True),
+        ("Pkt,Vorne,Y,X,Z", ",", None),
+    ],
+)
+def test_northings_are_y_behind_any_mark_and_in_other_languages(tmp_path, names, separator, counted):
+    before = {True: "{} ", False: "", None: "{} 7 "}[counted]
+    rows = [(before.format(i + 1) + row).replace(" ", separator) for i, row in enumerate(NORTHINGS)]
+    (tmp_path / "a.txt").write_text("\n".join([names, *rows]), encoding="utf-8")
+    table = read_points(tmp_path / "a.txt")
+    assert table.points[:2].tolist() == [[400_000.0, 5_400_000.0, 300.0], [400_000.7, 5_400_001.5, 300.25]]
+
+
+@pytest.mark.parametrize(
+    ("header", "told"),
+    [("Northing,Easting", "Northing,Easting"), ("0,1,2", "its first row, 0 1 2, is read as a point")],
+)
+def test_headers_that_cannot_be_used_are_told(tmp_path, header, told):
+    (tmp_path / "a.csv").write_text("\n".join([header, *(row.replace(" ", ",") for row in NORTHINGS)]))
+    (notice,) = read_points(tmp_path / "a.csv").notices
+    assert told in notice
+
+
+def test_what_counts_the_points_is_no_guess_at_a_place(tmp_path):
+    rows = [f"{i + 1} {row}" for i, row in enumerate(NORTHINGS)]
+    (tmp_path / "a.txt").write_text("\n".join(["foo bar baz qux", *rows]))
+    assert read_points(tmp_path / "a.txt").points[0].tolist() == [5_400_000.0, 400_000.0, 300.0]
+
+
+def test_no_row_names_are_taken_for_granted_beside_an_id(tmp_path):
+    rows = [f"{i + 1} {row} {7 * i}" for i, row in enumerate(NORTHINGS)]
+    (tmp_path / "a.csv").write_text("\n".join(["id,y,x,z", *rows]).replace(" ", ","))
+    assert read_points(tmp_path / "a.csv").points[0].tolist() == [400_000.0, 5_400_000.0, 300.0]
