@@ -15,6 +15,7 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
+    in_edit_mesh,
     point_count,
     positions_now,
     read_attribute,
@@ -268,11 +269,18 @@ def follow_own_material(obj):
         obj.update_tag()
 
 
+def _catch_up(obj):
+    """Color points as they were to be in Edit Mode, where neither colors for Solid nor slopes can be kept with them."""
+    if obj.meshfree.colors_behind and not in_edit_mesh(obj) and obj.is_editable:
+        recolor(obj)
+
+
 @persistent
-def _slots_changed(_scene, depsgraph):
+def _objects_changed(_scene, depsgraph):
     for update in depsgraph.updates:
         if isinstance(update.id, bpy.types.Object) and update.id.type in TYPES:
             follow_own_material(update.id.original)
+            _catch_up(update.id.original)
 
 
 def show_splats(obj):
@@ -397,6 +405,7 @@ def _sized_by_hand(obj):
 def _color(obj, name, values):
     _measure(obj)
     settings, material, groups = obj.meshfree, _display_material(obj), _group_colors(obj)
+    settings.colors_behind = in_edit_mesh(obj)
     part = component(name, settings)
     shown, stepped, colors_of = None if values is None else numbers(values, part), False, None
     if values is None:
@@ -513,7 +522,7 @@ _HANDLERS = {
     "undo_post": _keep_groups,
     "redo_pre": _note_groups,
     "redo_post": _keep_groups,
-    "depsgraph_update_post": _slots_changed,
+    "depsgraph_update_post": _objects_changed,
 }
 
 

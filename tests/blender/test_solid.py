@@ -74,6 +74,19 @@ def test_colors_of_the_points_own_stay_and_come_back(shown, extension):
     assert SOLID not in shown.data.attributes
 
 
+def test_colors_that_change_in_edit_mode_are_there_after_it(shown, extension):
+    show(shown, color_map="VIRIDIS")
+    bpy.ops.object.mode_set(mode="EDIT")
+    shown.meshfree.color_map = "COOL_WARM"
+    shown.meshfree.show_groups = True
+    shown.meshfree.show_groups = False
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    colors, places = colors_drawn(shown, SOLID)
+    off = np.abs(colors - ramp(extension, places[:, 2], "COOL_WARM"))[np.abs(places[:, 2]) < 0.9]
+    assert np.percentile(off, 99) < 0.06
+
+
 @pytest.mark.parametrize("settings", [{"iso_lines": 5}, {"outside": "HIDE"}], ids=str)
 def test_what_solid_cannot_show_is_left_to_materials(shown, settings, extension):
     show(shown, **settings)
