@@ -324,12 +324,17 @@ def look_at(objects):
 
 
 def use_material_preview(context):
-    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
+    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview.
+
+    In the Properties editor, which has some of our panels, that is each viewport beside it.
+    """
     space = context.space_data
-    if context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
+    if space is None or context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
         return
-    if space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
-        space.shading.type = "MATERIAL"
+    spaces = [area.spaces.active for area in context.screen.areas] if space.type == "PROPERTIES" else [space]
+    for view in spaces:
+        if view.type == "VIEW_3D" and view.shading.type == "SOLID":
+            view.shading.type = "MATERIAL"
 
 
 def resize(obj):

@@ -91,6 +91,18 @@ def test_colors_that_change_in_edit_mode_are_there_after_it(shown, extension):
 def test_what_solid_cannot_show_is_left_to_materials(shown, settings, extension):
     show(shown, **settings)
     assert not importlib.import_module(f"{extension.__name__}.ui.display").is_in_solid(shown)
+
+
+@pytest.mark.parametrize("editor", ["VIEW_3D", "PROPERTIES"])
+def test_what_solid_cannot_show_is_seen_wherever_it_is_chosen(shown, editor):
+    show(shown)
+    window = bpy.context.window_manager.windows[0]
+    areas = {area.type: area for area in window.screen.areas}
+    shading = areas["VIEW_3D"].spaces.active.shading
+    shading.type = "SOLID"
+    with bpy.context.temp_override(window=window, area=areas[editor]):
+        shown.meshfree.iso_lines = 5
+    assert shading.type == "MATERIAL"
     assert SOLID not in shown.data.attributes
 
 
