@@ -15,6 +15,7 @@ from ..operators.objects.attributes import (
     DISC,
     MEAN_CURVATURE,
     SIGNED_DISTANCE,
+    in_edit_mesh,
     point_count,
     positions_now,
     read_attribute,
@@ -268,11 +269,18 @@ def follow_own_material(obj):
         obj.update_tag()
 
 
+def _catch_up(obj):
+    """Color points as they were to be in Edit Mode, where neither colors for Solid nor slopes can be kept with them."""
+    if obj.meshfree.colors_behind and not in_edit_mesh(obj) and obj.is_editable:
+        recolor(obj)
+
+
 @persistent
-def _slots_changed(_scene, depsgraph):
+def _objects_changed(_scene, depsgraph):
     for update in depsgraph.updates:
         if isinstance(update.id, bpy.types.Object) and update.id.type in TYPES:
             follow_own_material(update.id.original)
+            _catch_up(update.id.original)
 
 
 def show_splats(obj):
@@ -316,12 +324,17 @@ def look_at(objects):
 
 
 def use_material_preview(context):
-    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview."""
+    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview.
+
+    In the Properties editor, which has some of our panels, that is each viewport beside it.
+    """
     space = context.space_data
-    if context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
+    if space is None or context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
         return
-    if space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
-        space.shading.type = "MATERIAL"
+    spaces = [area.spaces.active for area in context.screen.areas] if space.type == "PROPERTIES" else [space]
+    for view in spaces:
+        if view.type == "VIEW_3D" and view.shading.type == "SOLID":
+            view.shading.type = "MATERIAL"
 
 
 def resize(obj):
@@ -397,6 +410,7 @@ def _sized_by_hand(obj):
 def _color(obj, name, values):
     _measure(obj)
     settings, material, groups = obj.meshfree, _display_material(obj), _group_colors(obj)
+    settings.colors_behind = in_edit_mesh(obj)
     part = component(name, settings)
     shown, stepped, colors_of = None if values is None else numbers(values, part), False, None
     if values is None:
@@ -515,7 +529,7 @@ _HANDLERS = {
     "undo_post": _keep_groups,
     "redo_pre": _note_groups,
     "redo_post": _keep_groups,
-    "depsgraph_update_post": _slots_changed,
+    "depsgraph_update_post": _objects_changed,
 }
 
 

@@ -339,6 +339,9 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
     )
     slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
+    colors_behind: BoolProperty(
+        name="Colors Behind", description="Whether colors were changed in Edit Mode, where points get none for Solid"
+    )
 
     notices: CollectionProperty(
         type=notices.MESHFREE_PG_notice, name="Notices", description="What tools told of the object, until dismissed"

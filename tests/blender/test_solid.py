@@ -74,10 +74,35 @@ def test_colors_of_the_points_own_stay_and_come_back(shown, extension):
     assert SOLID not in shown.data.attributes
 
 
+def test_colors_that_change_in_edit_mode_are_there_after_it(shown, extension):
+    show(shown, color_map="VIRIDIS")
+    bpy.ops.object.mode_set(mode="EDIT")
+    shown.meshfree.color_map = "COOL_WARM"
+    shown.meshfree.show_groups = True
+    shown.meshfree.show_groups = False
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    colors, places = colors_drawn(shown, SOLID)
+    off = np.abs(colors - ramp(extension, places[:, 2], "COOL_WARM"))[np.abs(places[:, 2]) < 0.9]
+    assert np.percentile(off, 99) < 0.06
+
+
 @pytest.mark.parametrize("settings", [{"iso_lines": 5}, {"outside": "HIDE"}], ids=str)
 def test_what_solid_cannot_show_is_left_to_materials(shown, settings, extension):
     show(shown, **settings)
     assert not importlib.import_module(f"{extension.__name__}.ui.display").is_in_solid(shown)
+
+
+@pytest.mark.parametrize("editor", ["VIEW_3D", "PROPERTIES"])
+def test_what_solid_cannot_show_is_seen_wherever_it_is_chosen(shown, editor):
+    show(shown)
+    window = bpy.context.window_manager.windows[0]
+    areas = {area.type: area for area in window.screen.areas}
+    shading = areas["VIEW_3D"].spaces.active.shading
+    shading.type = "SOLID"
+    with bpy.context.temp_override(window=window, area=areas[editor]):
+        shown.meshfree.iso_lines = 5
+    assert shading.type == "MATERIAL"
     assert SOLID not in shown.data.attributes
 
 
