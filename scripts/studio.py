@@ -240,9 +240,9 @@ def add_display(obj, radius):
 
 def paint(name, color, normals=""):
     """Return a matt material of one colour."""
-    add_node = part("ui.nodes").add_node
+    add_node = part("operators.objects.modifiers").add_node
     material = bpy.data.materials.new(name)
-    tree = part("ui.nodes").new_tree(material)
+    tree = part("ui.materials").new_tree(material)
     diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", 2, 0)
     diffuse.inputs["Color"].default_value = color
     output = add_node(tree, "ShaderNodeOutputMaterial", 3, 0)

@@ -4,7 +4,8 @@ import numpy as np
 
 from ..operators.objects.attributes import DISPLACEMENT, DISTANCE, point_count, read_attribute
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, is_display
-from .nodes import ATTRIBUTE, COLORS, DISC_COST, DISCS, MOST, RANGE, SOLID_NAME, shows_own
+from .materials import ATTRIBUTE, COLORS, RANGE, shows_own
+from .nodes import DISC_COST, DISCS, MOST, SOLID_NAME
 from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"

@@ -6,11 +6,12 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..core import PointCloudError
+from ..operators.objects.modifiers import add_node
 from ..operators.running.ready import ReadyOperator
 from .canvas import PLATE_CORNERS
 from .colormaps import to_linear
 from .display import shown_attribute
-from .nodes import add_node, new_tree
+from .materials import new_tree
 from .plots import HEIGHT, legend_picture
 from .scale import shown_scale
 

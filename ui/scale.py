@@ -13,7 +13,7 @@ from .display import (
     shows_zeros,
     step_colors,
 )
-from .nodes import CHECKER, direction_color, is_checkered
+from .materials import CHECKER, direction_color, is_checkered
 from .ticks import round_ticks, tick_texts
 from .units import attribute_power, unit
 

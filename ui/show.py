@@ -53,16 +53,7 @@ from .display import (
     sloping,
     without_unreached,
 )
-from .nodes import (
-    DISCS,
-    FILLED,
-    INK,
-    LENGTH,
-    MOST,
-    SMOOTH,
-    SOLID_NAME,
-    SPLATS,
-    STROKES,
+from .materials import (
     color_by_checker,
     color_by_direction,
     color_by_number,
@@ -70,11 +61,11 @@ from .nodes import (
     color_plain,
     color_splats,
     dim_back,
-    display_group,
     is_plain,
     shade,
     stroke_material,
 )
+from .nodes import DISCS, FILLED, INK, LENGTH, MOST, SMOOTH, SOLID_NAME, SPLATS, STROKES, display_group
 from .value_range import STEPPED, all_zero, fit_range
 
 _MOST_HANDLES = 6  # that have colors

@@ -14,14 +14,14 @@ from ..operators.objects.attributes import (
     write_attribute,
 )
 from . import colormaps
-from .nodes import BEYOND, direction_color
+from .materials import BEYOND, direction_color
 from .value_range import CLASSES, STEPPED
 
 
 def number_colors(color_map, low, high, settings):
     """Return a function that gives the linear colours of numbers, (n,) to (n, 4), as a material shows them.
 
-    Parameters as in `nodes.color_by_number`; what is hidden beyond the range is not.
+    Parameters as in `materials.color_by_number`; what is hidden beyond the range is not.
     """
     colors = np.array(colormaps.colors(color_map, settings.reverse))
     margin = 0.5 if color_map in STEPPED else 0.0

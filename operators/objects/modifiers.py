@@ -81,6 +81,18 @@ def add_node(tree, kind, column, y, **properties):
     return node
 
 
+def add_math(tree, column, y, operation, first, second=0.0, name=""):
+    """Add a node that calculates, from one or two numbers or results of other nodes; return its result."""
+    node = add_node(tree, "ShaderNodeMath", column, y, operation=operation)
+    node.name = name or node.name
+    for number, socket in zip((first, second), node.inputs, strict=False):
+        if isinstance(number, bpy.types.NodeSocket):
+            tree.links.new(number, socket)
+        else:
+            socket.default_value = number
+    return node.outputs[0]
+
+
 def get_input(modifier, name: str):
     """Value of an input of a modifier of ours."""
     return _read(*input_property(modifier, name))
