@@ -20,6 +20,7 @@ KEPT = {
     "spacing",
     "spacing_of",
     "slopes_of",
+    "colors_behind",
     "deform",
     "stages",
     "fingerprint",
