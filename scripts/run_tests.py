@@ -20,7 +20,7 @@ import pythons
 from environments import ROOT, ensure, ensure_blender, isolated
 
 RESULTS = ROOT / "build" / "tests"
-LIMIT = 1800  # seconds for one run of pytest
+LIMIT = 2700  # seconds for one run of pytest
 _SHOWN = 40  # lines of a run that ended without a word of pytest about what failed
 
 
