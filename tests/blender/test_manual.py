@@ -24,6 +24,7 @@ KEPT = {
     "spacing",
     "spacing_of",
     "slopes_of",
+    "colors_behind",
     "deform",
     "stages",
     "fingerprint",
