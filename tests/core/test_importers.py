@@ -676,3 +676,22 @@ def test_no_row_names_are_taken_for_granted_beside_an_id(tmp_path):
     rows = [f"{i + 1} {row} {7 * i}" for i, row in enumerate(NORTHINGS)]
     (tmp_path / "a.csv").write_text("\n".join(["id,y,x,z", *rows]).replace(" ", ","))
     assert read_points(tmp_path / "a.csv").points[0].tolist() == [400_000.0, 5_400_000.0, 300.0]
+
+
+@pytest.mark.parametrize("separator", [" ", ",", ";", "\t"])
+def test_nan_as_visual_c_writes_it_is_no_comment(tmp_path, separator):
+    rows = ["x y z s t", "1 2 3 1.#QNAN 7", "4 5 6 -1.#IND00 8", "7 8 9 1.#INF 9", "1.#QNAN 8 9 -nan(ind) 9", "9 9 9 4 5"]
+    (tmp_path / "a.txt").write_text("\n".join(rows).replace(" ", separator))
+    table = read_points(tmp_path / "a.txt")
+    assert table.points.tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9], [9, 9, 9]]
+    assert_array_equal(table.attributes["s"], [np.nan, np.nan, np.inf, 4.0])
+    assert table.attributes["t"].tolist() == [7, 8, 9, 5]
+    assert any("left out 1 points" in notice for notice in table.notices)
+
+
+def test_fractions_in_bytes_of_a_ply_of_text_stay(tmp_path):
+    head = "ply\nformat ascii 1.0\nelement vertex 2\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz")
+    head += "".join(f"property uchar {color}\n" for color in ("red", "green", "blue"))
+    (tmp_path / "a.ply").write_text(head + "end_header\n1 2 3 0.5 0 0\n4 5 6 1 0.25 0\n")
+    assert_allclose(read_points(tmp_path / "a.ply").colors[:, :3], [[0.5, 0.0, 0.0], [1.0, 0.25, 0.0]])
