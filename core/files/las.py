@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError, TooFewPointsError
 from .las_choices import LasChoices
-from .table import PointTable, unit_colors
+from .table import PointTable, told_depth, unit_colors
 
 _COLUMNS = ("intensity", "classification", "return_number", "nir")  # that become attributes, where a file has them
 _COLORS = ("red", "green", "blue")
@@ -171,6 +171,7 @@ def _read(reader, path, choices):
         table.attributes = {name: values[:done] for name, values in table.attributes.items()}
     if colors is not None and colors[:done].any():  # all black are those of scanners without a camera
         table.colors = unit_colors(colors[:done])
+        table.notices += told_depth(colors[:done], path)
     table.degrees = np.abs(table.points[:, :2]).max(initial=0.0) <= _MOST_DEGREES and _is_geographic(header)
     return table
 

@@ -13,6 +13,8 @@ NORMAL = "normal"  # the attribute that files call nx ny nz
 SCANNER = "scanner"  # the attribute of places, where the scanner stood that saw a point, which move with the points
 _NORMALS = ("nx", "ny", "nz")
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+_ALPHAS = (("alpha",), ("diffuse_alpha",), ("a",))
+_DEPTHS = (8, 10, 12, 16, 32)  # bits of a color
 _AXES = ("x", "y", "z")
 _FARTHEST = 1e30  # of a coordinate, below the end of single precision, so that differences are numbers, too
 
@@ -74,8 +76,10 @@ def from_columns(columns, path):
     table.single = any(place.dtype == np.float32 for place in places)
     colors = next(filter(None, map(take, _COLORS)), None)
     if colors is not None:
-        alpha = take(("alpha",))
-        table.colors = unit_colors(np.stack(colors, axis=1), alpha and alpha[0])
+        alpha = next(filter(None, map(take, _ALPHAS)), None)
+        colors = np.stack(colors, axis=1)
+        table.colors = unit_colors(colors, alpha and alpha[0])
+        table.notices += told_depth(colors, path)
     normals = take(_NORMALS)
     if normals is not None:
         table.attributes[NORMAL] = np.stack(normals, axis=1)
@@ -114,7 +118,7 @@ def unit_colors(colors, alpha=None):
 def full_color(values) -> float:
     """Return the number that stands for a full color: by the type of bytes, which is told, otherwise by the numbers.
 
-    Programs write 8 bits in types of 16, and from 0 to 1 in whole numbers where all colors are pure.
+    Programs write 8, 10 or 12 bits in types of 16, and from 0 to 1 in whole numbers where all colors are pure.
     """
     if values.dtype.itemsize == 1:
         return 255.0
@@ -122,7 +126,14 @@ def full_color(values) -> float:
     bright = largest < 2.0 and not (values == np.round(values)).all()  # brighter than 1, since whole numbers would be
     if largest <= 1.0 or bright:
         return 1.0
-    return next((full for full in (255.0, 65535.0, 2.0**32 - 1.0) if largest <= full), 1.0)
+    return next((2.0**bits - 1.0 for bits in _DEPTHS if largest < 2.0**bits), 1.0)
+
+
+def told_depth(colors, path):
+    """Yield of what depth colors are, where that is not usual."""
+    full = full_color(colors)
+    if full in (1023.0, 4095.0):
+        yield f"{path.name}: no color is above {full:g}, so that these are taken for colors from 0 to {full:g}."
 
 
 def to_columns(table) -> dict:

@@ -680,7 +680,14 @@ def test_no_row_names_are_taken_for_granted_beside_an_id(tmp_path):
 
 @pytest.mark.parametrize("separator", [" ", ",", ";", "\t"])
 def test_nan_as_visual_c_writes_it_is_no_comment(tmp_path, separator):
-    rows = ["x y z s t", "1 2 3 1.#QNAN 7", "4 5 6 -1.#IND00 8", "7 8 9 1.#INF 9", "1.#QNAN 8 9 -nan(ind) 9", "9 9 9 4 5"]
+    rows = [
+        "x y z s t",
+        "1 2 3 1.#QNAN 7",
+        "4 5 6 -1.#IND00 8",
+        "7 8 9 1.#INF 9",
+        "1.#QNAN 8 9 -nan(ind) 9",
+        "9 9 9 4 5",
+    ]
     (tmp_path / "a.txt").write_text("\n".join(rows).replace(" ", separator))
     table = read_points(tmp_path / "a.txt")
     assert table.points.tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9], [9, 9, 9]]
