@@ -702,3 +702,29 @@ def test_fractions_in_bytes_of_a_ply_of_text_stay(tmp_path):
     head += "".join(f"property uchar {color}\n" for color in ("red", "green", "blue"))
     (tmp_path / "a.ply").write_text(head + "end_header\n1 2 3 0.5 0 0\n4 5 6 1 0.25 0\n")
     assert_allclose(read_points(tmp_path / "a.ply").colors[:, :3], [[0.5, 0.0, 0.0], [1.0, 0.25, 0.0]])
+
+
+def test_colors_of_an_obj_with_alpha_are_no_weights(tmp_path):
+    (tmp_path / "a.obj").write_text("v 1 2 3 0.5 0.25 1 0.75\nv 4 5 6 1 0 0 1\n")
+    assert_allclose(read_points(tmp_path / "a.obj").colors, [[0.5, 0.25, 1.0, 0.75], [1.0, 0.0, 0.0, 1.0]])
+
+
+def test_colors_of_some_vertices_of_an_obj_are_told(tmp_path):
+    (tmp_path / "a.obj").write_text("v 1 2 3\nv 4 5 6 1 0 0\n")
+    (notice,) = read_points(tmp_path / "a.obj").notices
+    assert "left out r, g, b" in notice
+
+
+TURNED = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [500_000, 5_400_000, 300, 1]])
+
+
+@pytest.mark.parametrize(
+    "matrix", [TURNED, TURNED.T, TURNED + 1e-9 * (np.arange(4) == 3)], ids=["rows", "columns", "rounded"]
+)
+@pytest.mark.parametrize("before", ["", "# exported by a scanner\n"])
+@pytest.mark.parametrize("ending", ["txt", "ptx"])
+def test_ptx_with_comments_or_a_matrix_of_columns_is_placed(tmp_path, matrix, before, ending):
+    rows = "\n".join(" ".join(map(repr, row)) for row in matrix.tolist())
+    head = f"2\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n{rows}\n"
+    (tmp_path / f"a.{ending}").write_text(before + head + "1 2 3 0.25\n0 0 0 0.5\n")
+    assert read_points(tmp_path / f"a.{ending}").points.tolist() == [[499_998.0, 5_400_001.0, 303.0]]
