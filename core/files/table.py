@@ -16,7 +16,7 @@ _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_g
 _ALPHAS = (("alpha",), ("diffuse_alpha",), ("a",))
 _DEPTHS = (8, 10, 12, 16, 32)  # bits of a color
 _AXES = ("x", "y", "z")
-_FARTHEST = 1e30  # of a coordinate, below the end of single precision, so that differences are numbers, too
+FARTHEST = 1e30  # of a coordinate, below the end of single precision, so that differences are numbers, too
 
 
 @dataclass
@@ -166,6 +166,8 @@ def _free_name(name, columns):
 def without_missed(table, path) -> PointTable:
     """Return a table without the points that have no place: sensors with a raster of rays write NaN where they miss.
 
+    Other programs write the largest number there is.
+
     Parameters
     ----------
     table : PointTable
@@ -173,11 +175,13 @@ def without_missed(table, path) -> PointTable:
     path : pathlib.Path
         The file, for the texts.
     """
-    kept = np.isfinite(table.points).all(axis=1)
+    kept = (np.abs(table.points) <= FARTHEST).all(axis=1)
     missed = len(kept) - np.count_nonzero(kept)
-    if not missed:
+    far = np.isfinite(table.points).all(axis=1) & ~kept
+    if not missed or far.all():
         return table
     what = "NaN or infinity" if np.isinf(table.points).any() else "NaN"
+    what = f"{what}, or beyond {FARTHEST:g}" if far.any() else what
     if missed == len(kept):
         raise TooFewPointsError(f"{path} has no points: all {missed} are without a place ({what}). Export it again.")
     table.points = table.points[kept]
@@ -192,11 +196,11 @@ def check_places(points, path) -> float:
     if len(points) == 0:
         raise TooFewPointsError(f"{path} has no points. Give a file with points.")
     largest = float(np.abs(points).max())
-    if largest <= _FARTHEST:
+    if largest <= FARTHEST:
         return largest
     bad, what = np.flatnonzero(~np.isfinite(points).all(axis=1)), "not finite (NaN or infinity)"
     if len(bad) == 0:
-        bad, what = np.flatnonzero((np.abs(points) > _FARTHEST).any(axis=1)), f"beyond {_FARTHEST:g}"
+        bad, what = np.flatnonzero((np.abs(points) > FARTHEST).any(axis=1)), f"beyond {FARTHEST:g}"
     raise InvalidPointsError(
         f"{path}: {len(bad)} of {len(points)} points have coordinates that are {what}, the first of them is"
         f" point {bad[0] + 1}. Delete these points from the file."

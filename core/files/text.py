@@ -178,7 +178,7 @@ def read_vertices(path) -> PointTable:
 
 
 def _vertex_names(rows):
-    """Return the names of the numbers of a vertex: of seven the fourth is a weight if it is 1, or the last one alpha."""
+    """Return the names of the numbers of a vertex: of seven the fourth is a weight if it is 1, or the last alpha."""
     if rows.width == 7:
         weighted = all(float(words[3]) == 1.0 for words in rows.sample if len(words) == 7 and is_number(words[3]))
         return ["x", "y", "z", "w", "r", "g", "b"] if weighted else ["x", "y", "z", "r", "g", "b", "alpha"]

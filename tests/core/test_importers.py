@@ -728,3 +728,12 @@ def test_ptx_with_comments_or_a_matrix_of_columns_is_placed(tmp_path, matrix, be
     head = f"2\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n{rows}\n"
     (tmp_path / f"a.{ending}").write_text(before + head + "1 2 3 0.25\n0 0 0 0.5\n")
     assert read_points(tmp_path / f"a.{ending}").points.tolist() == [[499_998.0, 5_400_001.0, 303.0]]
+
+
+@pytest.mark.parametrize("largest", ["3.4028235e38", "-1.7976931348623157e308"])
+def test_points_at_the_largest_number_have_no_place(tmp_path, largest):
+    (tmp_path / "a.csv").write_text(f"x,y,z,s\n1,2,3,4\n{largest},{largest},{largest},5\n7,8,9,6\nnan,0,0,7\n")
+    table = read_points(tmp_path / "a.csv")
+    assert table.points.tolist() == [[1, 2, 3], [7, 8, 9]]
+    assert table.attributes["s"].tolist() == [4, 6]
+    assert "left out 2 points that the sensor missed (NaN, or beyond 1e+30)." in table.notices[-1]
