@@ -65,7 +65,8 @@ def _read_text(blocks, path, columns, usual=None):
             notices.append(f"{path.name}: {layout.label(index)} has whole numbers whose last digits are rounded.")
     nameless = [layout.label(index) for index in others if not layout.names[index]]
     if nameless:
-        guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless)
+        behind = min(others) > max(layout.places)
+        guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless, behind)
         extra = _renamed(extra, dict(zip(nameless, guessed, strict=True)))
         notices.append(_tell_guess(path, layout.places, nameless, guessed))
     table = from_columns(dict(zip("xyz", values.T, strict=False)) | _renamed(extra, standard_names(extra)), path)

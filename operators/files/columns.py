@@ -10,7 +10,6 @@ from ...core.files import Digits, join_digits
 from ..objects.attributes import point_count, read_attribute
 from ..objects.place import COLUMNS
 
-
 RENAMED = "file_"  # before names of columns that Blender keeps for itself
 _LARGEST = float(np.finfo(np.float32).max)
 

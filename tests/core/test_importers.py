@@ -737,3 +737,18 @@ def test_points_at_the_largest_number_have_no_place(tmp_path, largest):
     assert table.points.tolist() == [[1, 2, 3], [7, 8, 9]]
     assert table.attributes["s"].tolist() == [4, 6]
     assert "left out 2 points that the sensor missed (NaN, or beyond 1e+30)." in table.notices[-1]
+
+
+def test_what_counts_points_is_no_intensity(tmp_path):
+    rows = [f"{i} {x} {y} {z} {r} {g} {b}" for i, ((x, y, z), (r, g, b)) in enumerate(zip(PLACES, BYTES, strict=True))]
+    (tmp_path / "a.txt").write_text("\n".join(rows))
+    table = read_points(tmp_path / "a.txt")
+    assert [*table.attributes] == ["column_1"]
+    assert_allclose(table.colors[:, :3], BYTES / 255.0, atol=1e-6)
+
+
+def test_a_full_alpha_beside_colors_as_shares_is_one(tmp_path):
+    np.savetxt(tmp_path / "a.txt", np.hstack([PLACES, BYTES / 255.0, np.ones((COUNT, 1))]), fmt="%.8f")
+    table = read_points(tmp_path / "a.txt")
+    assert not table.attributes
+    assert_allclose(table.colors[:, 3], 1.0)
