@@ -20,6 +20,7 @@ _DIGITS = 24  # of a whole number of 64 bits at most, and more
 _MISSING = r"(?:n/?a|nan|null|none|nil|no ?data|-|--|\?|\*)"
 _IS_MISSING = re.compile(f"{_MISSING}?", re.IGNORECASE)
 _COMMENTS = ("#", "//", "%", "!")
+_MARKED = re.compile(r"1\.?#(?:(INF)|QNAN|SNAN|IND|NAN)\d*|nan\(\w*\)", re.IGNORECASE)  # as Visual C writes them
 
 
 @dataclass
@@ -110,12 +111,18 @@ def is_numeric(words) -> bool:
 
 def split_row(line, delimiter) -> list:
     """Split a line without its comment, with decimal points; no words if the delimiter cannot be meant."""
-    line = _unquoted(line.replace("#N/A", ""), delimiter).split("#")[0].split("//")[0].strip(" ")
+    line = _unquoted(_unmarked(line.replace("#N/A", "")), delimiter).split("#")[0].split("//")[0].strip(" ")
     if delimiter is None and re.search(r"\s,|,\s|,$", line):
         return []
     if delimiter != ",":
         line = line.replace(",", ".")
     return [word.strip() for word in line.split(delimiter)]
+
+
+def _unmarked(text):
+    """Return text with NaN and infinity as numpy reads them: in 1.#QNAN stands a # that begins no comment."""
+    marked = "#" in text or "(" in text
+    return _MARKED.sub(lambda match: "inf" if match[1] else "nan", text) if marked else text
 
 
 def _unquoted(text, delimiter):
@@ -232,9 +239,10 @@ def _plain(lines, delimiter):
     """Return lines as numpy reads them: it knows comments with # alone, decimal points, and no quotes."""
     if delimiter is not None and any(map(str.isspace, lines)):
         lines = ["" if line.isspace() else line for line in lines]
-    text = "\n".join(lines)
+    given = "\n".join(lines)
+    text = _unmarked(given)
     slashes, commas, quotes = "//" in text, delimiter != "," and "," in text, '"' in text
-    if not (slashes or commas or quotes):
+    if not (slashes or commas or quotes) and text is given:
         return lines
     text = _unquoted(text, delimiter)
     if slashes:

@@ -12,7 +12,7 @@ _LENGTH = 0.02  # that normals, rounded to a few digits, may differ from 1
 _STEP = 1e-4  # that shares of 255 may differ from whole ones, in a file of a few digits
 
 
-def guess_names(values, unknown):
+def guess_names(values, unknown, scanned=True):
     """Name columns that a file does not name.
 
     Parameters
@@ -20,6 +20,8 @@ def guess_names(values, unknown):
     values : ndarray, (n, k)
     unknown : list of str
         A name for each, for those that are neither.
+    scanned : bool
+        Whether a single number before colors may be an intensity: not one before the places, which counts.
 
     Returns
     -------
@@ -34,9 +36,10 @@ def guess_names(values, unknown):
     if color is not None:
         names[color : color + 3] = _COLORS
         alpha = color + 3
-        if alpha < len(names) and alpha != normal and (values[:, alpha] == _FULL).all():
+        full = _FULL if values[:, color:alpha].max() > 1.0 else 1.0
+        if alpha < len(names) and alpha != normal and (values[:, alpha] == full).all():
             names[alpha] = "alpha"
-        if color == 1 and len(names) == len(_SCANNED):
+        if scanned and color == 1 and len(names) == len(_SCANNED):
             names = list(_SCANNED)
     return names
 

@@ -7,9 +7,16 @@ import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError, TooFewPointsError
 from .las_choices import LasChoices
-from .table import PointTable, unit_colors
+from .table import PointTable, told_depth, unit_colors
 
-_COLUMNS = ("intensity", "classification", "return_number", "nir")  # that become attributes, where a file has them
+_TIMES = "gps_time"
+_COLUMNS = (
+    "intensity",
+    "classification",
+    "return_number",
+    "nir",
+    _TIMES,
+)  # that become attributes, where there are any
 _COLORS = ("red", "green", "blue")
 _BLOCK = 2**16  # points that are read at once
 _SHORTEST = 227  # bytes of a header
@@ -169,8 +176,11 @@ def _read(reader, path, choices):
     if done < count:
         table.points = table.points[:done]
         table.attributes = {name: values[:done] for name, values in table.attributes.items()}
+    if not table.attributes.get(_TIMES, np.ones(1)).any():  # all zero are those of programs that know none
+        del table.attributes[_TIMES]
     if colors is not None and colors[:done].any():  # all black are those of scanners without a camera
         table.colors = unit_colors(colors[:done])
+        table.notices += told_depth(colors[:done], path)
     table.degrees = np.abs(table.points[:, :2]).max(initial=0.0) <= _MOST_DEGREES and _is_geographic(header)
     return table
 

@@ -76,10 +76,17 @@ _OTHERS = re.compile(  # of columns that are no places
 )
 _BRACKETS = re.compile(r"[\[(<{].*?([\])>}]|$)")
 _ABOUT_COLORS = ("color", "colour", "rgb", "rgba", "diffuse")
+_ALPHA = ("alpha", "a", "af")  # beside colors
 _TRIPLES = {
     "r,g,b": ("r", "g", "b"),
     "rf,gf,bf": ("r", "g", "b"),
     "red,green,blue": ("red", "green", "blue"),
+    "rot,gruen,blau": ("r", "g", "b"),
+    "rouge,vert,bleu": ("r", "g", "b"),
+    "rojo,verde,azul": ("r", "g", "b"),
+    "rosso,verde,blu": ("r", "g", "b"),
+    "vermelho,verde,azul": ("r", "g", "b"),
+    "rood,groen,blauw": ("r", "g", "b"),
     "nx,ny,nz": ("nx", "ny", "nz"),
     "normal x,normal y,normal z": ("nx", "ny", "nz"),
 }
@@ -191,6 +198,8 @@ def standard_names(names) -> dict:
     for triple, standard in _TRIPLES.items():
         if all(word in found for word in triple.split(",")):
             result |= {found[word]: name for word, name in zip(triple.split(","), standard, strict=True)}
+            if standard[0] != "nx":
+                result |= {found[word]: "alpha" for word in _ALPHA if word in found}
     return result
 
 

@@ -12,6 +12,8 @@ _HEAD = 10  # lines: columns, rows, the scanner's place and axes, and four rows 
 _MOST_DIGITS = 9  # of a number of columns or rows
 _NAMES = ("x", "y", "z", "intensity", "r", "g", "b")
 _WIDTHS = (3, 4, 6, 7)  # numbers of a point
+_LAST = [0.0, 0.0, 0.0, 1.0]  # column of a matrix, ...
+_ROUNDED = 1e-6  # ... but for rounding
 _UNKNOWN = 0.5  # intensity of rays that hit nothing
 
 
@@ -36,7 +38,7 @@ def read_ptx(path):
     """
     scans, missed = [], 0
     lines = enumerate(chain.from_iterable(read_text(path)), start=1)
-    lines = ((number, line) for number, line in lines if line.strip())
+    lines = ((number, line) for number, line in lines if _is_filled(line))
     while head := [*islice(lines, _HEAD)]:
         values, center, misses = _read_scan(lines, head, len(scans), path)
         scans.append((values, center))
@@ -45,7 +47,12 @@ def read_ptx(path):
 
 
 def _filled(blocks):
-    return filter(str.strip, chain.from_iterable(blocks))
+    return filter(_is_filled, chain.from_iterable(blocks))
+
+
+def _is_filled(line):
+    """Tell whether a line is neither empty nor a comment, as some programs write before the first scan."""
+    return bool(line.strip()) and not line.lstrip().startswith(("#", "//"))
 
 
 def _parse(lines):
@@ -59,7 +66,11 @@ def _parse(lines):
     if not all(is_number(word) for row in words[2:] for word in row):
         return None
     matrix = np.array(words[6:], dtype=np.float64)
-    if matrix[:, 3].tolist() != [0.0, 0.0, 0.0, 1.0] or not np.isfinite(matrix).all():
+    if not np.isfinite(matrix).all():
+        return None
+    if matrix[3].tolist() == _LAST and matrix[:, 3].tolist() != _LAST:  # its columns are rows
+        matrix = matrix.T
+    if not np.allclose(matrix[:, 3], _LAST, rtol=0.0, atol=_ROUNDED):
         return None
     return int(sizes[0]) * int(sizes[1]), np.array(words[2], dtype=np.float64), matrix
 

@@ -123,7 +123,8 @@ def _typed(column, code):
     """
     if code[0] != "f" and len(column):
         limits = np.iinfo(code)
-        if limits.min <= column.min() and column.max() <= limits.max:  # neither is NaN
+        fits = limits.min <= column.min() and column.max() <= limits.max  # neither is NaN
+        if fits and (column == np.rint(column)).all():
             return column.astype(code)
     return column.astype("f8")
 

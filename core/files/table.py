@@ -13,8 +13,10 @@ NORMAL = "normal"  # the attribute that files call nx ny nz
 SCANNER = "scanner"  # the attribute of places, where the scanner stood that saw a point, which move with the points
 _NORMALS = ("nx", "ny", "nz")
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+_ALPHAS = (("alpha",), ("diffuse_alpha",), ("a",))
+_DEPTHS = (8, 10, 12, 16, 32)  # bits of a color
 _AXES = ("x", "y", "z")
-_FARTHEST = 1e30  # of a coordinate, below the end of single precision, so that differences are numbers, too
+FARTHEST = 1e30  # of a coordinate, below the end of single precision, so that differences are numbers, too
 
 
 @dataclass
@@ -74,8 +76,10 @@ def from_columns(columns, path):
     table.single = any(place.dtype == np.float32 for place in places)
     colors = next(filter(None, map(take, _COLORS)), None)
     if colors is not None:
-        alpha = take(("alpha",))
-        table.colors = unit_colors(np.stack(colors, axis=1), alpha and alpha[0])
+        alpha = next(filter(None, map(take, _ALPHAS)), None)
+        colors = np.stack(colors, axis=1)
+        table.colors = unit_colors(colors, alpha and alpha[0])
+        table.notices += told_depth(colors, path)
     normals = take(_NORMALS)
     if normals is not None:
         table.attributes[NORMAL] = np.stack(normals, axis=1)
@@ -114,7 +118,7 @@ def unit_colors(colors, alpha=None):
 def full_color(values) -> float:
     """Return the number that stands for a full color: by the type of bytes, which is told, otherwise by the numbers.
 
-    Programs write 8 bits in types of 16, and from 0 to 1 in whole numbers where all colors are pure.
+    Programs write 8, 10 or 12 bits in types of 16, and from 0 to 1 in whole numbers where all colors are pure.
     """
     if values.dtype.itemsize == 1:
         return 255.0
@@ -122,7 +126,14 @@ def full_color(values) -> float:
     bright = largest < 2.0 and not (values == np.round(values)).all()  # brighter than 1, since whole numbers would be
     if largest <= 1.0 or bright:
         return 1.0
-    return next((full for full in (255.0, 65535.0, 2.0**32 - 1.0) if largest <= full), 1.0)
+    return next((2.0**bits - 1.0 for bits in _DEPTHS if largest < 2.0**bits), 1.0)
+
+
+def told_depth(colors, path):
+    """Yield of what depth colors are, where that is not usual."""
+    full = full_color(colors)
+    if full in (1023.0, 4095.0):
+        yield f"{path.name}: no color is above {full:g}, so that these are taken for colors from 0 to {full:g}."
 
 
 def to_columns(table) -> dict:
@@ -155,6 +166,8 @@ def _free_name(name, columns):
 def without_missed(table, path) -> PointTable:
     """Return a table without the points that have no place: sensors with a raster of rays write NaN where they miss.
 
+    Other programs write the largest number there is.
+
     Parameters
     ----------
     table : PointTable
@@ -162,11 +175,13 @@ def without_missed(table, path) -> PointTable:
     path : pathlib.Path
         The file, for the texts.
     """
-    kept = np.isfinite(table.points).all(axis=1)
+    kept = (np.abs(table.points) <= FARTHEST).all(axis=1)
     missed = len(kept) - np.count_nonzero(kept)
-    if not missed:
+    far = np.isfinite(table.points).all(axis=1) & ~kept
+    if not missed or far.all():
         return table
     what = "NaN or infinity" if np.isinf(table.points).any() else "NaN"
+    what = f"{what}, or beyond {FARTHEST:g}" if far.any() else what
     if missed == len(kept):
         raise TooFewPointsError(f"{path} has no points: all {missed} are without a place ({what}). Export it again.")
     table.points = table.points[kept]
@@ -181,11 +196,11 @@ def check_places(points, path) -> float:
     if len(points) == 0:
         raise TooFewPointsError(f"{path} has no points. Give a file with points.")
     largest = float(np.abs(points).max())
-    if largest <= _FARTHEST:
+    if largest <= FARTHEST:
         return largest
     bad, what = np.flatnonzero(~np.isfinite(points).all(axis=1)), "not finite (NaN or infinity)"
     if len(bad) == 0:
-        bad, what = np.flatnonzero((np.abs(points) > _FARTHEST).any(axis=1)), f"beyond {_FARTHEST:g}"
+        bad, what = np.flatnonzero((np.abs(points) > FARTHEST).any(axis=1)), f"beyond {FARTHEST:g}"
     raise InvalidPointsError(
         f"{path}: {len(bad)} of {len(points)} points have coordinates that are {what}, the first of them is"
         f" point {bad[0] + 1}. Delete these points from the file."

@@ -2,7 +2,7 @@
 
 import re
 from functools import partial
-from itertools import chain
+from itertools import chain, islice
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from .ptx import holds_ptx, read_ptx
 from .table import PointTable, from_columns, to_columns
 
 _BLOCK = 10_000  # lines that are written at once
+_SAMPLE = 100  # vertices that tell what they hold
 _MOST_DIGITS = 15  # of a number of points; no file has so many
 _SKIPPED = ("#", "//")  # how lines begin that may be of any length
 _EXACT = 2.0**53  # from here on doubles skip whole numbers
@@ -64,7 +65,8 @@ def _read_text(blocks, path, columns, usual=None):
             notices.append(f"{path.name}: {layout.label(index)} has whole numbers whose last digits are rounded.")
     nameless = [layout.label(index) for index in others if not layout.names[index]]
     if nameless:
-        guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless)
+        behind = min(others) > max(layout.places)
+        guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless, behind)
         extra = _renamed(extra, dict(zip(nameless, guessed, strict=True)))
         notices.append(_tell_guess(path, layout.places, nameless, guessed))
     table = from_columns(dict(zip("xyz", values.T, strict=False)) | _renamed(extra, standard_names(extra)), path)
@@ -161,12 +163,12 @@ def read_vertices(path) -> PointTable:
             faces += sum(line.startswith(("f ", "f\t", "l ", "l\t")) for line in lines)
             yield [line[2:] if line.startswith(("v ", "v\t")) else "" for line in lines]
 
-    words = next(filter(None, (row.split("#")[0].split() for row in chain.from_iterable(blocks()))), None)
-    if words is None:
+    words = filter(None, (row.split("#")[0].split() for row in chain.from_iterable(blocks())))
+    rows = Rows(blocks, path, 0, None, [], [*islice(words, _SAMPLE)])
+    if not rows.sample:
         raise InvalidPointsError(f"{path} has no vertices, which are lines that begin with v. It holds no points.")
-    names = {6: "x y z r g b", 7: "x y z w r g b"}.get(len(words), "x y z").split()
-    rows = Rows(blocks, path, 0, None, [], [words])
-    colors = [index for index, name in enumerate(names) if name in "rgb"]
+    names = _vertex_names(rows)
+    colors = [index for index, name in enumerate(names) if index > 2 and name != "w"]
     others, values, notices = load(rows, [0, 1, 2], colors, names.__getitem__)
     columns = dict(zip("xyz", values.T, strict=False)) | {names[i]: values[:, 3 + n] for n, i in enumerate(others)}
     table = from_columns(columns, path)
@@ -174,6 +176,14 @@ def read_vertices(path) -> PointTable:
     if faces:
         table.notices.append(f"{path.name}: left out {faces} faces and lines. Only points are read.")
     return table
+
+
+def _vertex_names(rows):
+    """Return the names of the numbers of a vertex: of seven the fourth is a weight if it is 1, or the last alpha."""
+    if rows.width == 7:
+        weighted = all(float(words[3]) == 1.0 for words in rows.sample if len(words) == 7 and is_number(words[3]))
+        return ["x", "y", "z", "w", "r", "g", "b"] if weighted else ["x", "y", "z", "r", "g", "b", "alpha"]
+    return ["x", "y", "z", "r", "g", "b"] if rows.width == 6 else ["x", "y", "z"]
 
 
 def write_columns(path, table, delimiter=" ", double=True):

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError
 from ..files import (
+    FARTHEST,
     SPLATS,
     PlyVertices,
     check_places,
@@ -188,15 +189,15 @@ def _from_vertices(vertices: PlyVertices, path) -> Splats:
 
 
 def _without_broken(columns, path):
-    """Leave out splats with numbers that are not finite, as training leaves them, and tell how many.
+    """Leave out splats with numbers that are not finite, or too far away, as training leaves them; tell how many.
 
     Logarithms of sizes may be minus infinity, of sizes zero, and logits of opacities infinite, of 0 and 1.
     """
     sound = np.ones(len(columns[OPACITY]), bool)
-    for name in NEEDED:
-        values = columns[name]
-        if values.dtype.kind == "f":
+    for name, values in columns.items():
+        if values.dtype.kind == "f" and (name in NEEDED or name.startswith(REST)):
             limits = {**dict.fromkeys(SCALES, values < np.inf), OPACITY: ~np.isnan(values)}
+            limits |= dict.fromkeys(PLACES, np.abs(values) <= FARTHEST)
             sound &= limits[name] if name in limits else np.isfinite(values)
     broken = np.count_nonzero(~sound)
     if not broken:
@@ -205,8 +206,13 @@ def _without_broken(columns, path):
         raise InvalidPointsError(
             f"{path}: all {broken} splats have numbers that are not finite (NaN or infinity). Train or export it again."
         )
-    told = f"{path.name}: left out {broken:,} splats with numbers that are not finite (NaN or infinity)."
+    far = f", or places beyond {FARTHEST:g}" if any(_any_far(columns[name]) for name in PLACES) else ""
+    told = f"{path.name}: left out {broken:,} splats with numbers that are not finite (NaN or infinity){far}."
     return {name: values[sound] for name, values in columns.items()}, [told]
+
+
+def _any_far(values):
+    return bool((np.isfinite(values) & (np.abs(values) > FARTHEST)).any())
 
 
 def write_splats(path, splats):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..files import from_columns
+from ..files import unit_colors
 from .columns import COLORS, NEEDED, OPACITY, PLACES, ROTATIONS, SCALES, encode_opacities, split, stack
 from .harmonics import CONSTANT
 
@@ -49,8 +49,8 @@ def _add_colors(columns):
     if named is None:
         columns.update(dict.fromkeys(COLORS, np.zeros(len(columns["x"]), np.float32)))
         return "no colors: splats are gray"
-    table = from_columns({name: columns[name] for name in (*PLACES, *named)}, None)
-    columns.update(split(COLORS, (table.colors[:, :3] - 0.5) / CONSTANT))
+    colors = unit_colors(np.stack([columns[name] for name in named], axis=1))
+    columns.update(split(COLORS, (colors[:, :3] - 0.5) / CONSTANT))
     for name in named:
         del columns[name]
     return f"colors by {' '.join(named)}: the same from all sides"

@@ -4,10 +4,14 @@ import json
 from typing import NamedTuple
 
 import bpy
+import numpy as np
 
 from ...core.files import Digits, join_digits
 from ..objects.attributes import point_count, read_attribute
 from ..objects.place import COLUMNS
+
+RENAMED = "file_"  # before names of columns that Blender keeps for itself
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 class Column(NamedTuple):
@@ -58,11 +62,27 @@ def read_columns(obj, names) -> dict:
     return columns
 
 
-def tell_columns(obj) -> list:
-    """Return notices of the columns whose numbers an object keeps otherwise than its file."""
-    return [
-        f"{obj.name}: {_told(name, *column)}; exports write it as it was" for name, column in kept_columns(obj).items()
-    ]
+def tell_columns(obj, attributes) -> list:
+    """Return notices of the columns of a file, by name, whose names or numbers an object keeps otherwise."""
+    there = obj.data.attributes
+    kept = kept_columns(obj).items()
+    notices = [f"{obj.name}: {_told(name, *column)}; exports write it as it was" for name, column in kept]
+    names = [name for name in attributes if RENAMED + name in there and RENAMED + name not in attributes]
+    renamed = [f"{name} as {RENAMED}{name}" for name in names]
+    if renamed:
+        notices.append(f"{obj.name}: Blender keeps some names for itself: stored {', '.join(renamed)}")
+    counts = {name: _too_large(values) for name, values in attributes.items() if name in there}
+    endless = [f"{count:,} of {name}" for name, count in counts.items() if count]
+    if endless:
+        notices.append(f"{obj.name}: numbers too large for Blender are infinite: {', '.join(endless)}")
+    return notices
+
+
+def _too_large(values):
+    """Return how many numbers single precision cannot hold."""
+    if values.dtype != np.float64:
+        return 0
+    return np.count_nonzero(np.isfinite(values) & (np.abs(values) > _LARGEST))
 
 
 def _told(name, digits, second):

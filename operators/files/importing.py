@@ -257,7 +257,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
 
     def _tell(self, obj, table, shared, what):
         """Report what was imported, and what became of its coordinates."""
-        for notice in (*table.notices, *tell_columns(obj)):
+        for notice in (*table.notices, *tell_columns(obj, getattr(table, "attributes", {}))):
             self.warn(notice, obj)
         offset = offset_of(obj)
         self.report({"INFO"}, f"{obj.name}: {what}")

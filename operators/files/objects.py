@@ -34,7 +34,7 @@ from ..objects.colors import COLOR, own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions
-from .columns import Column, doubted_columns, known_digits, read_columns, remember_columns
+from .columns import RENAMED, Column, doubted_columns, known_digits, read_columns, remember_columns
 
 INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
@@ -139,9 +139,10 @@ def add_column(mesh, name, values):
     else:
         kind = "INT" if values.dtype.kind in "iu" and _fit(values) else "FLOAT"
     name = name.encode()[:_LONGEST_NAME].decode(errors="ignore")
-    layer = None if name in mesh.attributes else mesh.attributes.new(name, kind, "POINT")
+    free = name not in mesh.attributes and not name.startswith(".")  # which hides an attribute
+    layer = mesh.attributes.new(name, kind, "POINT") if free else None
     if layer is None:  # Blender keeps a few names for itself, each for one type
-        layer = mesh.attributes.new(f"file_{name}", kind, "POINT")
+        layer = mesh.attributes.new(f"{RENAMED}{name}", kind, "POINT")
     name = layer.name
     write_attribute(mesh, name, values, kind)
     return name

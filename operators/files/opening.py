@@ -47,7 +47,7 @@ def load(path, name: str = "", option: str = "--object", read=read_file):
         bpy.ops.wm.read_homefile(use_empty=True)
         add = add_object if isinstance(given, PointTable) else add_splats
         obj = add(path.stem, given, bpy.context.scene.collection)
-        notices = [*given.notices, *tell_columns(obj)]
+        notices = [*given.notices, *tell_columns(obj, getattr(given, "attributes", {}))]
     elif path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
     else:

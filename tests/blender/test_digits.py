@@ -148,6 +148,18 @@ def test_what_is_kept_otherwise_is_told(tmp_path, capfd):
     assert "PLY has no type for hash: it is hash + 4294967296 hash_high" in capfd.readouterr().out
 
 
+def test_names_and_numbers_that_blender_cannot_keep_are_told(tmp_path, capfd):
+    rows = ["1,2,3,7,8,9,-1.7976931348623157e308", "4,5,6,7,8,9,2"]
+    (tmp_path / "in.csv").write_text("\n".join(["x,y,z,.hidden,position,plain,none", *rows]))
+    obj = run_import(tmp_path / "in.csv")
+    told = capfd.readouterr().out
+    assert "stored .hidden as file_.hidden, position as file_position" in told
+    assert "numbers too large for Blender are infinite: 1 of none" in told
+    assert "plain" not in told
+    assert attribute(obj, "file_.hidden").tolist() == [7.0, 7.0]
+    assert "file_.hidden" in exported(tmp_path / "out.csv").attributes
+
+
 def test_tiles_can_be_joined(tmp_path, capfd):
     times = COLUMNS["timestamp"]
     write_ply(tmp_path / "a.ply", {"timestamp": times})

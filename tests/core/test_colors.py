@@ -120,3 +120,30 @@ def test_opacity_has_a_range_of_its_own(tmp_path):
     assert_allclose(read_points(tmp_path / "a.csv").colors, [[1.0, 0.0, 0.2, 1.0], [0.0, 0.0, 0.0, 0.5]], atol=1e-6)
     (tmp_path / "a.csv").write_text("x,y,z,r,g,b,alpha\n0,0,0,1,0,0.2,255\n1,0,0,0,0,0,51\n")
     assert_allclose(read_points(tmp_path / "a.csv").colors, [[1.0, 0.0, 0.2, 1.0], [0.0, 0.0, 0.0, 0.2]], atol=1e-6)
+
+
+@pytest.mark.parametrize("bits", [10, 12])
+@pytest.mark.parametrize("ending", ["ply", "pcd", "las", "csv"])
+def test_colors_of_ten_and_twelve_bits_are_bright_and_told(tmp_path, ending, bits):
+    full = 2**bits - 1
+    colors = np.array([[full, 0, 0], [full - 3, full // 2, 5]], np.uint16)
+    path = tmp_path / f"a.{ending}"
+    {"ply": write_ply, "pcd": write_pcd, "las": write_las, "csv": write_text}[ending](path, colors)
+    table = read_points(path)
+    assert_allclose(table.colors[:, :3], colors / full, atol=1e-6)
+    assert any(f"colors from 0 to {full}" in notice for notice in table.notices)
+
+
+@pytest.mark.parametrize(
+    "names", ["r,g,b,a", "R,G,B,A", "Rf,Gf,Bf,Af", "Color_R,Color_G,Color_B,Color_A", "Rot,Grün,Blau,A"]
+)
+def test_alpha_by_its_letter_beside_colors_is_alpha(tmp_path, names):
+    (tmp_path / "a.csv").write_text(f"x,y,z,{names}\n1,2,3,1,0.5,0,0.25\n4,5,6,0,0,0.5,1\n", encoding="utf-8")
+    table = read_points(tmp_path / "a.csv")
+    assert_allclose(table.colors, [[1.0, 0.5, 0.0, 0.25], [0.0, 0.0, 0.5, 1.0]])
+    assert not table.attributes
+
+
+def test_a_without_colors_is_an_attribute(tmp_path):
+    (tmp_path / "a.csv").write_text("x,y,z,nx,ny,nz,a\n1,2,3,0,0,1,7\n")
+    assert read_points(tmp_path / "a.csv").attributes["a"].tolist() == [7.0]

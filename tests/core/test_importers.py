@@ -676,3 +676,79 @@ def test_no_row_names_are_taken_for_granted_beside_an_id(tmp_path):
     rows = [f"{i + 1} {row} {7 * i}" for i, row in enumerate(NORTHINGS)]
     (tmp_path / "a.csv").write_text("\n".join(["id,y,x,z", *rows]).replace(" ", ","))
     assert read_points(tmp_path / "a.csv").points[0].tolist() == [400_000.0, 5_400_000.0, 300.0]
+
+
+@pytest.mark.parametrize("separator", [" ", ",", ";", "\t"])
+def test_nan_as_visual_c_writes_it_is_no_comment(tmp_path, separator):
+    rows = [
+        "x y z s t",
+        "1 2 3 1.#QNAN 7",
+        "4 5 6 -1.#IND00 8",
+        "7 8 9 1.#INF 9",
+        "1.#QNAN 8 9 -nan(ind) 9",
+        "9 9 9 4 5",
+    ]
+    (tmp_path / "a.txt").write_text("\n".join(rows).replace(" ", separator))
+    table = read_points(tmp_path / "a.txt")
+    assert table.points.tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9], [9, 9, 9]]
+    assert_array_equal(table.attributes["s"], [np.nan, np.nan, np.inf, 4.0])
+    assert table.attributes["t"].tolist() == [7, 8, 9, 5]
+    assert any("left out 1 points" in notice for notice in table.notices)
+
+
+def test_fractions_in_bytes_of_a_ply_of_text_stay(tmp_path):
+    head = "ply\nformat ascii 1.0\nelement vertex 2\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz")
+    head += "".join(f"property uchar {color}\n" for color in ("red", "green", "blue"))
+    (tmp_path / "a.ply").write_text(head + "end_header\n1 2 3 0.5 0 0\n4 5 6 1 0.25 0\n")
+    assert_allclose(read_points(tmp_path / "a.ply").colors[:, :3], [[0.5, 0.0, 0.0], [1.0, 0.25, 0.0]])
+
+
+def test_colors_of_an_obj_with_alpha_are_no_weights(tmp_path):
+    (tmp_path / "a.obj").write_text("v 1 2 3 0.5 0.25 1 0.75\nv 4 5 6 1 0 0 1\n")
+    assert_allclose(read_points(tmp_path / "a.obj").colors, [[0.5, 0.25, 1.0, 0.75], [1.0, 0.0, 0.0, 1.0]])
+
+
+def test_colors_of_some_vertices_of_an_obj_are_told(tmp_path):
+    (tmp_path / "a.obj").write_text("v 1 2 3\nv 4 5 6 1 0 0\n")
+    (notice,) = read_points(tmp_path / "a.obj").notices
+    assert "left out r, g, b" in notice
+
+
+TURNED = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [500_000, 5_400_000, 300, 1]])
+
+
+@pytest.mark.parametrize(
+    "matrix", [TURNED, TURNED.T, TURNED + 1e-9 * (np.arange(4) == 3)], ids=["rows", "columns", "rounded"]
+)
+@pytest.mark.parametrize("before", ["", "# exported by a scanner\n"])
+@pytest.mark.parametrize("ending", ["txt", "ptx"])
+def test_ptx_with_comments_or_a_matrix_of_columns_is_placed(tmp_path, matrix, before, ending):
+    rows = "\n".join(" ".join(map(repr, row)) for row in matrix.tolist())
+    head = f"2\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n{rows}\n"
+    (tmp_path / f"a.{ending}").write_text(before + head + "1 2 3 0.25\n0 0 0 0.5\n")
+    assert read_points(tmp_path / f"a.{ending}").points.tolist() == [[499_998.0, 5_400_001.0, 303.0]]
+
+
+@pytest.mark.parametrize("largest", ["3.4028235e38", "-1.7976931348623157e308"])
+def test_points_at_the_largest_number_have_no_place(tmp_path, largest):
+    (tmp_path / "a.csv").write_text(f"x,y,z,s\n1,2,3,4\n{largest},{largest},{largest},5\n7,8,9,6\nnan,0,0,7\n")
+    table = read_points(tmp_path / "a.csv")
+    assert table.points.tolist() == [[1, 2, 3], [7, 8, 9]]
+    assert table.attributes["s"].tolist() == [4, 6]
+    assert "left out 2 points that the sensor missed (NaN, or beyond 1e+30)." in table.notices[-1]
+
+
+def test_what_counts_points_is_no_intensity(tmp_path):
+    rows = [f"{i} {x} {y} {z} {r} {g} {b}" for i, ((x, y, z), (r, g, b)) in enumerate(zip(PLACES, BYTES, strict=True))]
+    (tmp_path / "a.txt").write_text("\n".join(rows))
+    table = read_points(tmp_path / "a.txt")
+    assert [*table.attributes] == ["column_1"]
+    assert_allclose(table.colors[:, :3], BYTES / 255.0, atol=1e-6)
+
+
+def test_a_full_alpha_beside_colors_as_shares_is_one(tmp_path):
+    np.savetxt(tmp_path / "a.txt", np.hstack([PLACES, BYTES / 255.0, np.ones((COUNT, 1))]), fmt="%.8f")
+    table = read_points(tmp_path / "a.txt")
+    assert not table.attributes
+    assert_allclose(table.colors[:, 3], 1.0)

@@ -357,3 +357,14 @@ class TestDegrees:
         self.write(tmp_path / "a.las", [self.keys(2)], 10.0 * self.PLACES)
         table = read_points(tmp_path / "a.las")
         assert (table.degrees, table.notices) == (False, [])
+
+
+@pytest.mark.parametrize(("point_format", "version"), [(1, "1.2"), (3, "1.2"), (6, "1.4"), (7, "1.4")])
+def test_times_keep_their_digits_and_are_absent_where_all_are_zero(tmp_path, point_format, version):
+    las = laspy.LasData(laspy.LasHeader(point_format=point_format, version=version))
+    las.x = las.y = las.z = np.arange(3.0)
+    las.write(str(tmp_path / "a.las"))
+    assert "gps_time" not in read_points(tmp_path / "a.las").attributes
+    las.gps_time = np.array([3e8, 3e8 + 1e-6, 3e8 + 2e-6])
+    las.write(str(tmp_path / "b.las"))
+    assert read_points(tmp_path / "b.las").attributes["gps_time"].tolist() == las.gps_time.tolist()

@@ -180,6 +180,16 @@ class TestNotFinite:
         core.write_splats(tmp_path / "again.ply", found)
         assert len(core.read_splats(tmp_path / "again.ply")) == 12
 
+    def test_harmonics_without_a_number_and_places_far_out_are_left_out_too(self, tmp_path):
+        columns = splat_files.some_columns(20)
+        columns |= {f"f_rest_{number}": np.zeros(20, np.float32) for number in range(9)}
+        columns["f_rest_4"][3], columns["y"][7] = np.nan, np.finfo(np.float32).max
+        found = read_as_trained(tmp_path, columns)
+        assert len(found) == 18
+        assert np.isfinite(found.harmonics).all()
+        assert "left out 2 splats" in found.notices[0]
+        assert "or places beyond 1e+30." in found.notices[0]
+
     def test_a_file_of_nothing_else_is_refused(self, tmp_path):
         columns = splat_files.some_columns(5)
         columns["x"][:] = np.nan

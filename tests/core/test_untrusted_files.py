@@ -291,7 +291,7 @@ HUGE = 2 * ("element camera 999999999999999\n" + 400 * "property double a\n")
         ("a.xyz", "1 2 3\n٣ 2 3\n".encode(), "line 2 has '٣' where a number"),
         ("a.xyz", b"1 2 3\n4\0 5 6\n", "line 2 has '4.x00' where a number"),
         ("a.xyz", b"1 2 3\n4 5 6//c 7\n8 9", "line 3 has 2 columns only"),
-        ("a.xyz", b"1 2 3\n4 5 1e300\n", "1 of 2 points .* beyond 1e.30, the first of them is point 2"),
+        ("a.xyz", b"1 2 1e300\n4 5 1e300\n", "2 of 2 points .* beyond 1e.30, the first of them is point 1"),
         ("a.csv", "x,y,z\n1,2,3\n".encode("utf-16-le"), "there are none"),
         ("a.ptx", b"1 2 3\n", "is no PTX file"),
         ("a.ptx", PTX_HEAD.replace(b"30", b"3") + b"1 2 3 0\n1 2 3 0", "announces 3 points in scan 1, but 2 follow"),
