@@ -16,6 +16,7 @@ from .lanczos import lift_lowest
 TOLERANCE = 2e-7  # leaves eigenvalues right to ten digits and more, for their errors go by its square
 
 _FEW = 0.01  # modes over points up to which coarse versions pay: of 6,000 to 50,000 random points
+_ALIKE = 1e-4  # share by which the sizes of entries differ that are the same on a symmetric shape
 _FLAT = 4.0  # the symbol hardly rises beyond
 
 
@@ -28,7 +29,8 @@ class Spectrum:
     eigenvalues : ndarray, (count,)
         Ascending, non-negative [1 / L^2].
     eigenvectors : ndarray, (n, count)
-        Orthonormal for the areas: ``phi.T @ (areas * phi)`` is the identity. The entry of largest size is positive.
+        Orthonormal for the areas: ``phi.T @ (areas * phi)`` is the identity. The first of the entries of
+        largest size is positive.
     residuals : ndarray, (count,), or None
         ``|A y - lambda y|`` of the raw pairs, y of length one, over the last eigenvalue, or over what Weyl's law makes
         of it, ``4 pi count / area``, where that is more.
@@ -79,9 +81,11 @@ def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=No
             f" of {tolerance:g}. Ask for fewer modes, or raise the tolerance."
         )
     vectors = root[:, None] * vectors
-    largest = np.argmax(np.abs(vectors), axis=0)
+    # The first of the largest entries is positive: on a symmetric shape rounding would choose one among equals.
+    sizes = np.abs(vectors)
+    first = np.argmax(sizes >= (1.0 - _ALIKE) * sizes.max(axis=0), axis=0)
     result = np.zeros((n, count))
-    result[order] = vectors * np.sign(vectors[largest, np.arange(count)])
+    result[order] = vectors * np.sign(vectors[first, np.arange(count)])
     return Spectrum(unit * np.maximum(values, 0.0), result, residuals)
 
 

@@ -56,6 +56,7 @@ def fail_everywhere(extension, make, name, step=3, **settings):
             bpy.ops.wm.read_homefile(use_empty=True)
             make()
             before, spoiled = scene(), False
+            active = bpy.context.object.name
         with Fault(extension, number) as fault:
             try:
                 getattr(bpy.ops.meshfree, name)(**settings)
@@ -64,6 +65,7 @@ def fail_everywhere(extension, make, name, step=3, **settings):
                 failures += 1
         if spoiled and not fault.happened:
             return failures
+        assert spoiled or bpy.context.object.name == active
         assert spoiled or not differences(scene(), before), (
             number
         )  # spoiled: Blender goes on when a setting's own function fails

@@ -91,8 +91,9 @@ def test_no_mode_but_the_constant_of_each_component_is_zero_and_none_lives_on_fe
 def test_signs_are_deterministic(laplacian, spectrum):
     again = laplacian.eigenpairs(20)
     np.testing.assert_array_equal(again.eigenvectors, spectrum.eigenvectors)
-    largest = np.argmax(np.abs(spectrum.eigenvectors), axis=0)
-    assert np.all(spectrum.eigenvectors[largest, np.arange(20)] > 0.0)
+    sizes = np.abs(spectrum.eigenvectors)
+    largest = spectrum.eigenvectors.max(axis=0)
+    assert np.all(largest >= (1.0 - 1e-4) * sizes.max(axis=0))  # one of the largest is positive
 
 
 def test_correction_raises_the_eigenvalues_of_the_same_vectors(laplacian, spectrum):
