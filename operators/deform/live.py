@@ -421,8 +421,7 @@ def _drop(uid):
 
 def _start(obj, key, pose, depsgraph):
     """Start a thread that settles an object, if it is time for that; say whether there is more to come."""
-    written, settled = binding.written_pose(obj)
-    if settled and binding.same_pose(written, pose):
+    if _is_settled(obj, pose):
         return False
     if binding.same_pose(_troubles.get(obj.session_uid, (None, None))[1], pose):
         return False  # it would go wrong again
@@ -448,10 +447,18 @@ def _take(obj, job, key, pose):
             work = "Binding" if find(obj) is None else "The exact result"
             _troubles[obj.session_uid] = f"{work} was stopped. Press Update, or move a handle", pose
         return
-    if job.key == key:
+    if job.key != key:
+        return
+    if not is_prepared(obj):  # a render may have been faster
         keep(obj, live)
-        if binding.same_pose(job.pose, pose):
-            write(obj, live, moved, pose, settled)
+    if binding.same_pose(job.pose, pose) and (settled or not _is_settled(obj, pose)):
+        write(obj, live, moved, pose, settled)
+
+
+def _is_settled(obj, pose):
+    """Whether what an object shows is exact for a pose."""
+    written, settled = binding.written_pose(obj)
+    return settled and binding.same_pose(written, pose)
 
 
 def _is_playing():
