@@ -9,7 +9,7 @@ from scipy.sparse.linalg import LinearOperator, eigs, eigsh, splu
 from scipy.spatial import cKDTree
 
 import core
-from core.operator.solvers import solve_symmetric
+from core.algebra.solvers import solve_symmetric
 
 _WIDE = 60  # neighbours per point from which factors cost more than Lanczos steps and conjugate gradients
 _TOLERANCE = 1e-10  # of the eigenvalue solvers, relative

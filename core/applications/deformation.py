@@ -4,12 +4,11 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..algebra import TRACE, blocks, dissect, factorize, nearest_rotations, rotations_in_groups, sparsify
 from ..arguments import as_array, as_doubles, check_positions, check_switches, real, whole
-from ..blocks import blocks
 from ..errors import PointCloudError
 from ..geometry import as_indices
-from ..operator import dissect, factorize, narrow_laplacian, sparsify
-from ..rotations import TRACE, nearest_rotations, rotations_in_groups
+from ..operator import narrow_laplacian
 from .gradients import DeformationGradients, coupled, sums_over_steps
 from .graph import coupled_components
 

@@ -4,11 +4,12 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..algebra import solve_symmetric
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from ..kernel import SECOND_MOMENT
-from ..operator import narrow_laplacian, solve_symmetric
+from ..operator import narrow_laplacian
 from .graph import coupled_components, mean_spacing
 
 _MEAN = 1e-2  # of the source's mean size: a larger mean is meant, a smaller one is left by the quadrature

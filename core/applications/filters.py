@@ -8,11 +8,12 @@ from scipy.fft import dct
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from scipy.special import expit
 
+from ..algebra import Rows
 from ..arguments import as_array, check_switches, real, whole
 from ..errors import InvalidPointsError, PointCloudError, SolverError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
-from ..operator import Rows, symmetric_form
+from ..operator import symmetric_form
 
 _NODES = 4096  # at which a response is read
 _DEGREE = 800  # of a polynomial, at most

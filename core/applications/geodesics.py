@@ -8,8 +8,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from ..algebra import blocks, on_all_cores
 from ..arguments import check_switches
-from ..blocks import blocks, on_all_cores
 from ..errors import InvalidPointsError
 from ..geometry import as_indices, as_mask, circle_arc, pair_heights
 from .graph import mean_spacing

@@ -4,9 +4,9 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..algebra import rotations_in_groups
 from ..arguments import check_positions
 from ..geometry import frames
-from ..rotations import rotations_in_groups
 
 _FAINT = 1e-3  # share of what its area asks below which a point counts as coupled to none
 _ROUND = 0.05  # share of the smaller extent of a neighbourhood, squared, in both: a half where it is round

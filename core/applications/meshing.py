@@ -7,8 +7,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..algebra import blocks, on_all_cores
 from ..arguments import real
-from ..blocks import blocks, on_all_cores
 from ..errors import NotEnoughMemoryError, PointCloudError
 from ..geometry import Prolongation, check_points
 from ..memory import available_memory

@@ -6,10 +6,11 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..algebra import Iterate, conjugate_gradients
 from ..arguments import real, whole
 from ..errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloudError
 from ..geometry import FEWEST, as_mask, check_points, find_nearest
-from ..operator import Iterate, LaplaceBeltrami, build_laplacian, conjugate_gradients
+from ..operator import LaplaceBeltrami, build_laplacian
 from ..options import LaplacianOptions, check_options
 from .boundary_curve import BoundaryCurve
 

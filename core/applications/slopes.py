@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..algebra import blocks, on_all_cores
 from ..arguments import as_array, as_doubles, check_positions
-from ..blocks import blocks, on_all_cores
 from ..errors import InvalidPointsError
 from ..geometry import Discs, frames
 from .gradients import lifted_inverse

@@ -7,10 +7,10 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..algebra import solve_symmetric
 from ..arguments import check_switches, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
-from ..operator import solve_symmetric
 from .filters import chebyshev_filter, fairing, spectral_filter
 from .sizes import SurfaceSize, match_size
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from ..algebra import TwoGrid, blocks, on_all_cores
 from ..arguments import as_array, as_doubles
-from ..blocks import blocks, on_all_cores
 from ..errors import InvalidPointsError
 from ..geometry import as_indices
-from ..operator import TwoGrid, connection_laplacian, tangent_frames
+from ..operator import connection_laplacian, tangent_frames
 from .geodesics import Geodesics
 
 _TIME = 2.0  # smoothing lengths that heat spreads over: with fewer, the randomness of points is not averaged out

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..blocks import blocks, on_all_cores
-from ..dense import inverses
+from ..algebra import blocks, inverses, on_all_cores
 from ..kernel import SUPPORT
 from .components import label_connected
 from .distances import arc_squared

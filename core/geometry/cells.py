@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..blocks import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores
 from .distances import arc_squared
 from .quadrics import frames
 from .sheets import on_sheet

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..blocks import on_all_cores
+from ..algebra import on_all_cores
 from .nearest import SMOOTH
 
 _STEPS = 8  # nearest neighbours whose chords tell of roughness

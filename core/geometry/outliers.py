@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..blocks import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores
 from .nearest import ON
 from .noise import FILLING
 from .quadrics import fit_quadrics, heights_over

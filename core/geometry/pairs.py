@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from ..blocks import on_all_cores
+from ..algebra import on_all_cores
 from ..kernel import SUPPORT
 from .patches import divide_pairs
 

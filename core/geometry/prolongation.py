@@ -4,8 +4,8 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..algebra import blocks, on_all_cores
 from ..arguments import as_array
-from ..blocks import blocks, on_all_cores
 from ..errors import InvalidPointsError
 from .nearest import SMOOTH
 from .points import as_mask, check_points, check_values

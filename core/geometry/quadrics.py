@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..blocks import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores
 from ..errors import NotASurfaceError
 
 _BLOCK = 1 << 13  # points fitted at one time

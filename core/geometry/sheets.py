@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
-from ..blocks import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores
 from .components import label_connected, number_by_size
 from .distances import pair_heights
 from .nearest import ON, SMOOTH, Nearest, changed_rows

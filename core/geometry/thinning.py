@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..blocks import blocks
+from ..algebra import blocks
 from .subset import independent
 
 _STEP = 2.0  # each pass leaves a quarter of the points

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.special import expit
 
-from ..blocks import on_all_cores
+from ..algebra import on_all_cores
 from ..errors import SolverError
 from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 
-from ..blocks import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores
 
 _BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
 

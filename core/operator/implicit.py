@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..blocks import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores
 from ..geometry import SMOOTH, find_nearest
 
 _NEIGHBORS = 12  # of a place, whose quadrics are averaged

@@ -6,12 +6,11 @@ import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
+from ..algebra import coarse_to_fine, lift_lowest
 from ..arguments import real, whole
 from ..errors import PointCloudError, SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_symbol, symbol
 from ..memory import check_mode_memory
-from .davidson import coarse_to_fine
-from .lanczos import lift_lowest
 
 TOLERANCE = 2e-7  # leaves eigenvalues right to ten digits and more, for their errors go by its square
 

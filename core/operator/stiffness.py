@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from ..blocks import on_all_cores
+from ..algebra import on_all_cores
 from ..kernel import SECOND_MOMENT, pair_kernel
 from .curvature import weight_factor
 from .images import mirror, own_images

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..blocks import on_all_cores
-from ..dense import inverses
+from ..algebra import inverses, on_all_cores
 from ..geometry import dots, frames
 from ..kernel import SECOND_MOMENT, SUPPORT
 from .curvature import second_moment, uneven

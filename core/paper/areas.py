@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
+from ..algebra import bounded_quadratic, conjugate_gradients
 from ..errors import AreaError
-from ..operator import SOLVERS, AreaSolution, bounded_quadratic, conjugate_gradients
+from ..operator import SOLVERS, AreaSolution
 
 _RTOL = 1e-12  # a looser one leaves areas open by as much as themselves: small eigenvalues weigh as little as rho
 _START = 1000  # products for a start that need not be exact

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from ..blocks import blocks, on_all_cores
-from ..rotations import nearest_rotations
+from ..algebra import blocks, nearest_rotations, on_all_cores
 
 _BLOCK = 1 << 13  # ellipsoids worked on at one time
 _SWEEPS = 12  # of Jacobi's method; six reach full precision even for axes of a millionth

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..blocks import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores
 from ..errors import InvalidPointsError
 
 _SEEN = 0.05  # opacity in the middle: nobody sees that less of what lies behind comes through

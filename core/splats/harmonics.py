@@ -7,7 +7,7 @@ Rendering. ACM Trans. Graph. 42, 2023.
 
 import numpy as np
 
-from ..blocks import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores
 
 COUNTS = (0, 3, 8, 15, 24)  # of harmonics up to the degrees 0 to 4
 CONSTANT = 0.5 / np.sqrt(np.pi)  # the harmonic of degree 0

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..algebra import nearest_rotations
 from ..arguments import as_array
 from ..errors import InvalidPointsError
-from ..rotations import nearest_rotations
 from .ellipsoids import mapped, matrices_of
 from .harmonics import COUNTS, turned
 

@@ -16,11 +16,11 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
+from core.algebra.solvers import bounded_quadratic
 from core.geometry.boundary import no_boundary
 from core.geometry.cloud import read_cloud
 from core.geometry.distances import arc_length
 from core.operator.areas import KernelMatrix, fast_areas, solve_areas
-from core.operator.solvers import bounded_quadratic
 from core.options import LaplacianOptions
 from core.paper.areas import TAU, constrained_areas, regularized_areas
 

@@ -5,7 +5,7 @@ import pytest
 
 import core
 from benchmarks.samplings import fibonacci_sphere
-from core.blocks import blocks, on_all_cores
+from core.algebra.blocks import blocks, on_all_cores
 
 
 @pytest.mark.parametrize(("count", "size"), [(10, 3), (9, 3), (2, 5), (0, 4)])

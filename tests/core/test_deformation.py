@@ -9,10 +9,10 @@ from scipy import sparse
 import core
 from benchmarks.deformation import LENGTH, bar_ends, section_areas, turns
 from benchmarks.samplings import bar, bent_end, fibonacci_sphere, random_sphere, square_grid
+from core.algebra.factors import sparsify
+from core.algebra.rotations import nearest_rotations
 from core.geometry.points import as_indices
-from core.operator.factors import sparsify
 from core.operator.laplacian import narrow_laplacian
-from core.rotations import nearest_rotations
 
 QUARTER = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 MODES = [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from core import dense
+from core.algebra import dense
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

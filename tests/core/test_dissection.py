@@ -7,8 +7,8 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 import core
-from core.operator.cholesky import factorize
-from core.operator.factors import dissect
+from core.algebra.cholesky import factorize
+from core.algebra.factors import dissect
 
 
 def near_matrix(points, reach):
@@ -80,7 +80,7 @@ def test_it_may_be_stopped():
 )
 @pytest.mark.parametrize("shape", [(), (1,), (3,)])
 def test_factors_solve_the_equations(points, reach, shape, monkeypatch):
-    monkeypatch.setattr("core.operator.cholesky._WIDEST", 50)  # so that parts are cut
+    monkeypatch.setattr("core.algebra.cholesky._WIDEST", 50)  # so that parts are cut
     matrix = near_matrix(points, reach)
     order, starts = dissect(matrix, points)
     ordered = matrix[order][:, order]

@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 import core
 from benchmarks.samplings import random_sphere
-from core.operator import solvers
-from core.operator.hierarchy import approximate_inverse
-from core.operator.solvers import conjugate_gradients, solve_symmetric
+from core.algebra import solvers
+from core.algebra.hierarchy import approximate_inverse
+from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
 CLOUDS = ["random sphere", "random torus", "random square", "density jump"]
 

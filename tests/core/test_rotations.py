@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from core.rotations import rotations_in_groups
+from core.algebra.rotations import rotations_in_groups
 
 
 def test_what_a_line_leaves_free_is_the_turn_of_its_group():

@@ -5,7 +5,7 @@ import pytest
 from scipy import sparse
 
 import core
-from core.operator.solvers import conjugate_gradients, solve_symmetric
+from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
 
 def chain(diagonal):

@@ -7,8 +7,9 @@ from scipy.sparse.linalg import splu
 
 import core
 from benchmarks.samplings import open_cylinder, random_sphere, square_grid, square_random, torus_points
+from core.algebra import TwoGrid
 from core.applications.geodesics import Geodesics
-from core.operator import TwoGrid, connection_laplacian, tangent_frames
+from core.operator import connection_laplacian, tangent_frames
 
 
 def connection(laplacian):
@@ -126,7 +127,7 @@ class TestTwoGrid:
         assert residual < 1e-2
 
     def test_what_does_not_converge_is_an_error(self, square, monkeypatch):
-        monkeypatch.setattr("core.operator.two_grid._STEPS", 1)
+        monkeypatch.setattr("core.algebra.two_grid._STEPS", 1)
         with pytest.raises(core.SolverError, match="in 1 steps"):
             core.transport(square, [0], [1.0, 0.0, 0.0])
 

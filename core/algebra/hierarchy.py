@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.linalg import pinvh
 from scipy.sparse.linalg import LinearOperator
 
-from ..dense import product
+from .dense import product
 
 SMALL = 1000  # unknowns that are solved whole in a tenth of a second
 PART = 1 << 20  # entries of a matrix that are multiplied in one go: some hundredths of a second

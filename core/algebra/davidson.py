@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from scipy.linalg import eigh
 
-from ..dense import product
+from .dense import product
 from .hierarchy import SMALL, Level, build_levels, solve_roughly
 
 _DENSE = 4000  # in ten seconds; where the coarsest version has more, this is not the way

@@ -6,9 +6,9 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg.lapack import dpotrf, dtrtri
 
-from ..blocks import blocks
-from ..dense import product
 from ..errors import SolverError
+from .blocks import blocks
+from .dense import product
 
 _BANDS = 6  # in which the lower half of a matrix is gone through
 _WIDEST = 512  # unknowns that are eliminated at one time, so that no step takes long

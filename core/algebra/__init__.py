@@ -1,0 +1,12 @@
+"""Linear algebra without geometry: blocks of rows, small dense systems, rotations, solvers, factors, eigenpairs."""
+
+from .blocks import blocks, on_all_cores
+from .cholesky import factorize
+from .davidson import coarse_to_fine
+from .dense import inverses
+from .factors import dissect, sparsify
+from .hierarchy import Rows
+from .lanczos import lift_lowest
+from .rotations import TRACE, nearest_rotations, rotations_in_groups
+from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_symmetric
+from .two_grid import TwoGrid
