@@ -13,106 +13,22 @@ of the unit sphere, where answers are known:
 >>> points = np.column_stack([ring.real, ring.imag, z])
 """
 
+import ast
 import importlib
 import threading
+from pathlib import Path
 
 from .errors import BrokenLibraryError
 
-_NAMES = {  # the public ones, by the module or package that is imported when one of them is first asked for
-    "applications": (
-        "CoarseDeformer",
-        "Deformer",
-        "Deviation",
-        "Geodesics",
-        "IsoLine",
-        "MatchedModes",
-        "MinimalSurface",
-        "PointBlend",
-        "Slopes",
-        "SurfaceMesh",
-        "Transport",
-        "band",
-        "boost",
-        "chebyshev_filter",
-        "deformation_gradients",
-        "displace_by_mode",
-        "exponential",
-        "fair_points",
-        "fairing",
-        "front_point",
-        "geodesic_distance",
-        "grow",
-        "harmonic_field",
-        "heat_kernel_signature",
-        "iso_lines",
-        "logarithmic_map",
-        "match_modes",
-        "mesh_surface",
-        "minimal_surface",
-        "modes_needed",
-        "nearest_source",
-        "nodal_domains",
-        "opposite_ends",
-        "roughness",
-        "segment",
-        "signature_energies",
-        "signature_times",
-        "signed_distance",
-        "smooth_points",
-        "smoothing_base",
-        "solve_poisson",
-        "spectral_filter",
-        "surface_deviation",
-        "transport",
-        "values_on_mesh",
-        "wave_kernel_signature",
-    ),
-    "errors": (
-        "AreaError",
-        "BrokenLibraryError",
-        "Cancelled",
-        "ComponentError",
-        "InvalidPointsError",
-        "NotASurfaceError",
-        "NotEnoughMemoryError",
-        "PointCloudError",
-        "SolverError",
-        "TooFewPointsError",
-        "UnresolvedModesError",
-    ),
-    "geometry": (
-        "Discs",
-        "Prolongation",
-        "blue_noise_subset",
-        "check_points",
-        "estimate_normals",
-        "orient_normals",
-        "surface_discs",
-    ),
-    "memory": ("points_that_fit",),
-    "operator": (
-        "LaplaceBeltrami",
-        "PrincipalCurvatures",
-        "Spectrum",
-        "build_laplacian",
-        "estimate_areas",
-        "mean_curvature",
-        "principal_curvatures",
-    ),
-    "options": ("LaplacianOptions",),
-    "paper": (
-        "Stability",
-        "check_stability",
-    ),
-    "splats": (
-        "Splats",
-        "floaters",
-        "read_splats",
-        "write_splats",
-    ),
-}
-_HOMES = {name: home for home, names in _NAMES.items() for name in names}
-_PACKAGES = (*_NAMES, "files")
+
+def _read_homes():
+    """Return the module of each public name, from the stub, which type checkers read, too."""
+    stub = ast.parse(Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8"))
+    return {alias.name: node.module for node in stub.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+
+
+_HOMES = _read_homes()
+_PACKAGES = (*{home.partition(".")[0] for home in _HOMES.values()}, "files")
 _WITH_PAPER = ("operator", "applications")
 _lock = threading.RLock()  # scipy imports itself in circles, which two threads at once might enter from two sides
 
@@ -125,7 +41,7 @@ def __getattr__(name):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = _HOMES.get(name, name)
     with _lock:
-        if home in _WITH_PAPER:
+        if home.partition(".")[0] in _WITH_PAPER:
             _import("paper")  # whose areas become choices of the operator
         module = _import(home)
     found = module if name == home else getattr(module, name)

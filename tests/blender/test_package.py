@@ -83,7 +83,8 @@ def test_the_preferences_open_the_manual(extension):
 
 def test_zip_holds_the_package_of_this_tree_and_nothing_else(packed, manifest):
     sources = [package.ROOT / name for name in package.PACKAGE]
-    files = [path for source in sources for path in ([source] if source.is_file() else source.rglob("*.py"))]
+    code = [path for source in sources for pattern in ("*.py", "*.pyi") for path in source.rglob(pattern)]
+    files = [*code, *filter(Path.is_file, sources)]
     wheels = {f"wheels/{name}" for name in package.wheel_names(package.this_platform())}
     names = {path.relative_to(package.ROOT).as_posix() for path in files}
     assert sorted(packed.namelist()) == sorted(names | wheels | manual())

@@ -74,7 +74,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed():
 
     But for the panel that tells which scipy there is.
     """
-    light = {name for home in LIGHT for name in core._NAMES.get(home, ())}
+    light = {name for name, home in core._HOMES.items() if home in LIGHT}
     files = [path for path in BLENDER_SIDE if path.name != "missing.py"]
     names = [(path.name, name.lstrip(".").split(".")) for path in files for name in imported(path)]
     heavy = [
@@ -170,7 +170,7 @@ def test_a_wing_lists_only_what_others_use():
         above = [path for other in BELOW for path in modules_of(other)]
         used = {name.rpartition(".")[2] for path in above for name in imported(path) if f".{wing}." in name}
         outside = {name.removeprefix(f".{wing}.") for path in BLENDER_SIDE for name in taken(path)}
-        assert listed == used | {*core._NAMES.get(wing, ())} | (outside & listed)
+        assert listed == used | {name for name, home in core._HOMES.items() if home == wing} | (outside & listed)
 
 
 def test_core_needs_numpy_and_scipy_only():
