@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ...core import PointCloudError
-from .quantities import AREA, EIGENVECTOR, FIELD, quantity
+from .quantities import AREA, EIGENVECTOR, quantity
 
 
 class _Storage(NamedTuple):
@@ -182,8 +182,10 @@ def check_size(name: str, values):
         )
     largest = np.max(sizes, initial=0.0)
     if largest > kept.max:
-        grows = quantity(name).power < 0  # where lengths become smaller
-        way = "Use smaller values" if name == FIELD else f"Scale the object {'up' if grows else 'down'}"
+        row = quantity(name)
+        way = f"Scale the object {'up' if row.power < 0 else 'down'}"
+        if row.attribute and row.power == 0:
+            way = "Use smaller values"
         raise PointCloudError(
             f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. {way}."
         )

@@ -86,7 +86,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         NORMAL,
         "Normal",
-        "Unit normal, outwards where the points enclose a volume",
+        "Unit normal in local space, outwards where the points enclose a volume",
         "analyze",
         "laplacian.normals",
         "FLOAT_VECTOR",
@@ -111,7 +111,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         BOUNDARY,
         "Boundary",
-        "True where the surface ends",
+        "True for the points at which the surface ends",
         "analyze",
         "laplacian.boundary",
         "BOOLEAN",
@@ -120,7 +120,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         COMPONENT,
         "Component",
-        "Number of the component, the largest 0; -1 for points left out",
+        "Number of the component that a point belongs to, the largest 0; -1 for points left out",
         "analyze",
         "laplacian.component",
         "INT",
@@ -160,7 +160,14 @@ QUANTITIES = (  # in the order of the panel
         "first",
         power=-1,
     ),
-    Quantity(CURVATURE_2, "Curvature 2", "Curvature across that direction", "principal_curvatures", "second", power=-1),
+    Quantity(
+        CURVATURE_2,
+        "Curvature 2",
+        "Curvature where the surface bends outwards least",
+        "principal_curvatures",
+        "second",
+        power=-1,
+    ),
     Quantity(
         DIRECTION_1,
         "Direction 1",
@@ -184,7 +191,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         SIGNED_DISTANCE,
         "Signed Distance",
-        "Distance along the surface from a curve",
+        "Distance along the surface from a curve that lies on it, with a sign that tells the side",
         "signed_distance",
         power=1,
         color_range="symmetric",
@@ -192,7 +199,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         DEVIATION,
         "Deviation",
-        "How far each point is from the surface of another cloud",
+        "How far each point of a cloud is from the surface of another one, along its normal",
         "compare",
         power=1,
         color_range="symmetric",
@@ -212,7 +219,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         DISPLACEMENT,
         "Displacement",
-        "How far each point moved, in the object's space",
+        "How far each point moved",
         "deform_bind",
         data_type="FLOAT_VECTOR",
         power=1,
