@@ -33,7 +33,7 @@ class Quantity(NamedTuple):
     tool : str
         Name of the operator that writes it.
     source : str
-        Where it is in what the tool computes: in `Built` for the analysis; empty for all of it.
+        Where it is in what the tool computes, which is `Built` for the analysis; empty where there is nothing else.
     data_type : str
         As Blender names it.
     power : int
