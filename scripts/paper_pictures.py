@@ -76,14 +76,14 @@ def domains(points, mode, like=None, radius=0.0, **settings):
     for name, value in settings.items():
         setattr(obj.meshfree, name, value)
     bpy.ops.meshfree.segment(method="NODAL", mode=mode)
-    labels = attributes.read_attribute(obj.data, attributes.SEGMENT)
+    labels = attributes.read_attribute(obj.data, "lb_segment")
     if like is None:
         labels = np.argsort(np.unique(labels, return_index=True)[1]).argsort()[labels]
     else:
-        labels = matched(labels, attributes.read_attribute(like.data, attributes.SEGMENT))
-    attributes.write_attribute(obj.data, attributes.SEGMENT, labels)
+        labels = matched(labels, attributes.read_attribute(like.data, "lb_segment"))
+    attributes.write_attribute(obj.data, "lb_segment", labels)
     obj.meshfree.color_map = "CATEGORICAL"
-    studio.show(obj, attributes.SEGMENT, radius)
+    studio.show(obj, "lb_segment", radius)
     return obj
 
 

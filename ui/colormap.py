@@ -6,6 +6,7 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 from ..operators.objects.all_or_nothing import all_or_nothing
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
 from ..operators.objects.colors import own_material
+from ..operators.objects.quantities import quantity
 from ..operators.running.ready import ReadyOperator, reporting
 from .display import find_display, is_colored
 from .show import look_at, show_attribute, show_in_solid, show_own_material, use_material_preview
@@ -40,6 +41,10 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
         " colors that points have of their own",
         default=True,
     )
+
+    @classmethod
+    def description(cls, context, properties):
+        return quantity(properties.attribute).tooltip  # of what is no result none, which leaves that of the class
 
     @reporting
     def execute(self, context):

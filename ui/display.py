@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ..operators.objects.attributes import DISPLACEMENT, DISTANCE, point_count, read_attribute
+from ..operators.objects.attributes import point_count, read_attribute
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, is_display
+from ..operators.objects.quantities import quantity
 from .materials import ATTRIBUTE, COLORS, RANGE, shows_own
 from .nodes import DISC_COST, DISCS, MOST, SOLID_NAME
 from .value_range import CLASSES
@@ -124,7 +125,7 @@ def component(name: str, settings) -> str:
     """What is shown of an attribute if it holds vectors: "DIRECTION", "LENGTH", "X", "Y" or "Z"."""
     if settings.component != "AUTO":
         return settings.component
-    return "LENGTH" if name == DISPLACEMENT else "DIRECTION"
+    return "LENGTH" if quantity(name).power else "DIRECTION"
 
 
 def numbers(values, part: str):
@@ -140,7 +141,7 @@ def numbers(values, part: str):
 
 def is_distance(name: str, values, part: str) -> bool:
     """Whether the numbers shown of an attribute are distances, or lengths of vectors."""
-    return name == DISTANCE or (values.ndim > 1 and part == "LENGTH")
+    return quantity(name).color_range == "positive" or (values.ndim > 1 and part == "LENGTH")
 
 
 def is_texture(values) -> bool:
@@ -150,7 +151,7 @@ def is_texture(values) -> bool:
 
 def without_unreached(name: str, values):
     """Leave out the numbers that say that no source reaches a point, which do not count for the range."""
-    return values[values >= 0.0] if name == DISTANCE else values
+    return values[values >= 0.0] if quantity(name).color_range == "positive" else values
 
 
 def sloping(name: str, values, part: str) -> list:
@@ -163,7 +164,7 @@ def sloping(name: str, values, part: str) -> list:
         return []
     if shown is None:
         return list(values.T)
-    return [np.where(shown >= 0.0, shown, np.nan) if name == DISTANCE else shown]
+    return [np.where(shown >= 0.0, shown, np.nan) if quantity(name).color_range == "positive" else shown]
 
 
 def _find_node(obj, name):
@@ -173,5 +174,7 @@ def _find_node(obj, name):
 
 def label(name: str) -> str:
     """Title of an attribute for people: "Mode 3" for lb_eigenvector_003."""
-    words = name.removeprefix("lb_").replace("eigenvector", "mode").split("_")
-    return " ".join(word.lstrip("0").title() for word in words).replace("Uv", "UV")
+    row = quantity(name)
+    if not row.label:
+        return " ".join(word.lstrip("0").title() for word in name.removeprefix("lb_").split("_"))
+    return f"{row.label} {name.removeprefix(row.attribute).lstrip('0')}".strip()

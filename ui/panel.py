@@ -3,18 +3,10 @@
 import bpy
 
 from ..operators.deform.binding import handled_object
-from ..operators.objects.attributes import (
-    ALONG_SURFACE,
-    APPLICATIONS,
-    DEVIATION,
-    DISC,
-    RESULTS,
-    eigenvector_name,
-    mode_number,
-    point_count,
-)
+from ..operators.objects.attributes import DISC, eigenvector_name, mode_number, point_count
 from ..operators.objects.colors import own_colors, own_material, shows_own_material
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
+from ..operators.objects.quantities import APPLICATIONS, DEVIATION, RESULTS, quantity
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
 from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
@@ -321,7 +313,7 @@ class Display:
         split_properties(layout, context)
         if shown in attributes and attributes[shown].data_type == "FLOAT_VECTOR":
             layout.prop(obj.meshfree, "component")
-            if shown in ALONG_SURFACE:
+            if quantity(shown).along_surface:
                 layout.prop(obj.meshfree, "strokes")
                 if has_input(find_display(obj).node_group, LENGTH):
                     layout.prop(*input_property(find_display(obj), LENGTH), text=LENGTH)

@@ -9,17 +9,7 @@ from bpy.app.handlers import persistent
 
 from .. import core
 from ..operators.deform.nodes import find_deform, is_baked, show_live, turns_discs
-from ..operators.objects.attributes import (
-    ALONG_SURFACE,
-    DEVIATION,
-    DISC,
-    MEAN_CURVATURE,
-    SIGNED_DISTANCE,
-    in_edit_mesh,
-    point_count,
-    positions_now,
-    read_attribute,
-)
+from ..operators.objects.attributes import DISC, in_edit_mesh, point_count, positions_now, read_attribute
 from ..operators.objects.colors import is_color, own_colors, own_material
 from ..operators.objects.groups import (
     ANCHOR,
@@ -34,6 +24,7 @@ from ..operators.objects.groups import (
 )
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
+from ..operators.objects.quantities import MEAN_CURVATURE, quantity
 from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
 from . import colormaps, legend, smooth, solid
@@ -386,7 +377,7 @@ def reshape(obj):
 def _has_strokes(obj):
     """Whether strokes are to show what is on show."""
     settings, name = obj.meshfree, shown_attribute(obj)
-    return settings.strokes and name in ALONG_SURFACE and component(name, settings) == "DIRECTION"
+    return settings.strokes and quantity(name).along_surface and component(name, settings) == "DIRECTION"
 
 
 def _radius(settings):
@@ -414,7 +405,7 @@ def _color(obj, name, values):
     else:
         locked = settings.range_low, settings.range_high
         chosen = [settings.color_map, settings.range_mode]
-        if name in (DEVIATION, SIGNED_DISTANCE):  # zero is what it is all about, even where all of it has one sign
+        if quantity(name).color_range == "symmetric":  # zero is what it is all about, even where all of it has one sign
             chosen = [
                 way if way != "AUTO" else zero for way, zero in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
             ]

@@ -1,26 +1,8 @@
 """In which unit the numbers of an attribute are written."""
 
-from ..operators.objects.attributes import (
-    AREA,
-    CURVATURE_1,
-    CURVATURE_2,
-    CURVEDNESS,
-    DEVIATION,
-    DISPLACEMENT,
-    DISTANCE,
-    GAUSSIAN_CURVATURE,
-    MEAN_CURVATURE,
-    ROUGHNESS,
-    SIGNED_DISTANCE,
-)
+from ..operators.objects.quantities import quantity
 
 EIGENVALUE_POWER = -2
-_POWERS = {  # of a length
-    AREA: 2,
-    GAUSSIAN_CURVATURE: -2,
-    **dict.fromkeys((MEAN_CURVATURE, CURVATURE_1, CURVATURE_2, CURVEDNESS), -1),
-    **dict.fromkeys((DISTANCE, SIGNED_DISTANCE, DISPLACEMENT, ROUGHNESS, DEVIATION), 1),
-}
 _METERS = {
     "KILOMETERS": ("km", 1000.0),
     "METERS": ("m", 1.0),
@@ -41,8 +23,9 @@ _RAISED = {1: "", 2: "²"}
 
 
 def attribute_power(name: str) -> int:
-    """Return which power of a length an attribute is: 2 for areas, -1 for curvature, 0 for plain numbers."""
-    return _POWERS.get(name, 0)
+    """Return of which power of a length an attribute has the unit: 2 for areas, -1 for curvature, 0 for none."""
+    row = quantity(name)
+    return 0 if row.numbered else row.power
 
 
 def unit(power: int, greatest: float, settings):

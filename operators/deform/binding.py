@@ -14,7 +14,6 @@ import numpy as np
 
 from ...core import PointCloudError
 from ..objects.attributes import (
-    DISPLACEMENT,
     REST,
     in_edit_mesh,
     point_count,
@@ -28,6 +27,7 @@ from ..objects.counting import members, weighted_checksum
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
 from ..objects.handlers import tell
 from ..objects.options import settings_values
+from ..objects.quantities import DISPLACEMENT
 from ..objects.reading import TYPES, fingerprint, sharing_objects
 from .nodes import find_deform, is_baked
 

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..objects.attributes import DISC, DISPLACEMENT, REST
+from ..objects.attributes import DISC, REST
 from ..objects.carried import carried
 from ..objects.modifiers import (
     DEFORM_TAG,
@@ -15,6 +15,7 @@ from ..objects.modifiers import (
     new_group,
     set_input,
 )
+from ..objects.quantities import DISPLACEMENT
 
 NAME = "Mesh-Free Deform"
 VALUE = "Value"  # input of the nodes of a stored deformation

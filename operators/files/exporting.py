@@ -170,7 +170,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
             built = build_operator(reading, options, progress)
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
-            save_arrays(path, analysis_arrays(place, built.laplacian, built.mean_curvature, spectrum))
+            save_arrays(path, analysis_arrays(place, built, spectrum))
             return f"{name}: {built.laplacian.stiffness.nnz:,} weights and {count} modes written to {path.name}"
 
         return write

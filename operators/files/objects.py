@@ -20,19 +20,11 @@ from ...core.files import (
 )
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
-from ..objects.attributes import (
-    NORMAL,
-    ONLY_DRAWN,
-    PREFIX,
-    STORABLE,
-    own_positions,
-    read_attribute,
-    type_of,
-    write_attribute,
-)
+from ..objects.attributes import ONLY_DRAWN, PREFIX, STORABLE, own_positions, read_attribute, type_of, write_attribute
 from ..objects.colors import COLOR, own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
+from ..objects.quantities import NORMAL, rows_of
 from ..objects.reading import seen_positions
 from .columns import RENAMED, Column, doubted_columns, known_digits, read_columns, remember_columns
 
@@ -263,7 +255,7 @@ def save_arrays(path, arrays):
         np.savez(file, **arrays)
 
 
-def analysis_arrays(place, laplacian, curvature, spectrum) -> dict:
+def analysis_arrays(place, built, spectrum) -> dict:
     """Return all arrays of an analysis, numbers in double precision, lengths and axes of the world.
 
     Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it.
@@ -272,21 +264,13 @@ def analysis_arrays(place, laplacian, curvature, spectrum) -> dict:
     ----------
     place : ndarray, (3,)
         Of the object, by `place_of`.
-    laplacian : LaplaceBeltrami
-    curvature : ndarray, (n,)
-        Mean curvature.
+    built : Built
     spectrum : Spectrum or None
     """
-    stiffness = laplacian.stiffness
+    laplacian, stiffness = built.laplacian, built.laplacian.stiffness
     return {
         "points": laplacian.points + place,
-        "areas": laplacian.areas,
-        "normals": laplacian.normals,
-        "mean_curvature": curvature,
-        "gaussian_curvature": laplacian.gaussian_curvature,
-        "boundary": laplacian.boundary,
-        "component": laplacian.component,
-        "trust": laplacian.trust,
+        **{row.source.rpartition(".")[2]: row.of(built) for row in rows_of("analyze")},
         "smoothing_lengths": laplacian.smoothing_lengths,
         "eigenvalues": np.empty(0) if spectrum is None else spectrum.eigenvalues,
         "eigenvectors": np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,

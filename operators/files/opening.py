@@ -5,9 +5,9 @@ import bpy
 from ... import core
 from ...core import PointCloudError
 from ...core.files import WRITABLE, PointTable, write_points
-from ..objects.attributes import APPLICATIONS, MEAN_CURVATURE
 from ..objects.colors import own_colors
 from ..objects.handlers import tell
+from ..objects.quantities import APPLICATIONS, MEAN_CURVATURE
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
 from .columns import tell_columns

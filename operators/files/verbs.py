@@ -164,7 +164,7 @@ class Analyze(ObjectVerb):
         renew(obj, self.operator.name, analysis.notices)
         written = [] if output is None else opening.save(output, obj, _arrays(obj, analysis))
         return {
-            "points": len(analysis.measures.areas),
+            "points": point_count(obj.data),
             "total_area": analysis.total_area,
             **analysis.counts,
             "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
@@ -178,7 +178,7 @@ def _arrays(obj, analysis):
     """Arrays of an analysis by name; of one of a subset those that were carried to all points, without an operator."""
     if analysis.subset_count:
         return files.attribute_arrays(obj)
-    return files.analysis_arrays(place_of(obj), analysis.laplacian, analysis.measures.mean_curvature, analysis.spectrum)
+    return files.analysis_arrays(place_of(obj), analysis.built, analysis.spectrum)
 
 
 def _rounded(seconds):

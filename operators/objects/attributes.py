@@ -1,4 +1,4 @@
-"""The attributes of this extension: their names and types, and how values get in and out of a mesh."""
+"""The attributes of this extension, beside results by name and type, and how values get in and out of a mesh."""
 
 from typing import NamedTuple
 
@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ...core import PointCloudError
+from .quantities import AREA, EIGENVECTOR, quantity
 
 
 class _Storage(NamedTuple):
@@ -31,15 +32,7 @@ _LAYERS = {"FLOAT": "float", "FLOAT_VECTOR": "float_vector", "INT": "int", "BOOL
 
 SELECTION = ".selection"  # of point clouds, as Blender names it
 PREFIX = "lb_"
-AREA = "lb_area"
-NORMAL = "lb_normal"
 ORIENTATION = "lb_orientation"  # vectors whose side the normals take, where a user chose it
-MEAN_CURVATURE = "lb_mean_curvature"
-GAUSSIAN_CURVATURE = "lb_gaussian_curvature"
-BOUNDARY = "lb_boundary"
-COMPONENT = "lb_component"
-TRUST = "lb_trust"
-CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"  # principal ones
 DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
 # Slopes of what is shown, or of both texture coordinates, and the values, by their means. Blender hides such names.
 SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
@@ -47,36 +40,15 @@ SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
 SOLID, TILT = ".lb_color", ".lb_tilt"
 RISE = "lb_rise"  # by how much what is shown rises in discs that the display draws
 CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
-SHAPE_INDEX, CURVEDNESS, ROUGHNESS = "lb_shape_index", "lb_curvedness", "lb_roughness"
-DEVIATION, COMPARED = "lb_deviation", "lb_compared"  # from another cloud, and where there is one
-SEGMENT = "lb_segment"
-FIELD = "lb_field"
-DISTANCE, SIGNED_DISTANCE = "lb_distance", "lb_signed_distance"
-CELL, DIRECTION = "lb_cell", "lb_direction"  # nearest source, and what was carried from there
-UV = "lb_uv"  # texture coordinates around a point
-DISPLACEMENT = "lb_displacement"
+COMPARED = "lb_compared"  # where there is a deviation from another cloud
 REST = "lb_rest"  # positions before the displacement
 SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of splats that are carried along
 MOVED_DISC = "lb_moved_disc"  # what a deformation makes of the disc
 ONLY_DRAWN = DISC, MOVED_DISC, CORNER  # which say nothing about the points, only how they are drawn
 SPLAT_HARMONIC = "lb_splat_sh_"  # followed by the number of the harmonic, from 0
-EIGENVECTOR = "lb_eigenvector_"  # followed by the number of the mode
-HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"  # followed by the number of the scale
-ALONG_SURFACE = DIRECTION, DIRECTION_1
-# Of every analysis, as in the panel.
-RESULTS = AREA, NORMAL, MEAN_CURVATURE, GAUSSIAN_CURVATURE, BOUNDARY, COMPONENT, TRUST
-# Of tools, as in the panel where they are there.
-APPLICATIONS = (
-    *(SEGMENT, SHAPE_INDEX, CURVEDNESS, CURVATURE_1, CURVATURE_2, DIRECTION_1, ROUGHNESS, FIELD, DISTANCE),
-    *(SIGNED_DISTANCE, DEVIATION, CELL, DIRECTION, UV, DISPLACEMENT),
-)
-_TYPES = {  # all others are FLOAT
-    **dict.fromkeys((NORMAL, ORIENTATION, DIRECTION_1, DIRECTION), "FLOAT_VECTOR"),
-    **dict.fromkeys((DISC, MOVED_DISC, DISPLACEMENT, REST, SLOPE, SLOPE_2, TILT), "FLOAT_VECTOR"),
-    **dict.fromkeys((COMPONENT, SEGMENT, CELL), "INT"),
-    **dict.fromkeys((BOUNDARY, COMPARED), "BOOLEAN"),
-    UV: "FLOAT2",
-    SPLAT_SCALE: "FLOAT_VECTOR",
+_TYPES = {  # of what is no result; all others are FLOAT
+    **dict.fromkeys((ORIENTATION, DISC, MOVED_DISC, REST, SLOPE, SLOPE_2, TILT, SPLAT_SCALE), "FLOAT_VECTOR"),
+    COMPARED: "BOOLEAN",
     SPLAT_ROTATION: "QUATERNION",
 }
 STORABLE = tuple(_STORAGE)
@@ -84,6 +56,9 @@ STORABLE = tuple(_STORAGE)
 
 def type_of(name: str) -> str:
     """Type of one of this extension's attributes."""
+    row = quantity(name)
+    if row.attribute:
+        return row.data_type
     return "FLOAT_VECTOR" if name.startswith(SPLAT_HARMONIC) else _TYPES.get(name, "FLOAT")
 
 
@@ -207,7 +182,10 @@ def check_size(name: str, values):
         )
     largest = np.max(sizes, initial=0.0)
     if largest > kept.max:
-        way = "Use smaller values" if name == FIELD else f"Scale the object {'up' if _grows(name) else 'down'}"
+        row = quantity(name)
+        way = f"Scale the object {'up' if row.power < 0 else 'down'}"
+        if row.attribute and row.power == 0:
+            way = "Use smaller values"
         raise PointCloudError(
             f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. {way}."
         )
@@ -216,12 +194,6 @@ def check_size(name: str, values):
             f"Attribute {name} has numbers up to {largest:.1e} only, below the 1e-38 that Blender keeps. Scale the"
             " object up."
         )
-
-
-def _grows(name):
-    """Whether values become larger where lengths become smaller."""
-    kinds = EIGENVECTOR, HEAT_SIGNATURE, WAVE_SIGNATURE
-    return name in (MEAN_CURVATURE, GAUSSIAN_CURVATURE, CURVATURE_1, CURVATURE_2, CURVEDNESS) or name.startswith(kinds)
 
 
 def read_attribute(data, name: str):

@@ -7,16 +7,7 @@ import numpy as np
 
 from ...core import PointCloudError
 from .attributes import (
-    AREA,
-    BOUNDARY,
-    COMPONENT,
-    EIGENVECTOR,
-    GAUSSIAN_CURVATURE,
-    MEAN_CURVATURE,
-    NORMAL,
     ORIENTATION,
-    RESULTS,
-    TRUST,
     check_names,
     check_size,
     eigenvector_name,
@@ -26,6 +17,7 @@ from .attributes import (
     write_attribute,
 )
 from .options import point_budget, settings_values
+from .quantities import AREA, EIGENVECTOR, NORMAL, RESULTS
 from .reading import chosen_sides, fingerprint, metric, sharing_objects
 
 _DIGITS = 3  # that scans bear
@@ -83,15 +75,9 @@ def write_result(obj, analysis, write_limit: int, oriented=False):
             owner.pop(EIGENVALUES, None)
     if oriented:
         write_attribute(mesh, ORIENTATION, analysis.local_normals)
-    measures = analysis.measures
-    write_attribute(mesh, AREA, measures.areas)
+    for name, values in {**analysis.measures, NORMAL: analysis.local_normals}.items():
+        write_attribute(mesh, name, values)
     check_size(f"{AREA}, summed up,", analysis.total_area)
-    write_attribute(mesh, NORMAL, analysis.local_normals)
-    write_attribute(mesh, MEAN_CURVATURE, measures.mean_curvature)
-    write_attribute(mesh, GAUSSIAN_CURVATURE, measures.gaussian_curvature)
-    write_attribute(mesh, BOUNDARY, measures.boundary)
-    write_attribute(mesh, COMPONENT, measures.component)
-    write_attribute(mesh, TRUST, measures.trust)
     for owner in owners:
         _note_analysis(owner, analysis, _settings(obj))
     tag_changed(mesh)

@@ -8,7 +8,6 @@ import numpy as np
 from ... import core
 from ...core import PointCloudError
 from .attributes import (
-    DISPLACEMENT,
     REST,
     SPLAT_HARMONIC,
     SPLAT_ROTATION,
@@ -20,6 +19,7 @@ from .attributes import (
     write_own_positions,
 )
 from .modifiers import get_input, is_deform
+from .quantities import DISPLACEMENT
 
 SCALE, ROTATION, BASE, HARMONIC = "scale", "rotation", "radiance:base", "radiance:sh_"
 PLACE = ".splat_place"  # attribute: where a splat was when its ellipsoid was written, but for a common step

@@ -5,22 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import core
+from ..objects.quantities import rows_of
 from . import cache
 
+_ROWS = rows_of("analyze")
 _ALL = np.arange(0)  # stands for all points
 _STEPS = (1, 2, 5)  # times a power of ten: sizes of subsets, so that a little more free memory makes no difference
-
-
-class Measures(NamedTuple):
-    """Values at each point, as of `LaplaceBeltrami`."""
-
-    areas: np.ndarray
-    normals: np.ndarray
-    mean_curvature: np.ndarray
-    gaussian_curvature: np.ndarray
-    boundary: np.ndarray
-    component: np.ndarray
-    trust: np.ndarray
 
 
 class Measured(NamedTuple):
@@ -28,20 +18,20 @@ class Measured(NamedTuple):
 
     Attributes
     ----------
-    laplacian : LaplaceBeltrami
+    built : Built
     subset : ndarray, (k,) int
         Rows of the points that it is built on; none for all.
-    measures : Measures
-        Of all points.
+    measures : dict
+        Values at all points, lengths and axes of the world, by the names of attributes.
     prolongation : Prolongation or None
         From the subset to all.
     left_out : ndarray, (m,) int
         Splats that take no part.
     """
 
-    laplacian: "core.LaplaceBeltrami"
+    built: cache.Built
     subset: np.ndarray
-    measures: Measures
+    measures: dict
     prolongation: "core.Prolongation | None"
     left_out: np.ndarray
 
@@ -53,12 +43,12 @@ class Measured(NamedTuple):
     def notices(self) -> list:
         """What a user should know of the operator, and of how many points it was built on."""
         if self.prolongation is None:
-            return self.laplacian.notices
+            return self.built.laplacian.notices
         told = (
             f"Analyzed {len(self.subset):,} of {len(self.prolongation.nearest):,} points, evenly spread over the"
             " surface, and carried the results to all. The setting Point Budget decides how many."
         )
-        return [told, *cache.floating_notices(self.left_out), *self.laplacian.notices]
+        return [told, *cache.floating_notices(self.left_out), *self.built.laplacian.notices]
 
 
 def measure(points, options, boundary, budget, modes, progress, orientation=None, splats=None) -> Measured:
@@ -76,11 +66,12 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
     out = cache.floating(splats)
     subset = _subset(points, options, boundary, splats, budget, modes, progress)
     if not len(subset):
-        laplacian, curvature = cache.build(points, options, boundary, progress, orientation, splats)
-        return Measured(laplacian, subset, _measures(laplacian, curvature), None, out)
+        built = cache.build(points, options, boundary, progress, orientation, splats)
+        return Measured(built, subset, {row.attribute: row.of(built) for row in _ROWS}, None, out)
     chosen = points[subset]
     at_boundary, sides = (None if given is None else given[subset] for given in (boundary, orientation))
-    laplacian, curvature = cache.build(chosen, options, at_boundary, progress, sides)
+    built = cache.build(chosen, options, at_boundary, progress, sides)
+    laplacian = built.laplacian
 
     def prolong():
         report = _within(progress, "All Points")
@@ -88,8 +79,8 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
 
     progress("All Points", 0.9)
     prolongation = cache.result(laplacian, "prolongation", points, compute=prolong)
-    carried = _carry(prolongation, _measures(laplacian, curvature), out)
-    return Measured(laplacian, subset, carried, prolongation, out)
+    carried = {row.attribute: _carry(prolongation, row, row.of(built), out) for row in _ROWS}
+    return Measured(built, subset, carried, prolongation, out)
 
 
 def _within(progress, stage):
@@ -97,35 +88,27 @@ def _within(progress, stage):
     return lambda: progress(stage, 0.9)
 
 
-def _measures(laplacian, curvature):
-    return Measures(
-        laplacian.areas,
-        laplacian.normals,
-        curvature,
-        laplacian.gaussian_curvature,
-        laplacian.boundary,
-        laplacian.component,
-        laplacian.trust,
-    )
+def _carry(prolongation, row, values, out):
+    """Carry values of a quantity to all points, of which some take no part."""
+    if row.carried == "share":
+        return prolongation.shares(values, out)
+    carried = carry(prolongation, row.carried, values)
+    if row.bounds is not None:
+        carried = np.clip(carried, *row.bounds)
+    if row.left_out is not None:
+        carried[out] = row.left_out
+    return carried
 
 
-def _carry(prolongation, known, out):
-    """Carry what is known of a subset to all points but those that take no part."""
-    smooth = np.column_stack([known.normals, known.mean_curvature, known.gaussian_curvature, known.trust])
-    smooth = prolongation.interpolate(smooth)
-    normals = smooth[:, :3]
-    length = np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
-    component, trust = prolongation.labels(known.component), np.clip(smooth[:, 5], 0.0, 1.0)
-    component[out], trust[out] = -1, 0.0
-    return Measures(
-        areas=prolongation.shares(known.areas, out),
-        normals=np.divide(normals, length, out=prolongation.labels(known.normals), where=length > 0.5),
-        mean_curvature=smooth[:, 3],
-        gaussian_curvature=smooth[:, 4],
-        boundary=prolongation.labels(known.boundary),
-        component=component,
-        trust=trust,
-    )
+def carry(prolongation, way, values):
+    """Carry values to all points of a `Prolongation`, in one of the ways of `Quantity` but "share"."""
+    if way == "label":
+        return prolongation.labels(values)
+    smooth = prolongation.interpolate(values)
+    if way == "smooth":
+        return smooth
+    length = np.sqrt(np.einsum("ij,ij->i", smooth, smooth))[:, None]
+    return np.divide(smooth, length, out=prolongation.labels(values), where=length > 0.5)
 
 
 def _subset(points, options, boundary, splats, budget, modes, progress):

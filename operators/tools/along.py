@@ -6,8 +6,9 @@ from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 
 from ... import core
 from ...core import PointCloudError
-from ..objects.attributes import CELL, DIRECTION, SIGNED_DISTANCE, UV, tag_changed, write_attribute
+from ..objects.attributes import tag_changed, write_attribute
 from ..objects.groups import SOURCE
+from ..objects.quantities import CELL, DIRECTION, SIGNED_DISTANCE, UV
 from ..objects.result import length_text
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader

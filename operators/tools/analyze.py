@@ -10,11 +10,12 @@ from ... import core
 from ...core import UnresolvedModesError
 from ..objects.attributes import point_count
 from ..objects.options import laplacian_options, point_budget
+from ..objects.quantities import AREA, BOUNDARY, COMPONENT, NORMAL
 from ..objects.reading import read_points
 from ..objects.result import analysis_names, area_text, write_result
 from ..running import cache
 from ..running.application import ShownOperator
-from ..running.measures import Measures, measure
+from ..running.measures import measure
 from ..running.stages import StageTimes
 
 WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each takes 4 bytes per point in the file
@@ -24,8 +25,8 @@ WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each 
 class Analysis:
     """All that is computed for an object, in lengths of the world; normals in local space too."""
 
-    laplacian: "core.LaplaceBeltrami"  # of the subset, where there is one
-    measures: Measures
+    built: cache.Built  # on the subset, where there is one
+    measures: dict  # by the names of attributes
     local_normals: np.ndarray
     spectrum: "core.Spectrum | None"
     subset_count: int  # points that it was computed on; 0 for all
@@ -35,15 +36,15 @@ class Analysis:
     @property
     def total_area(self) -> float:
         """Area of the whole surface."""
-        return float(self.measures.areas.sum())
+        return float(self.measures[AREA].sum())
 
     @property
     def counts(self) -> dict:
         """Components, points at a boundary and points left out, by the names of the settings that keep them."""
-        component = self.measures.component
+        component = self.measures[COMPONENT]
         return {
             "component_count": int(component.max()) + 1,
-            "boundary_count": int(np.count_nonzero(self.measures.boundary)),
+            "boundary_count": int(np.count_nonzero(self.measures[BOUNDARY])),
             "left_out_count": int(np.count_nonzero(component < 0)),
         }
 
@@ -63,14 +64,14 @@ def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, 
             measured = measure(*given, reading.orientation, reading.splats)
             if orient is not None:
                 measured = measure(*given, orient(measured, times), reading.splats)
-            spectrum, unresolved = resolved_modes(measured.laplacian, modes, times) if modes else (None, [])
+            spectrum, unresolved = resolved_modes(measured.built.laplacian, modes, times) if modes else (None, [])
             if spectrum is not None and len(measured.subset):
                 times("All Points", 1.0)
                 spectrum = replace(spectrum, eigenvectors=measured.carried(spectrum.eigenvectors[:, :write_limit]))
         return Analysis(
-            laplacian=measured.laplacian,
+            built=measured.built,
             measures=measured.measures,
-            local_normals=reading.local_normals(measured.measures.normals),
+            local_normals=reading.local_normals(measured.measures[NORMAL]),
             spectrum=spectrum,
             subset_count=len(measured.subset),
             seconds=times.seconds,

@@ -6,8 +6,9 @@ from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
 from ...core import PointCloudError
-from ..objects.attributes import COMPARED, DEVIATION, tag_changed, write_attribute
+from ..objects.attributes import COMPARED, tag_changed, write_attribute
 from ..objects.place import hide
+from ..objects.quantities import DEVIATION
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
 from ..running.application import ShownOperator, Tool, naming, operator_reader

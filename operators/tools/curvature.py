@@ -1,19 +1,23 @@
 """How the surface bends and along which directions, what shape it has there, and how rough it is."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty
 
 from ... import core
-from ..objects.attributes import (
+from ..objects.attributes import tag_changed, write_attribute
+from ..objects.quantities import (
     CURVATURE_1,
     CURVATURE_2,
     CURVEDNESS,
     DIRECTION_1,
     ROUGHNESS,
     SHAPE_INDEX,
-    tag_changed,
-    write_attribute,
+    quantity,
+    rows_of,
+    written_by,
 )
 from ..objects.result import length_text
 from ..running import cache
@@ -21,44 +25,30 @@ from ..running.application import ShownOperator, Tool, operator_reader
 from .smooth import check_wavelength
 
 _SHOWN = {
-    "SHAPE_INDEX": SHAPE_INDEX,
-    "CURVEDNESS": CURVEDNESS,
-    "GREATEST": CURVATURE_1,
-    "LEAST": CURVATURE_2,
-    "DIRECTION": DIRECTION_1,
+    "SHAPE_INDEX": ("Shape Index", SHAPE_INDEX),
+    "CURVEDNESS": ("Curvedness", CURVEDNESS),
+    "GREATEST": ("Greatest Curvature", CURVATURE_1),
+    "LEAST": ("Least Curvature", CURVATURE_2),
+    "DIRECTION": ("Direction", DIRECTION_1),
 }
 
 
 class Curvatures(Tool):
     """The settings and the work of `meshfree.principal_curvatures`."""
 
-    writes = (CURVATURE_1, CURVATURE_2, DIRECTION_1, SHAPE_INDEX, CURVEDNESS)
+    writes = written_by("principal_curvatures")
     asks = adjustable = ("display", "show")
 
     display: EnumProperty(
         name="Display",
         description="Which of the results is shown as colors",
-        items=[
-            (
-                "SHAPE_INDEX",
-                "Shape Index",
-                "The kind of shape: 1 a cap, 0 a saddle, -1 a cup, others between",
-            ),
-            ("CURVEDNESS", "Curvedness", "How strongly the surface bends, whatever its shape"),
-            (
-                "GREATEST",
-                "Greatest Curvature",
-                "Curvature where the surface bends outwards most",
-            ),
-            ("LEAST", "Least Curvature", "Curvature across that direction"),
-            ("DIRECTION", "Direction", "Direction of the greatest curvature"),
-        ],
+        items=[(key, title, quantity(name).tooltip) for key, (title, name) in _SHOWN.items()],
         default="SHAPE_INDEX",
     )
 
     @property
     def shown(self):
-        return _SHOWN[self.display]
+        return _SHOWN[self.display][1]
 
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)
@@ -67,17 +57,15 @@ class Curvatures(Tool):
             laplacian = operator(progress)
             progress("Curvature", 0.9)
             found = cache.result(laplacian, "principal", compute=lambda: core.principal_curvatures(laplacian))
-            return found, reading.local_directions(found.direction)
+            return replace(found, direction=reading.local_directions(found.direction))
 
         return compute
 
     def write(self, context, obj, result):
-        found, direction = result
-        values = found.first, found.second, direction, found.shape_index, found.curvedness
-        for name, numbers in zip(self.writes, values, strict=True):
-            write_attribute(obj.data, name, numbers)
+        for row in rows_of("principal_curvatures"):
+            write_attribute(obj.data, row.attribute, row.of(result))
         tag_changed(obj.data)
-        return [f"{obj.name}: curvatures from {found.second.min():.4g} to {found.first.max():.4g}"]
+        return [f"{obj.name}: curvatures from {result.second.min():.4g} to {result.first.max():.4g}"]
 
 
 class MESHFREE_OT_principal_curvatures(Curvatures, ShownOperator, bpy.types.Operator):

@@ -6,8 +6,9 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ... import core
 from ...core import PointCloudError
-from ..objects.attributes import DISTANCE, FIELD, point_count, read_attribute, tag_changed, write_attribute
+from ..objects.attributes import point_count, read_attribute, tag_changed, write_attribute
 from ..objects.groups import HIGH, LOW, SOURCE, VALUE, chosen_weights, group_kind, has_group, is_chosen
+from ..objects.quantities import DISTANCE, FIELD
 from ..objects.result import length_text
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader

@@ -6,15 +6,17 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
-from ..objects.attributes import DIRECTION_1, DISC, NORMAL, STORABLE, point_count, read_attribute, write_attribute
+from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
 from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
 from ..objects.handlers import tell
 from ..objects.place import copy_place, hide
+from ..objects.quantities import quantity
 from ..objects.splats import has_splats
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
+from ..running.measures import carry
 
 _LEFT = DISC, "position"  # attributes that mean nothing on a mesh, or something else
 _GAP = 12  # edges around a hole that is no opening, but a gap between points
@@ -135,12 +137,11 @@ class _Kept:
         return result
 
     def _carry(self, carrying, name, values):
-        if values.dtype.kind != "f" or name == DIRECTION_1:  # which has no sign
-            return carrying.labels(values)
-        smooth = carrying.interpolate(values)
-        if name == NORMAL:
-            smooth /= np.maximum(np.linalg.norm(smooth, axis=1), 1e-30)[:, None]
-        return np.clip(smooth, 0.0, None) if self._types[name] in COLORS else smooth
+        way = quantity(name).carried if values.dtype.kind == "f" else "label"
+        if way == "share":  # areas stay those of the points: the area of a mesh is that of its faces
+            way = "smooth"
+        result = carry(carrying, way, values)
+        return np.clip(result, 0.0, None) if self._types[name] in COLORS else result
 
     def write(self, obj):
         """Put all of it on the vertices of a mesh."""

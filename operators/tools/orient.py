@@ -6,7 +6,8 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ... import core
 from ...core import PointCloudError
-from ..objects.attributes import NORMAL, ORIENTATION, RESULTS, read_attribute
+from ..objects.attributes import ORIENTATION, read_attribute
+from ..objects.quantities import AREA, NORMAL, RESULTS
 from ..objects.reading import read_points
 from ..objects.result import write_result
 from ..running import cache
@@ -60,7 +61,7 @@ class OrientNormals(Tool):
         way = {"WINDING": "winding", "OUTSIDE": "outside"}.get(method, "viewpoint")
 
         def orient(measured, progress):
-            normals, areas = measured.measures.normals, measured.measures.areas
+            laplacian, normals, areas = measured.built.laplacian, measured.measures[NORMAL], measured.measures[AREA]
             if method == "KEEP":
                 return sign * normals
             progress("Orientation", 0.9)
@@ -68,7 +69,7 @@ class OrientNormals(Tool):
             def compute():
                 return core.orient_normals(reading.points, normals, method=way, viewpoint=viewpoint, areas=areas)
 
-            return sign * cache.result(measured.laplacian, "sides", reading.points, way, viewpoint, compute=compute)
+            return sign * cache.result(laplacian, "sides", reading.points, way, viewpoint, compute=compute)
 
         return plan_analysis(context, obj, orient=orient)
 

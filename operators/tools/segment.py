@@ -7,16 +7,8 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ... import core
 from ...core import PointCloudError
-from ..objects.attributes import (
-    HEAT_SIGNATURE,
-    SEGMENT,
-    SELECTION,
-    WAVE_SIGNATURE,
-    read_attribute,
-    remove_numbered,
-    tag_changed,
-    write_attribute,
-)
+from ..objects.attributes import SELECTION, read_attribute, remove_numbered, tag_changed, write_attribute
+from ..objects.quantities import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE
 from ..objects.result import EIGENVALUES, check_writable
 from ..running import cache
 from ..running.application import ApplicationOperator, ShownOperator, Tool, operator_reader

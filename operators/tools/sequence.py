@@ -10,9 +10,10 @@ from bpy.props import BoolProperty, IntProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import MEAN_CURVATURE, eigenvector_name
+from ..objects.attributes import eigenvector_name
 from ..objects.handlers import tell
 from ..objects.modifiers import COLLECTION, get_input, is_sequence
+from ..objects.quantities import AREA, MEAN_CURVATURE
 from ..objects.reading import obstacle, read_points, sharing_objects
 from ..objects.result import analysis_names, area_text, check_writable, write_result
 from ..running.application import naming
@@ -59,7 +60,7 @@ def continue_modes(analysis, points, earlier):
     count = spectrum.eigenvectors.shape[1]  # of a subset fewer may be carried to all points
     spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
     if earlier is not None:
-        matched = core.match_modes(spectrum, analysis.measures.areas, points, *earlier)
+        matched = core.match_modes(spectrum, analysis.measures[AREA], points, *earlier)
         spectrum, overlaps = matched.spectrum, matched.overlaps
     return replace(analysis, spectrum=spectrum), overlaps, (spectrum, points)
 
@@ -157,7 +158,7 @@ def _compute(plans, progress):
             analysis, overlaps = plan(report), np.empty(0)
             if analysis.spectrum is not None:
                 analysis, overlaps, earlier = continue_modes(analysis, points, earlier)
-        results.append((replace(analysis, laplacian=None), overlaps))  # the largest part, which nothing is written of
+        results.append((replace(analysis, built=None), overlaps))  # the largest part, which nothing is written of
     return results
 
 

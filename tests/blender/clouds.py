@@ -5,16 +5,9 @@ from collections import Counter
 import bpy
 import numpy as np
 
-RESULTS = [
-    "lb_area",
-    "lb_boundary",
-    "lb_component",
-    "lb_disc",
-    "lb_gaussian_curvature",
-    "lb_mean_curvature",
-    "lb_normal",
-    "lb_trust",
-]
+from operators.objects.quantities import written_by
+
+RESULTS = sorted([*written_by("analyze"), "lb_disc"])
 CORNERS, FACES = 8, 12  # of a disc that the display draws: two cones with a common rim
 _KEYS = {
     "FLOAT_VECTOR": ("vector", 3, np.float32),

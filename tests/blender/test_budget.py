@@ -1,12 +1,14 @@
 """More points than the budget: a subset is analyzed, and its results carried to all points."""
 
 import importlib
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
+from operators.objects.quantities import rows_of
 from tests.blender.clouds import RESULTS, add_object, attribute, everything, local_points, result_names, sphere_points
 
 
@@ -52,15 +54,25 @@ def test_results_are_carried_to_all_points(core):
     assert np.abs(modes @ fit - points).max() < 0.02  # the modes of degree 1 are the coordinates
 
 
-def test_values_at_the_subset_are_those_of_its_operator(core):
-    obj = limited(sphere_points(3000))
+def test_values_at_the_subset_are_those_of_its_operator_and_others_take_theirs_from_these(core):
+    bowl = sphere_points(3000)
+    bowl = bowl[bowl[:, 2] < 0.3]
+    obj = limited(np.concatenate([bowl, bowl + [3.0, 0.0, 0.0]]))
     bpy.ops.meshfree.analyze()
     points = local_points(obj)
     subset = core.blue_noise_subset(points, 1000)
     laplacian = core.build_laplacian(points[subset], options=core.LaplacianOptions(orient=True))
+    built = SimpleNamespace(laplacian=laplacian, mean_curvature=core.mean_curvature(laplacian))
+    nearest = core.Prolongation(points, subset, laplacian.normals, laplacian.component).nearest
     assert obj.meshfree.subset_count == len(subset)
-    assert_allclose(attribute(obj, "lb_gaussian_curvature")[subset], laplacian.gaussian_curvature, rtol=1e-5)
-    assert_array_equal(attribute(obj, "lb_boundary")[subset], laplacian.boundary)
+    for row in rows_of("analyze"):
+        values, known = attribute(obj, row.attribute), row.of(built)
+        if row.attribute == "lb_area":
+            assert values.sum() == pytest.approx(known.sum(), rel=1e-5)
+            continue
+        assert_allclose(values[subset], known, rtol=1e-5, atol=1e-6, err_msg=row.attribute)
+        if values.dtype.kind != "f":
+            assert (values == known[nearest]).all(), row.attribute
 
 
 def test_modes_beyond_those_written_keep_their_eigenvalue():

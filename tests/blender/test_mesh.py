@@ -58,15 +58,18 @@ def test_lies_on_the_points_of_a_scaled_and_mirrored_object(obj):
 def test_results_colors_and_groups_are_on_the_vertices(obj):
     points = local_points(obj)
     bpy.ops.meshfree.analyze(modes=4, show=False)
+    bpy.ops.meshfree.principal_curvatures(show=False)
     color = obj.data.attributes.new("Col", "FLOAT_COLOR", "POINT")
     color.data.foreach_set("color", np.column_stack([points * 0.5 + 0.5, np.ones(1500)]).astype(np.float32).ravel())
     add_group(obj, "Top", points[:, 2] > 0.0, 0.5)
     made = make(obj)
     places = local_points(made)
     names = {item.name for item in obj.data.attributes if item.name.startswith("lb_")}
-    assert len(names) == 11
+    assert len(names) == 16
     assert names <= {item.name for item in made.data.attributes}
     assert_allclose(attribute(made, "lb_normal"), places, atol=0.02)
+    for name in ("lb_normal", "lb_direction_1"):  # the latter has no sign to interpolate
+        assert_allclose(np.linalg.norm(attribute(made, name), axis=1), 1.0, rtol=1e-5)
     assert_allclose(attribute(made, "lb_mean_curvature"), 1.0, atol=0.05)
     assert not attribute(made, "lb_component").any()
     found = np.empty((len(places), 4), np.float32)

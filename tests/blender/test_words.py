@@ -5,6 +5,8 @@ import re
 import bpy
 import pytest
 
+from operators.objects.quantities import QUANTITIES
+
 # Words that stay small within a label, and names that are not written as others are.
 SMALL = {"a", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "the", "to", "with"}
 # These change nothing in the scene.
@@ -78,6 +80,7 @@ def test_labels_are_in_title_case():
     labels = {name: kind.name for name, kind in operators().items()}
     labels.update((name, panel.bl_label) for name, panel in panels().items())
     labels.update((path, item.name) for path, item in properties())
+    labels.update((row.attribute, row.label) for row in QUANTITIES)
     choices = [(path, item) for path, item in properties() if item.type == "ENUM"]
     labels.update((f"{path}.{choice.identifier}", choice.name) for path, item in choices for choice in item.enum_items)
     assert [(path, label) for path, label in labels.items() if not title(label)] == []
@@ -87,6 +90,7 @@ def test_everything_has_a_tooltip():
     tips = {name: kind.description for name, kind in operators().items()}
     tips.update((name, panel.__doc__ or "") for name, panel in panels().items())
     tips.update((path, item.description) for path, item in properties())
+    tips.update((row.attribute, row.tooltip) for row in QUANTITIES)
     choices = [(path, item) for path, item in properties() if item.type == "ENUM"]
     tips.update(
         (f"{path}.{choice.identifier}", choice.description) for path, item in choices for choice in item.enum_items

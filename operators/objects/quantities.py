@@ -1,0 +1,257 @@
+"""The results at the points, a row each: all that writes, carries, exports, lists or shows results goes by these.
+
+To add a result, add a row. Nothing here needs Blender.
+"""
+
+from operator import attrgetter
+from typing import NamedTuple
+
+AREA, NORMAL = "lb_area", "lb_normal"
+MEAN_CURVATURE, GAUSSIAN_CURVATURE = "lb_mean_curvature", "lb_gaussian_curvature"
+BOUNDARY, COMPONENT, TRUST = "lb_boundary", "lb_component", "lb_trust"
+SEGMENT = "lb_segment"
+SHAPE_INDEX, CURVEDNESS = "lb_shape_index", "lb_curvedness"
+CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"
+ROUGHNESS = "lb_roughness"
+FIELD = "lb_field"
+DISTANCE, SIGNED_DISTANCE, DEVIATION = "lb_distance", "lb_signed_distance", "lb_deviation"
+CELL, DIRECTION, UV = "lb_cell", "lb_direction", "lb_uv"
+DISPLACEMENT = "lb_displacement"
+EIGENVECTOR = "lb_eigenvector_"
+HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"
+
+
+class Quantity(NamedTuple):
+    """A result at the points.
+
+    Attributes
+    ----------
+    attribute : str
+        Name of the attribute that holds it; for a numbered one, what comes before the number.
+    label, tooltip : str
+        Title, and what it is in the words of the manual.
+    tool : str
+        Name of the operator that writes it.
+    source : str
+        Where it is in what the tool computes, which is `Built` for the analysis; empty where there is nothing else.
+    data_type : str
+        As Blender names it.
+    power : int
+        Which power of a length its numbers are.
+    carried : {"smooth", "label", "share", "normal"}
+        How other points get it from those that have it: interpolated, from the nearest one, divided among those that
+        belong to one, or interpolated as a unit vector. Of principal directions the nearest, for they have no sign.
+    left_out : float, optional
+        What points get that take no part.
+    bounds : tuple of float, optional
+        Least and greatest value that there can be.
+    color_range : {"", "symmetric", "positive"}
+        Range of the colors: as the values are, about zero whatever their signs, or from zero on, where numbers below
+        zero say that there is no value.
+    along_surface : bool
+        Whether it is a vector in the tangent plane.
+    numbered : bool
+        Whether there are several, with a number of three digits: compared with each other, so written without a unit.
+    """
+
+    attribute: str
+    label: str
+    tooltip: str
+    tool: str
+    source: str = ""
+    data_type: str = "FLOAT"
+    power: int = 0
+    carried: str = "smooth"
+    left_out: float | None = None
+    bounds: tuple | None = None
+    color_range: str = ""
+    along_surface: bool = False
+    numbered: bool = False
+
+    def of(self, found):
+        """Return its values in what the tool computed."""
+        return attrgetter(self.source)(found)
+
+
+QUANTITIES = (  # in the order of the panel
+    Quantity(
+        AREA,
+        "Area",
+        "Part of the surface that belongs to each point",
+        "analyze",
+        "laplacian.areas",
+        power=2,
+        carried="share",
+    ),
+    Quantity(
+        NORMAL,
+        "Normal",
+        "Unit normal in local space, outwards where the points enclose a volume",
+        "analyze",
+        "laplacian.normals",
+        "FLOAT_VECTOR",
+        carried="normal",
+    ),
+    Quantity(
+        MEAN_CURVATURE,
+        "Mean Curvature",
+        "Half the sum of the principal curvatures",
+        "analyze",
+        "mean_curvature",
+        power=-1,
+    ),
+    Quantity(
+        GAUSSIAN_CURVATURE,
+        "Gaussian Curvature",
+        "Product of the principal curvatures",
+        "analyze",
+        "laplacian.gaussian_curvature",
+        power=-2,
+    ),
+    Quantity(
+        BOUNDARY,
+        "Boundary",
+        "True for the points at which the surface ends",
+        "analyze",
+        "laplacian.boundary",
+        "BOOLEAN",
+        carried="label",
+    ),
+    Quantity(
+        COMPONENT,
+        "Component",
+        "Number of the component that a point belongs to, the largest 0; -1 for points left out",
+        "analyze",
+        "laplacian.component",
+        "INT",
+        carried="label",
+        left_out=-1,
+    ),
+    Quantity(
+        TRUST,
+        "Trust",
+        "How far the points around carry the answer, 0 to 1",
+        "analyze",
+        "laplacian.trust",
+        left_out=0.0,
+        bounds=(0.0, 1.0),
+    ),
+    Quantity(SEGMENT, "Segment", "Number of the part", "segment", data_type="INT", carried="label"),
+    Quantity(
+        SHAPE_INDEX,
+        "Shape Index",
+        "The kind of shape: 1 a cap, 0 a saddle, -1 a cup, others between",
+        "principal_curvatures",
+        "shape_index",
+    ),
+    Quantity(
+        CURVEDNESS,
+        "Curvedness",
+        "How strongly the surface bends, whatever its shape",
+        "principal_curvatures",
+        "curvedness",
+        power=-1,
+    ),
+    Quantity(
+        CURVATURE_1,
+        "Curvature 1",
+        "Curvature where the surface bends outwards most",
+        "principal_curvatures",
+        "first",
+        power=-1,
+    ),
+    Quantity(
+        CURVATURE_2,
+        "Curvature 2",
+        "Curvature where the surface bends outwards least",
+        "principal_curvatures",
+        "second",
+        power=-1,
+    ),
+    Quantity(
+        DIRECTION_1,
+        "Direction 1",
+        "Direction of the greatest curvature",
+        "principal_curvatures",
+        "direction",
+        "FLOAT_VECTOR",
+        carried="label",
+        along_surface=True,
+    ),
+    Quantity(ROUGHNESS, "Roughness", "How far each point sticks out of the smooth surface", "roughness", power=1),
+    Quantity(FIELD, "Field", "The smoothest field between given values", "harmonic_field"),
+    Quantity(
+        DISTANCE,
+        "Distance",
+        "Distance along the surface from the nearest of some points",
+        "geodesic_distance",
+        power=1,
+        color_range="positive",
+    ),
+    Quantity(
+        SIGNED_DISTANCE,
+        "Signed Distance",
+        "Distance along the surface from a curve that lies on it, with a sign that tells the side",
+        "signed_distance",
+        power=1,
+        color_range="symmetric",
+    ),
+    Quantity(
+        DEVIATION,
+        "Deviation",
+        "How far each point of a cloud is from the surface of another one, along its normal",
+        "compare",
+        power=1,
+        color_range="symmetric",
+    ),
+    Quantity(CELL, "Cell", "Number of the nearest source", "nearest_source", data_type="INT", carried="label"),
+    Quantity(
+        DIRECTION,
+        "Direction",
+        "Unit vector along the surface",
+        "extend_direction",
+        data_type="FLOAT_VECTOR",
+        along_surface=True,
+    ),
+    Quantity(
+        UV, "UV", "Texture coordinates: 0.5, 0.5 in the middle, 0 and 1 at the borders", "unwrap", data_type="FLOAT2"
+    ),
+    Quantity(
+        DISPLACEMENT,
+        "Displacement",
+        "How far each point moved",
+        "deform_bind",
+        data_type="FLOAT_VECTOR",
+        power=1,
+    ),
+    Quantity(EIGENVECTOR, "Mode", "Vibration mode of the surface", "spectrum", power=-1, numbered=True),
+    Quantity(
+        HEAT_SIGNATURE, "Heat Signature", "Heat that is left after some time", "signature", power=-2, numbered=True
+    ),
+    Quantity(WAVE_SIGNATURE, "Wave Signature", "Waves of one energy", "signature", power=-2, numbered=True),
+)
+_BY_NAME = {row.attribute: row for row in QUANTITIES}
+_NO_RESULT = Quantity("", "", "", "")
+
+
+def quantity(name: str) -> Quantity:
+    """Return the row of the result that an attribute holds; for one that holds no result a row of empty texts."""
+    known = _BY_NAME.get(name)
+    if known is not None:
+        return known
+    several = _BY_NAME.get(name.rstrip("0123456789"), _NO_RESULT)
+    return several if several.numbered else _NO_RESULT
+
+
+def rows_of(tool: str) -> tuple:
+    """Return the rows of what a tool writes, by the name of its operator."""
+    return tuple(row for row in QUANTITIES if row.tool == tool)
+
+
+def written_by(tool: str) -> tuple:
+    """Return the names of the attributes that a tool writes."""
+    return tuple(row.attribute for row in rows_of(tool))
+
+
+RESULTS = written_by("analyze")  # the panel shows these always, and those of tools where they are there
+APPLICATIONS = tuple(row.attribute for row in QUANTITIES if row.tool != "analyze" and not row.numbered)
