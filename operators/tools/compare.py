@@ -10,6 +10,7 @@ from ..objects.attributes import COMPARED, DEVIATION, tag_changed, write_attribu
 from ..objects.place import hide
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
+from ..registration import Registration, Row
 from ..running.application import ShownOperator, Tool, naming, operator_reader
 
 
@@ -173,4 +174,7 @@ def _others(context):
     return [other for other in context.selected_objects if other != context.object and other.type in TYPES]
 
 
-CLASSES = (MESHFREE_OT_compare, MESHFREE_OT_compare_swap)
+TOOLS = (
+    Registration(MESHFREE_OT_compare, panel=Row("Measure", 5, 1), menu=Row("Object", 2, 3), verb=Compare),
+    Registration(MESHFREE_OT_compare_swap, menu=Row("Object", 2, 4)),
+)

@@ -18,6 +18,7 @@ from ..objects.attributes import (
     write_attribute,
 )
 from ..objects.result import EIGENVALUES, check_writable
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ApplicationOperator, ShownOperator, Tool, operator_reader
 from .analyze import resolved_modes
@@ -252,4 +253,14 @@ class MESHFREE_OT_signature(Signature, ShownOperator, bpy.types.Operator):
     bl_label = "Signatures"
 
 
-CLASSES = (MESHFREE_OT_segment, MESHFREE_OT_separate_by_segment, MESHFREE_OT_signature)
+TOOLS = (
+    Registration(
+        MESHFREE_OT_segment,
+        panel=Row("Segment", 1, 1),
+        menu=Row("Object", 5, 1),
+        quick=Row("Object", 1, 2, "Segment"),
+        verb=Segment,
+    ),
+    Registration(MESHFREE_OT_separate_by_segment, panel=Row("Segment", 1, 2), menu=Row("Object", 5, 2)),
+    Registration(MESHFREE_OT_signature, panel=Row("Measure", 4, 1), menu=Row("Object", 5, 3), verb=Signature),
+)
