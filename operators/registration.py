@@ -28,7 +28,7 @@ class Registration:
 
     @property
     def name(self) -> str:
-        """Name of the operator after ``bpy.ops.meshfree.``."""
+        """Name of the operator, as scripts call it."""
         return self.operator.bl_idname.removeprefix("meshfree.")
 
 
