@@ -118,11 +118,12 @@ class CompareOperator(Compare, ShownOperator):
             return f'"{context.object.name}" is compared with one other cloud, and {many} selected. Select one'
         return obstacle(other)
 
-    def conclude(self, context, objects):
-        """Show the colors, and not the cloud that covers them."""
-        super().conclude(context, objects)
+    def finish(self, context, objects, results):
+        """Hide the cloud that covers the colors: when nothing can fail anymore, for nothing would show it again."""
+        finished = super().finish(context, objects, results)
         if self.hide_reference:
             hide(objects[0].meshfree.compared_with)
+        return finished
 
 
 class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):
@@ -153,14 +154,15 @@ class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
             return "The active object was not compared yet. Press Compare Points under Measure"
         return super().obstacle(context)
 
-    def conclude(self, context, objects):
+    def finish(self, context, objects, results):
         """Make the former reference the active object too."""
-        super().conclude(context, objects)
+        finished = super().finish(context, objects, results)
         hide(objects[0], False)
         for other in context.selected_objects:
             other.select_set(False)
         objects[0].select_set(True)
         context.view_layer.objects.active = objects[0]
+        return finished
 
 
 def _compared(context):
