@@ -7,7 +7,6 @@ from bpy.props import BoolProperty, FloatProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.attributes import COMPARED, DEVIATION, tag_changed, write_attribute
-from ..objects.place import hide
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
 from ..registration import Registration, Row
@@ -122,7 +121,9 @@ class CompareOperator(Compare, ShownOperator):
         """Hide the cloud that covers the colors: when nothing can fail anymore, for nothing would show it again."""
         finished = super().finish(context, objects, results)
         if self.hide_reference:
-            hide(objects[0].meshfree.compared_with)
+            other = objects[0].meshfree.compared_with
+            other.hide_set(True)
+            other.hide_render = True
         return finished
 
 
@@ -157,7 +158,8 @@ class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
     def finish(self, context, objects, results):
         """Make the former reference the active object too."""
         finished = super().finish(context, objects, results)
-        hide(objects[0], False)
+        objects[0].hide_set(False)
+        objects[0].hide_render = False
         for other in context.selected_objects:
             other.select_set(False)
         objects[0].select_set(True)

@@ -206,7 +206,7 @@ def test_failure_while_any_tool_writes_changes_nothing(extension):
     others = [(make, name, told) for make, name, told in by_default() if name not in tried]
     assert len(others) > 10
     for make, name, told in others:
-        assert fail_everywhere(extension, make, name, step=43, **told) > 0, name
+        assert fail_everywhere(extension, make, name, step=97, **told) > 0, name
 
 
 def test_parts_stay_one_object_if_separating_fails(extension):
