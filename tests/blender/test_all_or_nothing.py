@@ -170,6 +170,7 @@ FIRST = {  # what is there before tools that a sphere with groups is not enough 
     "iso_lines_to_curves": (colored, {}),
     "minimal_surface": (film, {}),
     "separate_by_segment": (parted, {}),
+    "signature": (handled, {"count": 3, "modes": 10}),
     "signed_distance": (crossed, {"curve": "Curve"}),
 }
 VARIANTS = [

@@ -77,7 +77,6 @@ RUNS = [  # beside all tools by default
     (handled, "orient_normals", {"method": "KEEP", "flip": True}),
     (handled, "segment", {"parts": 3}),
     (handled, "segment", {"method": "NODAL"}),
-    (handled, "signature", {"count": 3, "modes": 10}),
     (handled, "smooth", {"target": "IN_PLACE"}),
     (keyed, "smooth", {"method": "HEAT"}),
     (handled, "mode_shape", {"animate": True}),
@@ -96,6 +95,7 @@ RUNS = [  # beside all tools by default
 
 
 UNREPORTED = {"separate_by_segment"}  # it computes nothing
+UNATTENDED = {"deform_bake", "compare_swap"}  # its steps wait for nobody; it writes to another object
 
 
 def runs():
@@ -288,7 +288,7 @@ HARMLESS = [rename, save_elsewhere, move]
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + COUNT))
 def test_change_while_computing_beside_the_window(fresh, reports, attended, tmp_path, seed):
     rng = np.random.default_rng(seed)
-    tried = [run for run in runs() if run[1] != "deform_bake"]  # whose steps wait for nobody
+    tried = [run for run in runs() if run[1] not in UNATTENDED]
     make, name, settings = tried[seed % len(tried)]
     change = [*ENDING, *HARMLESS][rng.integers(len(ENDING) + len(HARMLESS))]
     obj, seen = fresh(make), reports()
