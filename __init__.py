@@ -1,5 +1,8 @@
 """Mesh-Free Laplacian: areas, normals, curvature and vibration modes of point clouds, inside Blender."""
 
+import importlib
+import pkgutil
+
 _registered = []
 
 
@@ -9,29 +12,12 @@ def _modules():
 
     if not missing.scipy_serves():
         return (missing,)
+    from .operators import tools
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
     from .operators.objects import counting, earlier, notices, settings
     from .operators.running import cache, job
-    from .operators.tools import (
-        along,
-        analyze,
-        compare,
-        convert,
-        curvature,
-        fields,
-        mesh,
-        minimal,
-        orient,
-        segment,
-        sequence,
-        smooth,
-        spectrum,
-        splats,
-        surface,
-    )
-    from .operators.tools import select as selecting
     from .ui import (
         applications,
         colormap,
@@ -57,25 +43,10 @@ def _modules():
         cache,
         counting,
         job,
-        analyze,
-        orient,
-        surface,
-        splats,
-        mesh,
-        compare,
-        spectrum,
-        sequence,
-        curvature,
-        smooth,
-        segment,
-        fields,
-        along,
+        *_within(tools),
         deform,
         bake,
         live,
-        minimal,
-        selecting,
-        convert,
         importing,
         exporting,
         command,
@@ -97,13 +68,27 @@ def _modules():
     )
 
 
+def _within(package):
+    """All modules of a package: a new tool is found without being named here."""
+    found = pkgutil.iter_modules(package.__path__)
+    return [importlib.import_module(f"{package.__name__}.{module.name}") for module in found]
+
+
+def _classes(module):
+    """All classes of a module that Blender registers: operators of tools, and others."""
+    return [*(tool.operator for tool in getattr(module, "TOOLS", ())), *getattr(module, "CLASSES", ())]
+
+
 def register():
     """Add the extension's classes, the settings of objects, menus, handlers and the command line to Blender."""
     import bpy
 
+    from .operators import registration
+
     for module in _modules():
-        for cls in getattr(module, "CLASSES", ()):
+        for cls in _classes(module):
             bpy.utils.register_class(cls)
+        registration.add(getattr(module, "TOOLS", ()))
         if hasattr(module, "attach"):
             module.attach()
         _registered.append(module)
@@ -113,9 +98,12 @@ def unregister():
     """Take everything out again, in reverse order."""
     import bpy
 
+    from .operators import registration
+
+    registration.clear()
     while _registered:
         module = _registered.pop()
         if hasattr(module, "detach"):
             module.detach()
-        for cls in reversed(getattr(module, "CLASSES", ())):
+        for cls in reversed(_classes(module)):
             bpy.utils.unregister_class(cls)

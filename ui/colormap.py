@@ -7,6 +7,7 @@ from ..operators.objects.all_or_nothing import all_or_nothing
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
 from ..operators.objects.colors import own_material
 from ..operators.objects.quantities import quantity
+from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator, reporting
 from .display import find_display, is_colored
 from .show import look_at, show_attribute, show_in_solid, show_own_material, use_material_preview
@@ -87,4 +88,7 @@ class MESHFREE_OT_own_material(ReadyOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (MESHFREE_OT_colormap, MESHFREE_OT_own_material)
+TOOLS = (
+    Registration(MESHFREE_OT_colormap, menu=Row("Object", 1, 6)),
+    Registration(MESHFREE_OT_own_material, menu=Row("Object", 1, 7)),
+)

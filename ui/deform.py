@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..operators import registration
 from ..operators.deform import live
 from ..operators.deform.binding import copied_from, handled_object, is_bound, stale_reason
 from ..operators.deform.nodes import find_deform, is_baked
@@ -61,10 +62,11 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
             draw_text(column, context, "Blender may crash in renders", "ERROR")
             column.prop(context.scene.render, "use_lock_interface")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        for name in ("update", "reset", "apply", "to_shape_key", "bake", "free"):
-            if name not in {"bake", "free"} or (name == "free") == is_baked(obj):
-                grid.operator(f"meshfree.deform_{name}")
-        grid.operator("meshfree.deform_unbind")
+        hidden = "deform_bake" if is_baked(obj) else "deform_free"
+        for group in registration.groups("panel", self.bl_label):
+            for tool in group:
+                if tool.name != hidden:
+                    grid.operator(tool.operator.bl_idname)
 
 
 def _draw_state(layout, context, obj):

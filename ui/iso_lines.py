@@ -7,6 +7,7 @@ from bpy.props import FloatProperty, IntProperty
 from .. import core
 from ..operators.objects.attributes import own_positions, read_attribute
 from ..operators.objects.place import OFFSET
+from ..operators.registration import Registration, Row
 from ..operators.running.application import ApplicationOperator, operator_reader
 from ..operators.tools.mesh import surface_mesh
 from .display import component, label, shown_attribute, shown_range, sloping, step_colors
@@ -130,4 +131,4 @@ def _curve(name, lines, thickness):
     return curve
 
 
-CLASSES = (MESHFREE_OT_iso_lines_to_curves,)
+TOOLS = (Registration(MESHFREE_OT_iso_lines_to_curves, menu=Row("Object", 2, 2)),)

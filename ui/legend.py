@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..core import PointCloudError
 from ..operators.objects.modifiers import add_node
+from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator
 from .canvas import PLATE_CORNERS
 from .colormaps import to_linear
@@ -256,4 +257,4 @@ def _material(name, attribute):
     return material
 
 
-CLASSES = (MESHFREE_OT_legend,)
+TOOLS = (Registration(MESHFREE_OT_legend, menu=Row("Object", 1, 8)),)

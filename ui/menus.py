@@ -2,36 +2,10 @@
 
 import bpy
 
+from ..operators import registration
 from ..operators.files.importing import OWN
 from ..operators.objects.reading import TYPES
-from .panel import TASKS
-
-_TOOLS = (
-    ("show_surface", "show_splats", "analyze", "spectrum", "analyze_sequence", "colormap", "own_material", "legend"),
-    ("mesh_surface", "iso_lines_to_curves", "compare", "compare_swap"),
-    ("principal_curvatures", "roughness", "orient_normals"),
-    ("smooth", "mode_shape"),
-    ("segment", "separate_by_segment", "signature"),
-    ("geodesic_distance", "harmonic_field"),
-    ("signed_distance", "nearest_source", "unwrap", "extend_direction"),
-    ("deform_bind", "deform_update", "deform_reset", "deform_apply", "deform_to_shape_key", "deform_unbind"),
-    ("deform_bake", "deform_free"),
-    ("apply_to_splats", "join_splats"),
-    ("minimal_surface",),
-    ("dismiss", "stop"),
-)
-_SELECTING = (
-    "select_grow",
-    "select_component",
-    "select_front",
-    "select_boundary",
-    "select_by_range",
-    "select_floaters",
-)
-
-
-# What is done most with points, by right click.
-_QUICK_SELECTING = ("select_grow", "select_component", "select_front")
+from .panel import draw_tasks
 
 
 class MESHFREE_MT_object(bpy.types.Menu):
@@ -40,11 +14,7 @@ class MESHFREE_MT_object(bpy.types.Menu):
     bl_label = "Mesh-Free"
 
     def draw(self, context):
-        for index, names in enumerate(_TOOLS):
-            if index:
-                self.layout.separator()
-            for name in names:
-                self.layout.operator(f"meshfree.{name}")
+        _draw_tools(self.layout, "menu", "Object")
         self.layout.operator_menu_enum("meshfree.convert", "target")
 
 
@@ -54,11 +24,18 @@ class MESHFREE_MT_points(bpy.types.Menu):
     bl_label = "Mesh-Free"
 
     def draw(self, context):
-        for name in _SELECTING:
-            self.layout.operator(f"meshfree.{name}")
+        _draw_tools(self.layout, "menu", "Points")
         self.layout.separator()
         _draw_assign(self.layout)
         self.layout.operator("meshfree.handle_add")
+
+
+def _draw_tools(layout, kind, home):
+    for index, group in enumerate(registration.groups(kind, home)):
+        if index:
+            layout.separator()
+        for tool in group:
+            layout.operator(tool.operator.bl_idname)
 
 
 def _draw_assign(layout):
@@ -83,8 +60,7 @@ def _draw_object_quick(menu, context):
     layout.separator()
     if obj.type != "MESH" or not obj.data.polygons:
         layout.operator("meshfree.analyze").modes = obj.meshfree.modes
-        for name, text in TASKS:
-            layout.operator(f"meshfree.{name}", text=text).at_once = True
+        draw_tasks(layout)
     layout.menu(MESHFREE_MT_object.__name__)
 
 
@@ -92,8 +68,7 @@ def _draw_points_quick(menu, context):
     layout = menu.layout
     layout.separator()
     if context.object.type != "MESH" or not context.object.data.polygons:
-        for name in _QUICK_SELECTING:
-            layout.operator(f"meshfree.{name}")
+        _draw_tools(layout, "quick", "Points")
         _draw_assign(layout)
     layout.menu(MESHFREE_MT_points.__name__)
 

@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..operators import registration
 from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import DISC, eigenvector_name, mode_number, point_count
 from ..operators.objects.colors import own_colors, own_material, shows_own_material
@@ -10,6 +11,7 @@ from ..operators.objects.quantities import APPLICATIONS, DEVIATION, RESULTS, qua
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
 from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
+from ..operators.running.application import ApplicationOperator
 from ..operators.running.job import running
 from .dialogs import draw_setting
 from .display import (
@@ -31,12 +33,6 @@ _NOTICES = 6  # there at a time
 _CROSS = 44.0  # width of the cross beside a notice, and of the box around it
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
-TASKS = (  # that one click does, each with its defaults
-    ("smooth", "Clean"),
-    ("segment", "Segment"),
-    ("principal_curvatures", "Curvature"),
-    ("deform_bind", "Bend"),
-)
 _SETTINGS = (  # what belongs together
     ("boundary", "boundary_group", "sheets", "projection"),
     ("bandwidth", "neighbors", "bandwidth_factor"),
@@ -115,9 +111,24 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             if is_stale(obj, glance=True):
                 draw_text(layout, context, "Results are stale: analyze again", "ERROR")
         _draw_compared(layout, context, obj)
-        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        for name, text in TASKS:
-            grid.operator(f"meshfree.{name}", text=text).at_once = True
+        draw_tasks(layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True))
+
+
+def draw_tools(layout, home):
+    """Draw the tools with a row in a panel, each group close together; dots say that a tool asks before it works."""
+    for group in registration.groups("panel", home):
+        column = layout.column(align=True)
+        for tool in group:
+            operator = tool.operator
+            asks = issubclass(operator, ApplicationOperator) and operator.asks
+            column.operator(operator.bl_idname, text=tool.panel.text or f"{operator.bl_label}{'...' if asks else ''}")
+
+
+def draw_tasks(layout):
+    """Draw what one click does with an object, each tool with its defaults."""
+    for group in registration.groups("quick", "Object"):
+        for tool in group:
+            layout.operator(tool.operator.bl_idname, text=tool.quick.text).at_once = True
 
 
 def _draw_job(layout, context, job):
@@ -199,12 +210,7 @@ def _draw_splats(layout, context, obj):
     """Draw what is there for Gaussian splats alone."""
     if are_left_behind(obj.data, glance=True):
         draw_text(layout, context, LEFT_BEHIND[0].upper() + LEFT_BEHIND[1:], "ERROR")
-    column = layout.column(align=True)
-    column.operator("meshfree.show_splats")
-    column.operator("meshfree.select_floaters")
-    column.operator("meshfree.apply_to_splats")
-    column.operator("meshfree.join_splats")
-    column.operator("meshfree.export_splats", text="Export Splats...")
+    draw_tools(layout, "Splats")
     layout.prop(obj.meshfree, "leave_out_floaters")
 
 
@@ -263,7 +269,7 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
         layout = self.layout
         obj = context.object
         layout.operator("meshfree.spectrum").count = obj.meshfree.modes
-        layout.operator("meshfree.mode_shape", text="Deform by Mode...")
+        draw_tools(layout, self.bl_label)
         eigenvalues = read_eigenvalues(obj)
         if not len(eigenvalues):
             return

@@ -19,7 +19,7 @@ from ..operators.objects.groups import (
 from ..operators.objects.reading import TYPES
 from ..operators.tools.convert import MESHFREE_OT_convert
 from . import colormaps
-from .panel import SidebarPanel
+from .panel import SidebarPanel, draw_tools
 
 _TITLES = {
     HANDLE: "Handles",
@@ -48,9 +48,7 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout, obj = self.layout, context.object
-        column = layout.column(align=True)
-        for name in ("grow", "component", "front", "boundary"):
-            column.operator(f"meshfree.select_{name}")
+        draw_tools(layout, self.bl_label)
         layout.prop(obj.meshfree, "show_groups")
         column = layout.column(align=True)
         for role, title in _TITLES.items():

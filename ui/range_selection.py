@@ -4,6 +4,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty
 
 from ..core import PointCloudError
+from ..operators.registration import Registration, Row
 from ..operators.tools.select import SelectionOperator, select, selection
 from .display import label, shown_attribute, shown_range, shown_values
 
@@ -58,4 +59,4 @@ class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
         return lambda: select(context, obj, chosen)
 
 
-CLASSES = (MESHFREE_OT_select_by_range,)
+TOOLS = (Registration(MESHFREE_OT_select_by_range, menu=Row("Points", 1, 5)),)

@@ -12,6 +12,7 @@ from ..objects.carried import carried, carries, moved_names
 from ..objects.quantities import DISPLACEMENT
 from ..objects.reading import find_object
 from ..objects.splats import HARMONIC, harmonic_names
+from ..registration import Registration, Row
 from ..running.job import Job, JobOperator, SteppedJob, all_steps
 from ..running.ready import reporting
 from ..running.stages import Stages
@@ -234,4 +235,7 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
         return f"{obj.name}: follows its handles again"
 
 
-CLASSES = (MESHFREE_OT_deform_bake, MESHFREE_OT_deform_free)
+TOOLS = (
+    Registration(MESHFREE_OT_deform_bake, panel=Row("Bend", 1, 5), menu=Row("Object", 9, 1)),
+    Registration(MESHFREE_OT_deform_free, panel=Row("Bend", 1, 6), menu=Row("Object", 9, 2)),
+)

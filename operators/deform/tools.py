@@ -26,6 +26,7 @@ from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
 from ..objects.result import length_text
 from ..objects.splats import has_splats, shown_splats, write_splats
+from ..registration import Registration, Row
 from ..running.application import ApplicationOperator
 from ..running.job import busy
 from ..running.ready import ReadyOperator, reporting
@@ -474,12 +475,12 @@ def delete_bake(obj):
         bpy.data.meshes.remove(cache.data)  # and the object that shows it
 
 
-CLASSES = (
-    MESHFREE_OT_handle_add,
-    MESHFREE_OT_deform_bind,
-    MESHFREE_OT_deform_update,
-    MESHFREE_OT_deform_apply,
-    MESHFREE_OT_deform_to_shape_key,
-    MESHFREE_OT_deform_reset,
-    MESHFREE_OT_deform_unbind,
+TOOLS = (
+    Registration(MESHFREE_OT_handle_add),
+    Registration(MESHFREE_OT_deform_bind, menu=Row("Object", 8, 1), quick=Row("Object", 1, 4, "Bend")),
+    Registration(MESHFREE_OT_deform_update, panel=Row("Bend", 1, 1), menu=Row("Object", 8, 2)),
+    Registration(MESHFREE_OT_deform_apply, panel=Row("Bend", 1, 3), menu=Row("Object", 8, 4)),
+    Registration(MESHFREE_OT_deform_to_shape_key, panel=Row("Bend", 1, 4), menu=Row("Object", 8, 5)),
+    Registration(MESHFREE_OT_deform_reset, panel=Row("Bend", 1, 2), menu=Row("Object", 8, 3)),
+    Registration(MESHFREE_OT_deform_unbind, panel=Row("Bend", 1, 7), menu=Row("Object", 8, 6)),
 )

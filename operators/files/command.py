@@ -8,16 +8,13 @@ import bpy
 
 from ...core import PointCloudError
 from ...core.files import numbered_files
-from ..tools.along import ExtendDirection, NearestSource, Unwrap
-from ..tools.curvature import Curvatures, Roughness
-from ..tools.fields import GeodesicDistance, HarmonicField
-from ..tools.minimal import MinimalSurface
-from ..tools.segment import Segment, Signature
-from ..tools.smooth import ModeShape, Smooth
+from .. import registration
+from ..objects.groups import SOURCE
 from .bending import Deform, SplatInfo
 from .tool_verbs import AlongCurve, CompareWith, FromSources, Mesh, Orient
 from .verbs import Analyze, Apply
 
+_OWN = {"signed_distance": AlongCurve, "mesh_surface": Mesh, "compare": CompareWith, "orient_normals": Orient}
 _handles = []
 
 
@@ -33,28 +30,18 @@ def detach():
 
 
 def make_verbs():
-    """Return all verbs."""
-    return [
-        Analyze(),
-        Apply("principal_curvatures", Curvatures),
-        Apply("roughness", Roughness),
-        Apply("smooth", Smooth),
-        Apply("mode_shape", ModeShape),
-        Apply("segment", Segment),
-        Apply("signature", Signature),
-        Apply("minimal_surface", MinimalSurface),
-        Mesh(),
-        CompareWith(),
-        Orient(),
-        FromSources("geodesic_distance", GeodesicDistance),
-        FromSources("nearest_source", NearestSource),
-        FromSources("unwrap", Unwrap),
-        FromSources("extend_direction", ExtendDirection),
-        AlongCurve(),
-        Apply("harmonic_field", HarmonicField),
-        SplatInfo(),
-        Deform(),
-    ]
+    """Return all verbs: the analysis, those of tools in the order of the menu, and those that need no object."""
+    tools = [tool for group in registration.groups("menu", "Object") for tool in group if tool.verb]
+    return [Analyze(), *map(_verb, tools), SplatInfo(), Deform()]
+
+
+def _verb(tool):
+    """Return the verb of a tool: its own, where it takes more than settings, or one for all tools."""
+    if tool.name in _OWN:
+        return _OWN[tool.name]()
+    group = getattr(bpy.ops.meshfree, tool.name).get_rna_type().properties.get("group")
+    starts = group is not None and group.default == SOURCE
+    return (FromSources if starts else Apply)(tool.name, tool.verb)
 
 
 def run(argv) -> int:

@@ -15,6 +15,7 @@ from ..objects.place import place_of
 from ..objects.reading import TYPES, read_points
 from ..objects.result import read_eigenvalues
 from ..objects.splats import LEFT_BEHIND, are_left_behind, has_splats
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import build_operator
 from ..running.job import JobOperator
@@ -204,9 +205,9 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
         return write
 
 
-CLASSES = (
-    MESHFREE_OT_export_points,
-    MESHFREE_OT_export_splats,
-    MESHFREE_OT_export_operator,
-    MESHFREE_OT_export_eigenvalues,
+TOOLS = (
+    Registration(MESHFREE_OT_export_points),
+    Registration(MESHFREE_OT_export_splats, panel=Row("Splats", 1, 5, "Export Splats...")),
+    Registration(MESHFREE_OT_export_operator),
+    Registration(MESHFREE_OT_export_eigenvalues),
 )

@@ -29,6 +29,7 @@ from ..objects.handlers import tell
 from ..objects.notices import keep
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
+from ..registration import Registration
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
@@ -340,4 +341,4 @@ def _turned(vectors, up):
     return vectors[:, [0, 2, 1]] * np.array([1.0, -side, side], vectors.dtype)
 
 
-CLASSES = (MESHFREE_OT_import_points,)
+TOOLS = (Registration(MESHFREE_OT_import_points),)

@@ -3,6 +3,8 @@
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
+from ..registration import Registration, Row
+
 
 class MESHFREE_PG_notice(bpy.types.PropertyGroup):
     """What a tool had to tell of an object"""
@@ -74,4 +76,4 @@ class MESHFREE_OT_dismiss(bpy.types.Operator):
 
 
 PROPERTY_GROUPS = (MESHFREE_PG_notice,)
-CLASSES = (MESHFREE_OT_dismiss,)
+TOOLS = (Registration(MESHFREE_OT_dismiss, menu=Row("Object", 12, 1)),)

@@ -33,7 +33,7 @@ def known_offset(scene):
     return next((offset_of(obj) for obj in scene.objects if OFFSET in obj), None)
 
 
-def hide(obj, hidden=True):
-    """Hide an object in views and in renders, or show it in both."""
-    obj.hide_set(hidden)
-    obj.hide_render = hidden
+def hide(obj):
+    """Hide an object in views and in renders."""
+    obj.hide_set(True)
+    obj.hide_render = True

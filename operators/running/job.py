@@ -11,6 +11,7 @@ from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..objects.options import point_budget, settings_values
 from ..objects.reading import find_object, fingerprint, metric, obstacle, read_points
 from ..objects.result import same_lengths
+from ..registration import Registration, Row
 from .ready import ReadyOperator, reporting
 from .stages import Stages, StageTimes
 
@@ -352,4 +353,4 @@ def _abandon(*_):
 
 
 _HANDLERS = {"undo_post": _undone, "redo_post": _undone, "load_pre": _abandon}
-CLASSES = (MESHFREE_OT_stop,)
+TOOLS = (Registration(MESHFREE_OT_stop, menu=Row("Object", 12, 2)),)

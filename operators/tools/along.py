@@ -10,6 +10,7 @@ from ..objects.attributes import tag_changed, write_attribute
 from ..objects.groups import SOURCE
 from ..objects.quantities import CELL, DIRECTION, SIGNED_DISTANCE, UV
 from ..objects.result import length_text
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
 from .select import read_sources
@@ -272,9 +273,13 @@ def _read_curve(context, name):
     return places @ matrix[:3, :3].T + matrix[:3, 3], curve.data.splines[0].use_cyclic_u
 
 
-CLASSES = (
-    MESHFREE_OT_nearest_source,
-    MESHFREE_OT_unwrap,
-    MESHFREE_OT_extend_direction,
-    MESHFREE_OT_signed_distance,
+TOOLS = (
+    Registration(MESHFREE_OT_nearest_source, panel=Row("Measure", 3, 1), menu=Row("Object", 7, 2), verb=NearestSource),
+    Registration(MESHFREE_OT_unwrap, panel=Row("Measure", 3, 2), menu=Row("Object", 7, 3), verb=Unwrap),
+    Registration(
+        MESHFREE_OT_extend_direction, panel=Row("Measure", 3, 3), menu=Row("Object", 7, 4), verb=ExtendDirection
+    ),
+    Registration(
+        MESHFREE_OT_signed_distance, panel=Row("Measure", 2, 2), menu=Row("Object", 7, 1), verb=SignedDistance
+    ),
 )

@@ -13,6 +13,7 @@ from ..objects.options import laplacian_options, point_budget
 from ..objects.quantities import AREA, BOUNDARY, COMPONENT, NORMAL
 from ..objects.reading import read_points
 from ..objects.result import analysis_names, area_text, write_result
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator
 from ..running.measures import measure
@@ -150,4 +151,4 @@ class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
         return self.modes
 
 
-CLASSES = (MESHFREE_OT_analyze,)
+TOOLS = (Registration(MESHFREE_OT_analyze, menu=Row("Object", 1, 3)),)

@@ -7,10 +7,10 @@ from bpy.props import BoolProperty, FloatProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.attributes import COMPARED, tag_changed, write_attribute
-from ..objects.place import hide
 from ..objects.quantities import DEVIATION
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
+from ..registration import Registration, Row
 from ..running.application import ShownOperator, Tool, naming, operator_reader
 
 
@@ -118,11 +118,14 @@ class CompareOperator(Compare, ShownOperator):
             return f'"{context.object.name}" is compared with one other cloud, and {many} selected. Select one'
         return obstacle(other)
 
-    def conclude(self, context, objects):
-        """Show the colors, and not the cloud that covers them."""
-        super().conclude(context, objects)
+    def finish(self, context, objects, results):
+        """Hide the cloud that covers the colors: when nothing can fail anymore, for nothing would show it again."""
+        finished = super().finish(context, objects, results)
         if self.hide_reference:
-            hide(objects[0].meshfree.compared_with)
+            other = objects[0].meshfree.compared_with
+            other.hide_set(True)
+            other.hide_render = True
+        return finished
 
 
 class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):
@@ -153,14 +156,16 @@ class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
             return "The active object was not compared yet. Press Compare Points under Measure"
         return super().obstacle(context)
 
-    def conclude(self, context, objects):
+    def finish(self, context, objects, results):
         """Make the former reference the active object too."""
-        super().conclude(context, objects)
-        hide(objects[0], False)
+        finished = super().finish(context, objects, results)
+        objects[0].hide_set(False)
+        objects[0].hide_render = False
         for other in context.selected_objects:
             other.select_set(False)
         objects[0].select_set(True)
         context.view_layer.objects.active = objects[0]
+        return finished
 
 
 def _compared(context):
@@ -174,4 +179,7 @@ def _others(context):
     return [other for other in context.selected_objects if other != context.object and other.type in TYPES]
 
 
-CLASSES = (MESHFREE_OT_compare, MESHFREE_OT_compare_swap)
+TOOLS = (
+    Registration(MESHFREE_OT_compare, panel=Row("Measure", 5, 1), menu=Row("Object", 2, 3), verb=Compare),
+    Registration(MESHFREE_OT_compare_swap, menu=Row("Object", 2, 4)),
+)

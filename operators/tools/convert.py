@@ -15,6 +15,7 @@ from ..objects.evaluated import POINTCLOUDS_SINCE, shown_as_own, shown_points
 from ..objects.groups import ROLES, group_weights, handle_names, has_group, role_group
 from ..objects.modifiers import inputs_of, is_display, put_inputs, set_input
 from ..objects.result import check_writable
+from ..registration import Registration
 from ..running.application import chosen_objects
 from ..running.ready import ReadyOperator, reporting
 from .select import selection
@@ -183,4 +184,4 @@ def _put_display(obj, display):
     put_inputs(modifier, inputs)
 
 
-CLASSES = (MESHFREE_OT_convert,)
+TOOLS = (Registration(MESHFREE_OT_convert),)

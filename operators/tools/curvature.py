@@ -20,6 +20,7 @@ from ..objects.quantities import (
     written_by,
 )
 from ..objects.result import length_text
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
 from .smooth import check_wavelength
@@ -121,4 +122,13 @@ class MESHFREE_OT_roughness(Roughness, ShownOperator, bpy.types.Operator):
     bl_label = "Roughness"
 
 
-CLASSES = (MESHFREE_OT_principal_curvatures, MESHFREE_OT_roughness)
+TOOLS = (
+    Registration(
+        MESHFREE_OT_principal_curvatures,
+        panel=Row("Measure", 1, 1),
+        menu=Row("Object", 3, 1),
+        quick=Row("Object", 1, 3, "Curvature"),
+        verb=Curvatures,
+    ),
+    Registration(MESHFREE_OT_roughness, panel=Row("Measure", 1, 2), menu=Row("Object", 3, 2), verb=Roughness),
+)

@@ -10,6 +10,7 @@ from ..objects.attributes import point_count, read_attribute, tag_changed, write
 from ..objects.groups import HIGH, LOW, SOURCE, VALUE, chosen_weights, group_kind, has_group, is_chosen
 from ..objects.quantities import DISTANCE, FIELD
 from ..objects.result import length_text
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
 from .select import read_sources
@@ -204,4 +205,9 @@ class MESHFREE_OT_geodesic_distance(GeodesicDistance, ShownOperator, bpy.types.O
     bl_label = "Geodesic Distance"
 
 
-CLASSES = (MESHFREE_OT_harmonic_field, MESHFREE_OT_geodesic_distance)
+TOOLS = (
+    Registration(MESHFREE_OT_harmonic_field, panel=Row("Measure", 2, 3), menu=Row("Object", 6, 2), verb=HarmonicField),
+    Registration(
+        MESHFREE_OT_geodesic_distance, panel=Row("Measure", 2, 1), menu=Row("Object", 6, 1), verb=GeodesicDistance
+    ),
+)

@@ -14,6 +14,7 @@ from ..objects.handlers import tell
 from ..objects.place import copy_place, hide
 from ..objects.quantities import quantity
 from ..objects.splats import has_splats
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.measures import carry
@@ -197,4 +198,4 @@ def _close(mesh, most):
     return opened
 
 
-CLASSES = (MESHFREE_OT_mesh_surface,)
+TOOLS = (Registration(MESHFREE_OT_mesh_surface, panel=Row("Mesh", 1, 1), menu=Row("Object", 2, 1), verb=MeshSurface),)

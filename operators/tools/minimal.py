@@ -11,6 +11,7 @@ from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.reading import read_points
 from ..objects.result import area_text
 from ..objects.splats import has_splats
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, build_operator
 from ..running.discs import disc_finder
@@ -112,4 +113,8 @@ def _shrink(points, boundary, tolerance, steps, options, progress):
     return film
 
 
-CLASSES = (MESHFREE_OT_minimal_surface,)
+TOOLS = (
+    Registration(
+        MESHFREE_OT_minimal_surface, panel=Row("Minimal Surface", 1, 1), menu=Row("Object", 11, 1), verb=MinimalSurface
+    ),
+)

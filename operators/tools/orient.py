@@ -10,6 +10,7 @@ from ..objects.attributes import ORIENTATION, read_attribute
 from ..objects.quantities import AREA, NORMAL, RESULTS
 from ..objects.reading import read_points
 from ..objects.result import write_result
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool
 from .analyze import WRITE_LIMIT, plan_analysis
@@ -123,4 +124,6 @@ def _vectors(obj, name):
     return vectors
 
 
-CLASSES = (MESHFREE_OT_orient_normals,)
+TOOLS = (
+    Registration(MESHFREE_OT_orient_normals, panel=Row("Clean", 1, 2), menu=Row("Object", 3, 3), verb=OrientNormals),
+)

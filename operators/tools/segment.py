@@ -10,6 +10,7 @@ from ...core import PointCloudError
 from ..objects.attributes import SELECTION, read_attribute, remove_numbered, tag_changed, write_attribute
 from ..objects.quantities import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE
 from ..objects.result import EIGENVALUES, check_writable
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ApplicationOperator, ShownOperator, Tool, operator_reader
 from .analyze import resolved_modes
@@ -244,4 +245,14 @@ class MESHFREE_OT_signature(Signature, ShownOperator, bpy.types.Operator):
     bl_label = "Signatures"
 
 
-CLASSES = (MESHFREE_OT_segment, MESHFREE_OT_separate_by_segment, MESHFREE_OT_signature)
+TOOLS = (
+    Registration(
+        MESHFREE_OT_segment,
+        panel=Row("Segment", 1, 1),
+        menu=Row("Object", 5, 1),
+        quick=Row("Object", 1, 2, "Segment"),
+        verb=Segment,
+    ),
+    Registration(MESHFREE_OT_separate_by_segment, panel=Row("Segment", 1, 2), menu=Row("Object", 5, 2)),
+    Registration(MESHFREE_OT_signature, panel=Row("Measure", 4, 1), menu=Row("Object", 5, 3), verb=Signature),
+)

@@ -36,6 +36,7 @@ from ..objects.groups import (
 from ..objects.handlers import tell
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.splats import read_splats
+from ..registration import Registration, Row
 from ..running.application import compute_all, naming, operator_reader
 from ..running.job import JobOperator
 from ..running.ready import ReadyOperator, reporting
@@ -492,13 +493,28 @@ class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
         return lambda: select(context, obj, chosen)
 
 
-CLASSES = (
-    MESHFREE_OT_select_point,
-    MESHFREE_OT_select_grow,
-    MESHFREE_OT_select_component,
-    MESHFREE_OT_select_front,
-    MESHFREE_OT_select_boundary,
-    MESHFREE_OT_select_floaters,
-    MESHFREE_OT_select_group,
-    MESHFREE_OT_group_from_selection,
+TOOLS = (
+    Registration(MESHFREE_OT_select_point),
+    Registration(
+        MESHFREE_OT_select_grow,
+        panel=Row("Points and Groups", 1, 1),
+        menu=Row("Points", 1, 1),
+        quick=Row("Points", 1, 1),
+    ),
+    Registration(
+        MESHFREE_OT_select_component,
+        panel=Row("Points and Groups", 1, 2),
+        menu=Row("Points", 1, 2),
+        quick=Row("Points", 1, 2),
+    ),
+    Registration(
+        MESHFREE_OT_select_front,
+        panel=Row("Points and Groups", 1, 3),
+        menu=Row("Points", 1, 3),
+        quick=Row("Points", 1, 3),
+    ),
+    Registration(MESHFREE_OT_select_boundary, panel=Row("Points and Groups", 1, 4), menu=Row("Points", 1, 4)),
+    Registration(MESHFREE_OT_select_floaters, panel=Row("Splats", 1, 2), menu=Row("Points", 1, 6)),
+    Registration(MESHFREE_OT_select_group),
+    Registration(MESHFREE_OT_group_from_selection),
 )

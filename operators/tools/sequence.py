@@ -16,6 +16,7 @@ from ..objects.modifiers import COLLECTION, get_input, is_sequence
 from ..objects.quantities import AREA, MEAN_CURVATURE
 from ..objects.reading import obstacle, read_points, sharing_objects
 from ..objects.result import analysis_names, area_text, check_writable, write_result
+from ..registration import Registration, Row
 from ..running.application import naming
 from ..running.job import JobOperator
 from ..running.ready import reporting
@@ -162,4 +163,4 @@ def _compute(plans, progress):
     return results
 
 
-CLASSES = (MESHFREE_OT_analyze_sequence,)
+TOOLS = (Registration(MESHFREE_OT_analyze_sequence, menu=Row("Object", 1, 5)),)

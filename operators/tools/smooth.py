@@ -12,6 +12,7 @@ from ..objects.groups import chosen_weights
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.result import length_text
 from ..objects.splats import has_splats
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.discs import disc_finder
@@ -269,4 +270,13 @@ class MESHFREE_OT_mode_shape(ModeShape, ApplicationOperator, bpy.types.Operator)
     bl_label = "Deform by Mode"
 
 
-CLASSES = (MESHFREE_OT_smooth, MESHFREE_OT_mode_shape)
+TOOLS = (
+    Registration(
+        MESHFREE_OT_smooth,
+        panel=Row("Clean", 1, 1),
+        menu=Row("Object", 4, 1),
+        quick=Row("Object", 1, 1, "Clean"),
+        verb=Smooth,
+    ),
+    Registration(MESHFREE_OT_mode_shape, panel=Row("Spectrum", 1, 1), menu=Row("Object", 4, 2), verb=ModeShape),
+)

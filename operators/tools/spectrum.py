@@ -4,6 +4,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ..objects.attributes import eigenvector_name
+from ..registration import Registration, Row
 from .analyze import AnalysisOperator
 
 
@@ -32,4 +33,4 @@ class MESHFREE_OT_spectrum(AnalysisOperator, bpy.types.Operator):
         return eigenvector_name(min(2, self.count))
 
 
-CLASSES = (MESHFREE_OT_spectrum,)
+TOOLS = (Registration(MESHFREE_OT_spectrum, menu=Row("Object", 1, 4)),)

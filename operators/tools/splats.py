@@ -31,6 +31,7 @@ from ..objects.splats import (
     read_splats,
     write_splats,
 )
+from ..registration import Registration, Row
 from ..running.ready import ReadyOperator, reporting
 
 _ROUNDING = 1e-12  # of products of matrices
@@ -236,4 +237,8 @@ def _remove(context, objects):
     context.view_layer.update()
 
 
-CLASSES = (MESHFREE_OT_show_splats, MESHFREE_OT_apply_to_splats, MESHFREE_OT_join_splats)
+TOOLS = (
+    Registration(MESHFREE_OT_show_splats, panel=Row("Splats", 1, 1), menu=Row("Object", 1, 2)),
+    Registration(MESHFREE_OT_apply_to_splats, panel=Row("Splats", 1, 3), menu=Row("Object", 10, 1)),
+    Registration(MESHFREE_OT_join_splats, panel=Row("Splats", 1, 4), menu=Row("Object", 10, 2)),
+)

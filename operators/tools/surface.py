@@ -6,6 +6,7 @@ from ... import core
 from ..objects.attributes import DISC, tag_changed, write_attribute
 from ..objects.handlers import tell
 from ..objects.reading import chosen_sides, discs, read_points
+from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ApplicationOperator
 
@@ -40,4 +41,4 @@ class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
             tell("surface_found", obj)
 
 
-CLASSES = (MESHFREE_OT_show_surface,)
+TOOLS = (Registration(MESHFREE_OT_show_surface, menu=Row("Object", 1, 1)),)

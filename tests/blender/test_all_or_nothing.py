@@ -10,6 +10,7 @@ import pytest
 
 from tests.blender.clouds import add_group, add_object, differences, everything, grid_points, sphere_points
 from tests.blender.conftest import MODULE
+from tests.blender.operators import applications
 from tests.blender.splats import add_splats, bar_splats
 
 SKIPPED = inspect.CO_GENERATOR, "all_or_nothing.py"  # what Python ends by itself, and what puts things back
@@ -114,33 +115,99 @@ def film():
     return obj
 
 
-@pytest.mark.parametrize(
-    ("make", "name", "settings"),
-    [
-        (handled, "analyze", {"modes": 4}),
-        (shared, "analyze", {}),
-        (handled, "spectrum", {}),
-        (handled, "segment", {"parts": 3, "vertex_groups": True}),
-        (handled, "signature", {"count": 3, "modes": 10}),
-        (handled, "smooth", {"target": "IN_PLACE"}),
-        (keyed, "smooth", {}),
-        (handled, "mode_shape", {"animate": True}),
-        (handled, "harmonic_field", {}),
-        (handled, "geodesic_distance", {}),
-        (handled, "deform_bind", {"step": 37}),
-        (unhandled, "deform_bind", {"step": 37, "at_once": True}),
-        (film, "minimal_surface", {"target": "IN_PLACE"}),
-        (film, "minimal_surface", {}),
-    ],
-)
-def test_failure_while_writing_changes_nothing(extension, make, name, settings):
-    assert fail_everywhere(extension, make, name, **settings) > 2
-
-
 def parted():
     obj = handled()
     bpy.ops.meshfree.segment(parts=3)
     return obj
+
+
+def colored():
+    obj = handled()
+    bpy.ops.meshfree.colormap()
+    return obj
+
+
+def compared():
+    """Two selected spheres of other sizes, the first one active."""
+    obj = handled()
+    other = add_object(1.1 * sphere_points(300, seed=3), "Other")
+    bpy.context.view_layer.objects.active = obj
+    for each in (obj, other):
+        each.select_set(True)
+    return obj
+
+
+def compared_before():
+    obj = compared()
+    bpy.ops.meshfree.compare()
+    return obj
+
+
+def crossed():
+    """A sphere with a curve across it."""
+    obj = handled()
+    curve = bpy.data.curves.new("Curve", "CURVE")
+    curve.dimensions = "3D"
+    spline = curve.splines.new("POLY")
+    spline.points.add(2)
+    for point, place in zip(spline.points, ((-0.8, 0.0, 0.6), (0.0, 0.0, 1.0), (0.8, 0.0, 0.6)), strict=True):
+        point.co = (*place, 1.0)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Curve", curve))
+    return obj
+
+
+def bound():
+    obj = handled()
+    obj.meshfree.neighbors -= 1
+    bpy.ops.meshfree.deform_bind()
+    return obj
+
+
+FIRST = {  # what is there before tools that a sphere with groups is not enough for, and what they have to be told
+    "compare": (compared, {}),
+    "compare_swap": (compared_before, {}),
+    "deform_update": (bound, {}),
+    "iso_lines_to_curves": (colored, {}),
+    "minimal_surface": (film, {}),
+    "separate_by_segment": (parted, {}),
+    "signature": (handled, {"count": 3, "modes": 10}),
+    "signed_distance": (crossed, {"curve": "Curve"}),
+}
+VARIANTS = [
+    (handled, "analyze", {"modes": 4}),
+    (shared, "analyze", {}),
+    (handled, "spectrum", {}),
+    (handled, "segment", {"parts": 3, "vertex_groups": True}),
+    (handled, "signature", {"count": 3, "modes": 10}),
+    (handled, "smooth", {"target": "IN_PLACE"}),
+    (keyed, "smooth", {}),
+    (handled, "mode_shape", {"animate": True}),
+    (handled, "harmonic_field", {}),
+    (handled, "geodesic_distance", {}),
+    (handled, "deform_bind", {"step": 37}),
+    (unhandled, "deform_bind", {"step": 37, "at_once": True}),
+    (film, "minimal_surface", {"target": "IN_PLACE"}),
+    (film, "minimal_surface", {}),
+]
+
+
+@pytest.mark.parametrize(("make", "name", "settings"), VARIANTS)
+def test_failure_while_writing_changes_nothing(extension, make, name, settings):
+    assert fail_everywhere(extension, make, name, **settings) > 2
+
+
+def by_default():
+    """All tools that compute, as they are without settings: what is there first, name, and what they must be told."""
+    return [(make, name, told) for name in applications() for make, told in [FIRST.get(name, (handled, {}))]]
+
+
+def test_failure_while_any_tool_writes_changes_nothing(extension):
+    """Coarsely, for all that are not tried above; none can be forgotten."""
+    tried = {name for _, name, _ in VARIANTS} | {"separate_by_segment"}
+    others = [(make, name, told) for make, name, told in by_default() if name not in tried]
+    assert len(others) > 10
+    for make, name, told in others:
+        assert fail_everywhere(extension, make, name, step=97, **told) > 0, name
 
 
 def test_parts_stay_one_object_if_separating_fails(extension):
