@@ -2,8 +2,8 @@
 
 from .anderson import Anderson
 from .blocks import blocks, on_all_cores
-from .cholesky import factorize
 from .chebyshev import chebyshev_terms
+from .cholesky import factorize
 from .davidson import coarse_to_fine
 from .dense import eliminate, inverses
 from .eigenvalue import largest_eigenvalue
