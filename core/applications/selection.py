@@ -1,4 +1,4 @@
-"""Sets of points: grown by distance along the cloud, and around its ends."""
+"""Sets of points: grown by distance along the surface, and around its ends."""
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
