@@ -75,11 +75,12 @@ def read_group(name):
 
 
 def isolated(**variables):
-    """Environment variables that keep the user's own Python packages and Blender settings out."""
+    """Environment variables that keep the user's own Python packages and Blender settings out; none unsets one."""
     left_out = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "BLENDER_USER_RESOURCES", "BLENDER_USER_EXTENSIONS")
     kept = {name: value for name, value in os.environ.items() if name not in left_out}
     # More threads gain nothing on matrices this small, and wait for each other at length where other programs run.
-    return {"OPENBLAS_NUM_THREADS": "1", **kept, "PYTHONNOUSERSITE": "1", **variables}
+    chosen = {"OPENBLAS_NUM_THREADS": "1", **kept, "PYTHONNOUSERSITE": "1", **variables}
+    return {name: value for name, value in chosen.items() if value is not None}
 
 
 def run(command, **options):

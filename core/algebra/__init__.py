@@ -1,9 +1,12 @@
 """Linear algebra without geometry: blocks of rows, small dense systems, rotations, solvers, factors, eigenpairs."""
 
+from .anderson import Anderson
 from .blocks import blocks, on_all_cores
+from .chebyshev import chebyshev_terms
 from .cholesky import factorize
 from .davidson import coarse_to_fine
-from .dense import inverses
+from .dense import eliminate, inverses
+from .eigenvalue import largest_eigenvalue
 from .factors import dissect, sparsify
 from .hierarchy import Rows
 from .lanczos import lift_lowest

@@ -55,15 +55,31 @@ def inverses(matrices):
 
     def invert(part):
         rows = np.moveaxis(matrices[part], 0, -1).astype(np.float64, order="C")
-        for pivot in range(len(rows)):
-            column = rows[:, pivot].copy()
-            rows[pivot, pivot] = 1.0
-            rows[pivot] /= column[pivot]
-            for other in range(len(rows)):
-                if other != pivot:
-                    rows[other, pivot] = 0.0
-                    rows[other] -= column[other] * rows[pivot]
-        result[part] = np.moveaxis(rows, -1, 0)
+        result[part] = np.moveaxis(eliminate(rows), -1, 0)
 
     on_all_cores(invert, blocks(len(matrices), _BLOCK))
     return result
+
+
+def eliminate(equations):
+    """Solve many small symmetric positive definite systems at one time, by elimination in place.
+
+    Parameters
+    ----------
+    equations : ndarray, (c, c + m, k)
+        Of k systems, the matrices first and then m right sides.
+
+    Returns
+    -------
+    ndarray, (c, c + m, k)
+        The same array: the inverses, and then the solutions.
+    """
+    for pivot, row in enumerate(equations):
+        column = equations[:, pivot].copy()
+        row[pivot] = 1.0
+        row /= column[pivot]
+        for other, entries in enumerate(equations):
+            if other != pivot:
+                entries[pivot] = 0.0
+                entries -= column[other] * row
+    return equations

@@ -9,6 +9,7 @@ from scipy.linalg import pinvh
 from scipy.sparse.linalg import LinearOperator
 
 from .dense import product
+from .eigenvalue import rough_largest_eigenvalue
 
 SMALL = 1000  # unknowns that are solved whole in a tenth of a second
 PART = 1 << 20  # entries of a matrix that are multiplied in one go: some hundredths of a second
@@ -128,7 +129,7 @@ def build_levels(matrix, slowest, least, enough, pool, report):
         norm = np.sqrt(np.bincount(part, slowest**2))
         if 2 * len(norm) > n:
             break
-        top = largest_eigenvalue(rows, diagonal)
+        top = rough_largest_eigenvalue(rows, diagonal)
         plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1)), shape=(n, len(norm)))
         prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ (rows @ plain)).tocsr()
         restriction = prolongation.T.tocsr()
@@ -194,15 +195,6 @@ def smoothing_steps(top, diagonal):
     """Return the lengths of the steps of smoothing, two (n,), from the largest eigenvalue over the diagonal."""
     middle, half = 0.5 * top * (1.0 + _SMOOTHED), 0.5 * top * (1.0 - _SMOOTHED) * np.sqrt(0.5)
     return [1.0 / (length * diagonal) for length in (middle - half, middle + half)]
-
-
-def largest_eigenvalue(matrix, diagonal):
-    """Estimate the largest eigenvalue of the matrix over its diagonal; of raw scans, up to a fifth too low."""
-    y = np.random.default_rng(0).standard_normal(len(diagonal))
-    for _ in range(10):  # leaves less than a tenth
-        y /= np.linalg.norm(y)
-        y, before = (matrix @ y[:, None])[:, 0] / diagonal, y
-    return 1.1 * np.linalg.norm(y) / np.linalg.norm(before)
 
 
 def solve_roughly(levels, load, shifts, wanted):

@@ -1,7 +1,12 @@
 """Any number of eigenpairs, by Lanczos steps on a Chebyshev polynomial of the matrix."""
 
+from itertools import islice
+
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+
+from .chebyshev import chebyshev_terms
+from .eigenvalue import largest_eigenvalue
 
 _DEGREE = 6  # of the polynomial that the Lanczos steps work on, at least
 
@@ -30,7 +35,7 @@ def lift_lowest(matrix, count, cut, report):
 
     Raises
     ------
-    ArpackNoConvergence
+    ArpackNoConvergence, SolverError
     """
     n = matrix.shape[0]
     random = np.random.default_rng(0)
@@ -47,7 +52,7 @@ def lift_lowest(matrix, count, cut, report):
         operator = LinearOperator((n, n), matvec=function, dtype=np.float64)
         return eigsh(operator, which="LA", v0=random.standard_normal(n), maxiter=maxiter, **settings)
 
-    top = 1.02 * solve(multiply, k=1, tol=1e-2, return_eigenvectors=False)[0]
+    top = largest_eigenvalue(multiply, n)
     while True:
         if cut < 0.7 * top:
             degree = max(_DEGREE, round(np.sqrt(top / cut)))
@@ -56,10 +61,8 @@ def lift_lowest(matrix, count, cut, report):
             degree, center, radius = 1, 2.0 * top, top
 
         def polynomial(y, degree=degree, center=center, radius=radius):
-            before, now = y.ravel(), (center * y.ravel() - multiply(y)) / radius
-            for _ in range(degree - 1):
-                before, now = now, (2.0 / radius) * (center * now - multiply(now)) - before
-            return now
+            terms = chebyshev_terms(lambda y: (center * y - multiply(y)) / radius, y.ravel())
+            return next(islice(terms, degree, None))
 
         try:
             ncv, restarts = min(n, max(2 * count + 1, 40)), 20 if degree > 1 else 500

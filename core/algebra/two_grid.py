@@ -8,8 +8,9 @@ from scipy import sparse
 
 from ..errors import SolverError
 from .cholesky import factorize
+from .eigenvalue import rough_largest_eigenvalue
 from .factors import dissect
-from .hierarchy import STRONG, Rows, aggregates, largest_eigenvalue, smoothing_steps
+from .hierarchy import STRONG, Rows, aggregates, smoothing_steps
 
 _FAINT = 1e-200  # of the largest value: less is not compared
 _ACCURACY = 1e-3  # largest change in the last step, relative to the value of each point
@@ -55,7 +56,7 @@ class TwoGrid:
             weights = sparse.csr_array((-np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
             part, roots = aggregates(rows(weights, 0.3), diagonal, STRONG[0], lambda: report("Equations", 0.3))
             fine = rows(matrix, 0.4)
-            top = largest_eigenvalue(fine, diagonal)
+            top = rough_largest_eigenvalue(fine, diagonal)
             # The turn from the root is that of the entry which couples both.
             root = roots[part]
             turn = -matrix.data[matrix.indices == np.repeat(root, np.diff(matrix.indptr))]

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from ..arguments import check_positions, check_switches, real
 from ..errors import PointCloudError
-from ..geometry import move_apart, nearest_in_blocks, thin
+from ..geometry import balanced_weights, move_apart, nearest_in_blocks, thin
 from ..operator import narrow_laplacian
 from .deformation import (
     NEIGHBORS,
@@ -256,24 +256,12 @@ def _linear_weights(sources, points, report):
     weights, indices = [], []
     for start, distance, index in nearest_in_blocks(sources, points, _SOURCES + 1, lambda: None):
         report(start / len(points))
-        offset = sources[index] - points[start : start + len(index), None]
-        weights.append(_balanced(distance, offset))
+        offset = sources.T[:, index] - points.T[:, start : start + len(index), None]
+        last = distance[:, -1:]
+        share = (distance / np.where(last > 0.0, 1.0001 * last, 1.0)) ** 2  # so that a single one keeps some weight
+        weight = (1.0 - share) ** 2 / (share + _SHARP)
+        weights.append(balanced_weights(weight / weight.sum(axis=1, keepdims=True), offset, _RIDGE))
         indices.append(index)
     weights, indices = np.concatenate(weights), np.concatenate(indices)
     start = np.arange(0, weights.size + 1, weights.shape[1])
     return sparse.csr_array((weights.ravel(), indices.ravel(), start), shape=(len(points), len(sources)))
-
-
-def _balanced(distance, offset):
-    """Return the weights of neighbours at these distances, (n, k), and offsets, (n, k, 3)."""
-    last = distance[:, -1:]
-    share = (distance / np.where(last > 0.0, 1.0001 * last, 1.0)) ** 2  # so that a single one keeps some weight
-    weight = (1.0 - share) ** 2 / (share + _SHARP)
-    weight /= weight.sum(axis=1, keepdims=True)
-    mean = np.einsum("nk,nka->na", weight, offset)
-    offset = offset - mean[:, None]
-    spread = np.einsum("nka,nkb->nab", weight[:, :, None] * offset, offset)
-    trace = np.einsum("naa->n", spread)
-    spread += np.where(trace > 0.0, _RIDGE * trace, 1.0)[:, None, None] * np.eye(3)
-    slope = np.linalg.solve(spread, -mean[:, :, None])
-    return weight * (1.0 + (offset @ slope)[:, :, 0])

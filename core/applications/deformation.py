@@ -4,19 +4,19 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..algebra import TRACE, blocks, dissect, factorize, nearest_rotations, rotations_in_groups, sparsify
+from ..algebra import TRACE, Anderson, blocks, dissect, factorize, nearest_rotations, rotations_in_groups, sparsify
 from ..arguments import as_array, as_doubles, check_positions, check_switches, real, whole
 from ..errors import PointCloudError
 from ..geometry import as_indices
 from ..operator import narrow_laplacian
-from .gradients import DeformationGradients, coupled, sums_over_steps
+from .gradients import DeformationGradients, coupled, step_products, sums_over_steps
 from .graph import coupled_components
 
 NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
 STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
 RTOL = 1e-5
 _BLOCK = 1 << 14  # rows
-_MEMORY = 5  # steps that the acceleration looks back on
+_SMALLEST = 1e-10  # share of what steps change that the acceleration goes by
 
 
 class Deformer:
@@ -171,7 +171,7 @@ class Deformer:
         self._divergence = (stiffness[self._free] @ inverse).tocsr()
         report("Equations", 0.57)
         if self.rotation_aware:
-            self._edges = _edge_products(stiffness, self._rest)
+            self._edges = step_products((-stiffness).tocoo(), self._rest)
 
         report("Factors", 0.6)
         matrix = free_rows[:, self._free] + sparse.diags_array(self._pull[self._free])
@@ -240,7 +240,7 @@ class Deformer:
         step, converged = 0, True
         if self.rotation_aware and most > 0:
             at_rest = self._turned(turn, self._differential)
-            converged, mixing, begin = False, _Mixing(), now
+            converged, acceleration, begin = False, Anderson(_SMALLEST), now
             for step in range(1, most + 1):
                 report("Deform", step / (most + 1.0))
                 turned = np.einsum("abn,nb->na", self._rotations(begin), self._differential)
@@ -248,7 +248,7 @@ class Deformer:
                 if np.abs(now - begin).max() <= share * self._size:
                     converged = True
                     break
-                begin = mixing.mix(begin, now)
+                begin = acceleration.extrapolate(begin, now)
         self.steps, self.converged = step, converged  # at once, for solves may run in several threads
         result[self._moving] = now
         self._let_follow(result)
@@ -369,33 +369,6 @@ def notices_of_components(component, held):
     return notices
 
 
-class _Mixing:
-    """Anderson's acceleration of a repeated map: half of the steps or fewer, to the same end.
-
-    References
-    ----------
-    Walker, Ni. Anderson acceleration for fixed-point iterations. SIAM J. Numer. Anal. 49, 2011.
-    """
-
-    def __init__(self):
-        self._before, self._change = [], []
-
-    def mix(self, before, after):
-        """Return where to go on from, given where the last step began and ended, both of any one shape."""
-        self._before.append(before.ravel())
-        self._change.append(after.ravel() - before.ravel())
-        del self._before[: -_MEMORY - 1], self._change[: -_MEMORY - 1]
-        if len(self._change) == 1:
-            return after
-        starts, changes = np.diff(self._before, axis=0), np.diff(self._change, axis=0)
-        products = changes @ changes.T
-        products += 1e-10 * np.trace(products) * np.eye(len(products))
-        if not products.any():  # both steps ended at one place
-            return after
-        share = np.linalg.solve(products, changes @ self._change[-1])
-        return after - (share @ (starts + changes)).reshape(after.shape)
-
-
 def check_constraints(handles, anchors, weights, count):
     """Return handles and anchors of so many points as indices, and the weight of each, handles first."""
     handles, anchors = as_indices(handles, count, "handles"), as_indices(anchors, count, "anchors")
@@ -443,15 +416,3 @@ def _energy(stiffness, inverse, report):
         report()
         parts.append(weighted[rows] @ stiffness)
     return sparse.vstack(parts, format="csr")
-
-
-def _edge_products(stiffness, rest):
-    """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_i - p_j)_c (x_i - x_j), p the points at rest."""
-    pairs = stiffness.tocoo()
-    difference = rest[pairs.row] - rest[pairs.col]  # zero on the diagonal
-    blocks = []
-    for c in range(3):
-        weight = -pairs.data * difference[:, c]
-        block = sparse.csr_array((-weight, (pairs.row, pairs.col)), shape=stiffness.shape)
-        blocks.append(block + sparse.diags_array(np.bincount(pairs.row, weight, minlength=len(rest)), format="csr"))
-    return sparse.vstack(blocks, format="csr")

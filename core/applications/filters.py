@@ -5,12 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy.fft import dct
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from scipy.special import expit
 
-from ..algebra import Rows
+from ..algebra import Rows, chebyshev_terms, largest_eigenvalue
 from ..arguments import as_array, check_switches, real, whole
-from ..errors import InvalidPointsError, PointCloudError, SolverError
+from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
 from ..operator import symmetric_form
@@ -271,17 +270,14 @@ def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False,
     filtered = respond(response, np.zeros(1))[0] * columns
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         order, root, multiply = corrected_operator(laplacian, dirichlet, raw, pool, tell)
-        top = highest_eigenvalue(multiply, len(order))
+        top = largest_eigenvalue(lambda y: multiply(y[:, None])[:, 0], len(order))
         coefficients = _polynomial(response, top, largest)
-        before = columns[order] / root[:, None]
-        result = coefficients[0] * before
-        if len(coefficients) > 1:
-            now = (2.0 / top) * multiply(before) - before
-            result += coefficients[1] * now
-            for k in range(2, len(coefficients)):
-                done = k / len(coefficients)
-                before, now = now, (4.0 / top) * multiply(now) - 2.0 * now - before
-                result += coefficients[k] * now
+        start = columns[order] / root[:, None]
+        result = np.zeros_like(start)
+        terms = chebyshev_terms(lambda y: (2.0 / top) * multiply(y) - y, start)
+        for degree, (coefficient, term) in enumerate(zip(coefficients, terms, strict=False), 1):
+            result += coefficient * term
+            done = degree / len(coefficients)
     filtered[order] = root[:, None] * result
     return filtered.reshape(values.shape)
 
@@ -308,25 +304,6 @@ def corrected_operator(laplacian, dirichlet, raw, pool, report):
         return product + rows @ (squared * product)
 
     return order, root, multiply
-
-
-def highest_eigenvalue(multiply, size):
-    """Return a close bound of the eigenvalues of a symmetric product, by a few Lanczos steps."""
-    start = np.random.default_rng(0).standard_normal(size)
-
-    def product(y):
-        return multiply(y.reshape(-1, 1)).ravel()
-
-    # By a power of two near one: the solver takes eigenvalues below some number for zero, in any unit.
-    unit = np.ldexp(1.0, np.frexp(np.abs(product(start)).max())[1])
-    operator = LinearOperator((size, size), matvec=lambda y: product(y) / unit, dtype=np.float64)
-    try:
-        highest = eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0]
-    except ArpackNoConvergence as error:
-        raise SolverError(
-            f"The highest eigenvalue of {size} points was not found. Compute a spectrum first."
-        ) from error
-    return 1.05 * unit * highest
 
 
 def _polynomial(response, top, tolerance):

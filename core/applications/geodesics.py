@@ -107,13 +107,15 @@ class Geodesics:
         self._laplacian = laplacian
         self._graph = _lengths_of_pairs(laplacian, lambda: report("Lengths", 0.0))
 
-    def distance(self, sources, *, progress=None):
+    def distance(self, sources, *, limit=np.inf, progress=None):
         """Measure the distance from the nearest of some points; see `geodesic_distance`.
 
         Parameters
         ----------
         sources : array_like, (k,) int or (n,) bool
             Points to measure from, at least one.
+        limit : float
+            Points that are farther away [L] get infinity, and nothing is computed there.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -130,7 +132,7 @@ class Geodesics:
         chosen, known = _known_sources(self._laplacian, sources)
         if progress is not None:
             progress("Distance", 0.5)
-        result = dijkstra(self._graph, indices=known, min_only=True)
+        result = dijkstra(self._graph, indices=known, min_only=True, limit=limit)
         result[chosen] = 0.0
         return result
 

@@ -35,7 +35,11 @@ class DeformationGradients:
             self._near[alone] = cKDTree(laplacian.points[own]).query(laplacian.points[alone])[1]
         rest = laplacian.points[own]
         rest = rest - rest.mean(axis=0) if len(own) else rest
-        self._products = _step_products(laplacian.stiffness[own][:, own].tocoo(), rest)
+        pairs = laplacian.stiffness[own][:, own].tocoo()
+        step = rest[pairs.row] - rest[pairs.col]
+        squared, weight = np.einsum("ka,ka->k", step, step), np.maximum(-pairs.data, 0.0)
+        pairs.data = np.divide(weight, squared, out=np.zeros_like(weight), where=squared > 0.0)
+        self._products = step_products(pairs, rest)
         self._component = np.unique(laplacian.component[own], return_inverse=True)[1].reshape(-1)
         self._at_rest = sums_over_steps(self._products, rest)
         # Normal, then two tangents, as columns. Sums over strided arrays take ten times as long.
@@ -145,17 +149,22 @@ def sums_over_steps(products, points):
     return np.array([(products @ column).reshape(3, -1) for column in np.ascontiguousarray(points.T)])
 
 
-def _step_products(stiffness, rest):
-    """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_j - p_i)_c (x_j - x_i), p the points at rest."""
-    weight = np.where(stiffness.row != stiffness.col, np.maximum(-stiffness.data, 0.0), 0.0)
-    step = rest[stiffness.col] - rest[stiffness.row]
-    squared = np.einsum("ka,ka->k", step, step)
-    weight = np.divide(weight, squared, out=np.zeros_like(weight), where=squared > 0.0)
+def step_products(weights, rest):
+    """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_j - p_i)_c (x_j - x_i), for `sums_over_steps`.
+
+    Parameters
+    ----------
+    weights : coo_array, (m, m)
+        Of the steps; the diagonal does not count.
+    rest : ndarray, (m, 3)
+        The points at rest, p.
+    """
+    step = rest[weights.col] - rest[weights.row]
     parts = []
     for c in range(3):
-        share = weight * step[:, c]
-        part = sparse.csr_array((share, (stiffness.row, stiffness.col)), shape=stiffness.shape)
-        own = np.bincount(stiffness.row, share, minlength=len(rest))
+        share = weights.data * step[:, c]
+        part = sparse.csr_array((share, (weights.row, weights.col)), shape=weights.shape)
+        own = np.bincount(weights.row, share, minlength=len(rest))
         parts.append(part - sparse.diags_array(own, format="csr"))
     return sparse.vstack(parts, format="csr")
 

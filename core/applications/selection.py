@@ -1,4 +1,4 @@
-"""Sets of points: grown by distance along the cloud, and around its ends."""
+"""Sets of points: grown by distance along the surface, and around its ends."""
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
@@ -6,6 +6,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..arguments import as_array, as_doubles, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
+from .geodesics import Geodesics
 from .graph import near_graph
 
 _OBLIQUE = 3.0  # slope to the ray of a surface whose points are told from those behind it: 72 degrees
@@ -15,8 +16,8 @@ _NEIGHBORS = 20  # so many directions make paths at most 2 % longer than the way
 def grow(laplacian, chosen, distance):
     """Add all points within a distance along the surface to a set of points.
 
-    Distances are lengths of paths from neighbour to neighbour on the same sheet, so that the set does not jump to
-    another sheet, or another component, that passes nearby. They are a few percent too long at most.
+    Distances are those of `geodesic_distance`, so that the set does not jump to another sheet, or another component,
+    that passes nearby.
 
     Parameters
     ----------
@@ -61,12 +62,10 @@ def grow(laplacian, chosen, distance):
     reach = real(distance)
     if not reach >= 0.0:
         raise PointCloudError(f"The distance to grow by is {distance!r}. Use a number that is not negative.")
-    graph = near_graph(laplacian, _NEIGHBORS)
-    start = np.unique(graph.place[mask & (graph.place >= 0)])
-    if not len(start):
+    sources = np.flatnonzero(mask & (laplacian.component >= 0))
+    if not len(sources):
         return mask.copy()
-    way = dijkstra(graph.lengths, directed=False, indices=start, min_only=True, limit=reach)
-    return mask | graph.scatter(np.isfinite(way), False)
+    return mask | np.isfinite(Geodesics(laplacian).distance(sources, limit=reach))
 
 
 def front_point(points, eye, direction, reach):

@@ -7,7 +7,7 @@ from .nearest import ON, ROUNDS, SMOOTH, find_nearest, nearest_rows, typical_dis
 from .normals import unit_normals
 from .orientation import orient_normals, toward
 from .points import FEWEST, as_indices, as_mask, check_points, check_values
-from .prolongation import Prolongation
+from .prolongation import Prolongation, balanced_weights
 from .quadrics import frames
 from .subset import blue_noise_subset
 from .thinning import nearest_in_blocks, thin

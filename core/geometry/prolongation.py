@@ -4,7 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..algebra import blocks, on_all_cores
+from ..algebra import blocks, eliminate, on_all_cores
 from ..arguments import as_array
 from ..errors import InvalidPointsError
 from .nearest import SMOOTH
@@ -182,19 +182,46 @@ def _weights(points, chosen, normals, component, index):
     own = normals[first]
     same = (np.einsum("ijk,ik->ij", normals[index], own) > SMOOTH) & (component[index] == component[first][:, None])
     same[row, best] = True
-    reach = squared.max(axis=1, keepdims=True) * 1.01 + 1e-300
+    reach = squared.max(axis=1, keepdims=True) * 1.01 + 1e-290
     weight = np.where(same, (1.0 - squared / reach) / (squared + _CLOSE**2 * reach), 0.0)
     weight /= weight.sum(axis=1, keepdims=True)
 
-    # In the tangent plane: the value at zero of the linear function that fits the neighbours' values best.
-    u, v = np.einsum("ijk,ikl->lij", step, frames(own)[:, :, 1:])
-    mean_u, mean_v = np.sum(weight * u, axis=1), np.sum(weight * v, axis=1)
-    u, v = u - mean_u[:, None], v - mean_v[:, None]
-    uu, uv, vv = (np.sum(weight * product, axis=1) for product in (u * u, u * v, v * v))
-    scatter = uu + vv
-    beyond = np.sqrt((mean_u**2 + mean_v**2) / np.maximum(scatter, 1e-300))
-    fade = _BEYOND / np.maximum(beyond, _BEYOND)
-    uu, vv = uu + _LEVEL * scatter + 1e-300, vv + _LEVEL * scatter + 1e-300
-    determinant = np.maximum(uu * vv - uv**2, 1e-300)
-    slope_u, slope_v = fade * (vv * mean_u - uv * mean_v), fade * (uu * mean_v - uv * mean_u)
-    return first, weight * (1.0 - (slope_u[:, None] * u + slope_v[:, None] * v) / determinant[:, None])
+    # Along the surface only: in the tangent plane.
+    offset = np.einsum("ijk,ikl->lij", step, frames(own)[:, :, 1:])
+    return first, balanced_weights(weight, offset, _LEVEL, _BEYOND)
+
+
+def balanced_weights(weight, offset, least, beyond=np.inf):
+    """Balance weights, so that they carry linear functions as they are: moving least squares of first order.
+
+    The value at zero of the linear function that fits the values at some offsets best is a sum of these values with
+    other weights.
+
+    Parameters
+    ----------
+    weight : ndarray, (n, k)
+        Of the neighbours of each place; they add up to one, and so does what is returned.
+    offset : ndarray, (d, n, k)
+        Where the neighbours are, seen from the place.
+    least : float
+        Share of the neighbours' scatter that counts as one in each direction: those in which less is not balanced.
+    beyond : float
+        Scatters beyond the middle of the neighbours up to which values go on in their slope.
+
+    Returns
+    -------
+    ndarray, (n, k)
+    """
+    dimensions = len(offset)
+    mean = np.einsum("nk,dnk->dn", weight, offset)
+    offset = offset - mean[:, :, None]
+    equations = np.empty((dimensions, dimensions + 1, len(weight)))
+    for row, weighted in enumerate(weight * offset):
+        for column in range(row + 1):
+            equations[row, column] = equations[column, row] = np.einsum("nk,nk->n", weighted, offset[column])
+    scatter = sum(equations[axis, axis] for axis in range(dimensions))
+    far = np.sqrt(np.sum(mean**2, axis=0) / np.maximum(scatter, 1e-300))
+    equations[range(dimensions), range(dimensions)] += np.where(scatter > 0.0, least * scatter, 1.0)
+    equations[:, dimensions] = mean / np.maximum(far / beyond, 1.0)
+    slope = eliminate(equations)[:, dimensions]
+    return weight * (1.0 - np.einsum("dn,dnk->nk", slope, offset))

@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..algebra import blocks, on_all_cores
+from ..algebra import blocks, eliminate, on_all_cores
 from ..errors import NotASurfaceError
 
 _BLOCK = 1 << 13  # points fitted at one time
@@ -102,7 +102,8 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
             equations[row, 6] = _sums(weighted, z)
             for column in range(row + 1):
                 equations[row, column] = equations[column, row] = _sums(weighted, basis[column])
-        fit = _solve(equations).T
+        equations[range(6), range(6)] += _RIDGE
+        fit = eliminate(equations)[:, 6].T
         missed = z - sum(values * part[:, None] for values, part in zip(basis, fit.T, strict=True))
         slope = 1.0 + fit[:, 1] ** 2 + fit[:, 2] ** 2
         local = np.stack([np.ones_like(slope), -fit[:, 2], -fit[:, 1]], axis=1) / np.sqrt(slope)[:, None]
@@ -128,20 +129,6 @@ def _covariance(offset, share):
         for column in range(row + 1):
             result[:, row, column] = result[:, column, row] = _sums(weighted, centered[column])
     return result
-
-
-def _solve(equations):
-    """Solve positive definite equations, (c, c + 1, k) with the right sides last, by elimination; (c, k).
-
-    All k at one time: numpy's own solver takes many times as long for as small ones.
-    """
-    count = len(equations)
-    equations[range(count), range(count)] += _RIDGE
-    for pivot in range(count):
-        equations[pivot] /= equations[pivot, pivot].copy()
-        others = np.arange(count) != pivot
-        equations[others] -= equations[others, pivot, None] * equations[pivot]
-    return equations[:, -1]
 
 
 def _sums(left, right):

@@ -156,23 +156,23 @@ def _shuffled(keys):
 
 def _discs(tree, rank, radius):
     """Return which points stay, (m,) bool, when each, in the order of their ranks, takes all others within a radius."""
-    first, second = tree.query_pairs(radius, output_type="ndarray").T
-    swap = rank[first] > rank[second]
-    first, second = np.where(swap, second, first), np.where(swap, first, second)
-    return independent(first, second, tree.n)
+    return independent(*tree.query_pairs(radius, output_type="ndarray").T, rank)
 
 
-def independent(first, second, count, report=lambda: None):
-    """Return which of so many points stay, (count,) bool: no two of a pair, and of each left out one that beats it.
+def independent(first, second, rank, report=lambda: None):
+    """Return which points stay, (m,) bool: no two of a pair, and of each left out one that comes before it.
 
     Parameters
     ----------
     first, second : ndarray, (p,) int
-        Pairs of which one may stay; the first beats the second, without circles (Luby 1986).
-    count : int
+        Pairs of which one may stay (Luby 1986).
+    rank : ndarray, (m,)
+        The one of the lower rank comes before the other. No two are the same.
     report : callable
         Called at each round; may raise `Cancelled`.
     """
+    count, swap = len(rank), rank[first] > rank[second]
+    first, second = np.where(swap, second, first), np.where(swap, first, second)
     kept, gone = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     while True:
         report()

@@ -49,7 +49,7 @@ def thin(points, areas, spacing, count, rank=None, report=lambda: None):
     reach = spacing * np.sqrt(_FILL * np.sum(areas / spacing**2) / count)
     priority = np.empty(n)
     priority[np.lexsort(points.T)] = np.random.default_rng(_SEED).permutation(n)
-    priority = np.argsort(np.argsort(priority + n * rank))
+    priority += n * rank
     passes = max(1, int(np.ceil(np.log(n / count) / np.log(_STEP**2))))
     chosen = np.arange(n)
     for step in range(passes):
@@ -62,9 +62,7 @@ def _independent(points, reach, priority, rank, report):
     """Return which points have none of a higher priority within reach that stays, (m,) bool."""
     pairs = [_close_pairs(*found, reach, rank) for found in nearest_in_blocks(points, points, _NEIGHBORS, report)]
     first, second = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
-    beats = priority[first] > priority[second]
-    winner, loser = np.where(beats, first, second), np.where(beats, second, first)
-    return independent(winner, loser, len(points), report)
+    return independent(first, second, -priority, report)
 
 
 def _close_pairs(start, distance, index, reach, rank):

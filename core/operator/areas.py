@@ -7,7 +7,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.special import expit
 
-from ..algebra import on_all_cores
+from ..algebra import chebyshev_terms, on_all_cores
 from ..errors import SolverError
 from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
@@ -233,14 +233,14 @@ def fast_areas(matrix, target, cells, rho=None):
 
 def _polynomial(matrix, root, residual, held, coefficients):
     """Evaluate a Chebyshev series in M on the free part of a residual."""
-    before, now = 0.0, residual
-    result = coefficients[0] * residual
-    for step, coefficient in enumerate(coefficients[1:]):
-        image = root * (matrix @ (root * now))
+
+    def product(values):
+        image = root * (matrix @ (root * values))
         image[held] = 0.0
-        before, now = now, image * (2.0 if step else 1.0) - before
-        result += coefficient * now
-    return result
+        return image
+
+    terms = chebyshev_terms(product, residual)
+    return sum(coefficient * term for coefficient, term in zip(coefficients, terms, strict=False))
 
 
 @functools.cache

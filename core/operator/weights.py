@@ -4,14 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..algebra import inverses, on_all_cores
+from ..algebra import Anderson, inverses, on_all_cores
 from ..geometry import dots, frames
 from ..kernel import SECOND_MOMENT, SUPPORT
 from .curvature import second_moment, uneven
 
 _ROUNDS = 12  # of the solver, at most
 _ENOUGH = 1e-3  # root mean square of that over h, which a first moment makes of a slope, at which it stops
-_MEMORY = 5  # earlier rounds that a step is extrapolated from
 _RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the terms apart
 _LARGEST = 1.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
 _SMALLEST = 1e-8  # share of what rounds change that an extrapolation goes by: less would be rounding
@@ -74,39 +73,15 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     inverse = inverses(moments.curvature() + _RIDGE * np.eye(_TERMS))
     goal = np.zeros((len(areas), _TERMS))
     goal[:, 0] = 1.0
-    terms, before, turns = np.zeros_like(goal), None, []
+    terms, acceleration = np.zeros_like(goal), Anderson(_SMALLEST)
     for step in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)
         if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
         change = np.einsum("iab,ib->ia", inverse, missing - _RIDGE * terms)
-        terms = terms + change
-        if before is not None:
-            turns = [*turns[1 - _MEMORY :], (before[0] - terms, before[1] - change)]
-        before = terms, change
-        terms = _extrapolate(terms, change, turns)
+        terms = acceleration.extrapolate(terms, terms + change)
     return Balance(moments.factor(terms), residual)
-
-
-def _extrapolate(terms, change, turns):
-    """Return the next iterate of a fixed-point iteration, from the turns of earlier ones (Anderson 1965).
-
-    Parameters
-    ----------
-    terms : ndarray
-        The iterate.
-    change : ndarray
-        How it differs from what it was made of.
-    turns : list of tuple of ndarray
-        How both of them differed from round to round.
-    """
-    if not turns:
-        return terms
-    products = np.array([[np.vdot(left, right) for _, left in turns] for _, right in turns])
-    products += _SMALLEST * np.trace(products) * np.eye(len(turns))
-    share = np.linalg.solve(products, [np.vdot(turn, change) for _, turn in turns])
-    return terms - sum(part * step for part, (step, _) in zip(share, turns, strict=True))
 
 
 def _trace(cloud, weights, areas):

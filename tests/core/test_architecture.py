@@ -124,6 +124,7 @@ SIDEWAYS = {  # applications that build on others
     ("transport", "geodesics"),
     ("minimal_surface", "boundary_curve"),
     ("segmentation", "graph"),
+    ("selection", "geodesics"),
     ("selection", "graph"),
     ("slopes", "gradients"),
     ("smoothing", "filters"),
