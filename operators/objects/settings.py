@@ -14,7 +14,6 @@ from bpy.props import (
 
 from . import deform_settings, notices
 from .color_choices import color_choice
-from .earlier import FormerSettings
 from .handlers import tell
 from .options import DEFAULTS
 
@@ -51,7 +50,7 @@ class MESHFREE_PG_stage(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Seconds", description="Time that this stage took, in seconds", min=0.0)
 
 
-class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
+class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     """Settings and results of the Mesh-Free Laplacian for one object"""
 
     # What results depend on. Names and defaults are those of core's options.
