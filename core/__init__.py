@@ -99,7 +99,10 @@ _NAMES = {  # the public ones, by the module or package that is imported when on
         "mean_curvature",
         "principal_curvatures",
     ),
-    "options": ("LaplacianOptions",),
+    "options": (
+        "LaplacianOptions",
+        "PaperOptions",
+    ),
     "paper": (
         "Stability",
         "check_stability",
@@ -113,7 +116,6 @@ _NAMES = {  # the public ones, by the module or package that is imported when on
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 _PACKAGES = (*_NAMES, "files")
-_WITH_PAPER = ("operator", "applications")
 _lock = threading.RLock()  # scipy imports itself in circles, which two threads at once might enter from two sides
 
 __all__ = sorted(_HOMES)
@@ -125,8 +127,6 @@ def __getattr__(name):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = _HOMES.get(name, name)
     with _lock:
-        if home in _WITH_PAPER:
-            _import("paper")  # whose areas become choices of the operator
         module = _import(home)
     found = module if name == home else getattr(module, name)
     globals()[name] = found
