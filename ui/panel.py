@@ -45,13 +45,14 @@ TASKS = (  # that one click does, each with its defaults
     ("principal_curvatures", "Curvature"),
     ("deform_bind", "Bend"),
 )
-_SETTINGS = (  # what belongs together
-    ("boundary", "boundary_group", "sheets", "projection"),
-    ("bandwidth", "neighbors", "bandwidth_factor"),
-    ("normals", "areas", "regularization"),
-    ("curvature_correction", "symbol_correction"),
-    ("point_budget", "most_points"),
-)
+_SETTINGS = {  # of each method, what belongs together
+    "DEFAULT": (
+        ("boundary", "boundary_group", "sheets", "projection"),
+        ("bandwidth", "neighbors", "bandwidth_factor"),
+    ),
+    "PAPER": (("areas", "normals", "regularization"), ("neighbors", "denoise")),
+}
+_BUDGET = "point_budget", "most_points"
 
 
 class SidebarPanel:
@@ -231,7 +232,7 @@ class Settings:
         row.operator("meshfree.add_preset", text="", icon="REMOVE").remove_active = True
         split_properties(layout, context)
         obj = context.object
-        for group in _SETTINGS:
+        for group in (("method",), *_SETTINGS[obj.meshfree.method], _BUDGET):
             column = layout.column(align=True)
             for name in group:
                 row = column.row(align=True)

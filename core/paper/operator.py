@@ -125,10 +125,10 @@ def symmetrized_operator(cloud, areas):
         Without images in boundaries, and without a width for the symbol correction to go by.
     """
     pairs, count = cloud.pairs, len(cloud.scaled.inverse)
-    h = pairs.lengths[0]  # the same everywhere
+    h = pairs.mean(pairs.lengths)
     weights = pair_kernel(projected_distance(pairs, cloud.normals) / h) / h**4
     weights *= areas[pairs.first] * areas[pairs.second]
-    own = pair_kernel(0.0) / h**4 * areas**2
+    own = pair_kernel(0.0) / pairs.lengths**4 * areas**2
     none = np.zeros(len(areas))
     matrix = stiffness_matrix(cloud.scaled, pairs, weights, own)
     return Stiffness(matrix, sparse.csr_array((count, count)), none, none)

@@ -57,7 +57,7 @@ def test_values_at_the_subset_are_those_of_its_operator(core):
     bpy.ops.meshfree.analyze()
     points = local_points(obj)
     subset = core.blue_noise_subset(points, 1000)
-    laplacian = core.build_laplacian(points[subset], options=core.LaplacianOptions(orient=True))
+    laplacian = core.build_laplacian(points[subset])
     assert obj.meshfree.subset_count == len(subset)
     assert_allclose(attribute(obj, "lb_gaussian_curvature")[subset], laplacian.gaussian_curvature, rtol=1e-5)
     assert_array_equal(attribute(obj, "lb_boundary")[subset], laplacian.boundary)
