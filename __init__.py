@@ -16,7 +16,7 @@ def _modules():
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
-    from .operators.objects import counting, earlier, notices, settings
+    from .operators.objects import counting, notices, settings
     from .operators.running import cache, job
     from .ui import (
         applications,
@@ -39,7 +39,6 @@ def _modules():
     return (
         settings,
         notices,
-        earlier,
         cache,
         counting,
         job,

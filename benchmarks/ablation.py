@@ -204,7 +204,7 @@ def corrections_off(names):
         "relief": [(cloud, "measure_roughness", lambda nearest, _: np.zeros(len(nearest.points)))],
         "h that varies": [(areas, "uneven", np.zeros_like), (weights, "uneven", np.zeros_like)],
         "images across corners": mirrors,
-        "areas of the kernel": [(areas, "SOLVERS", {"fast": lambda _, __, cell, ___: areas.AreaSolution(cell, 0)})],
+        "areas of the kernel": [(areas, "fast_areas", lambda _, __, cell: cell)],
         "areas of the cells": [(areas, "_like_cells", lambda _, values, __: values)],
         "balance of the weights": [(weights, "_ROUNDS", 0)],
         "width of the weights": [(stiffness, "_widths", lambda pairs, *_: pairs.lengths)],

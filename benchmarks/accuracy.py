@@ -73,9 +73,9 @@ def default_on_spheres():
 def structure():
     """Symmetry, row sums and the ends of the spectrum; of eq. (5), before it is made symmetric, the first two."""
     rows = []
-    for name, options in {"default": core.LaplacianOptions(), "paper": core.LaplacianOptions.paper()}.items():
+    for name, make in {"default": core.build_laplacian, "paper": core.paper.build_laplacian}.items():
         for kind, points in {"random sphere": random_sphere(4000), "torus": torus_points(4000)}.items():
-            stiffness = core.build_laplacian(points, options=options).stiffness
+            stiffness = make(points).stiffness
             diagonal = stiffness.diagonal()
             largest = eigsh(stiffness, k=1, which="LA", return_eigenvectors=False)[0]
             smallest = eigsh(stiffness, k=1, which="SA", return_eigenvectors=False)[0]
@@ -88,9 +88,11 @@ def structure():
                 ]
             )
     for kind, points in {"random sphere": random_sphere(4000), "torus": torus_points(4000)}.items():
-        cloud = read_cloud(points, core.LaplacianOptions.paper())
-        areas = core.estimate_areas(points, options=core.LaplacianOptions.paper())[cloud.scaled.first]
-        weak = unsymmetrized_operator(cloud.pairs, cloud.normals, areas).multiply(areas[:, None])
+        cloud = read_cloud(points, core.PaperOptions().cloud)
+        laplacian = core.paper.build_laplacian(points)
+        areas = laplacian.areas[cloud.scaled.first]
+        normals = laplacian.normals[cloud.scaled.first]
+        weak = unsymmetrized_operator(cloud.pairs, normals, areas).multiply(areas[:, None])
         largest = np.abs(weak.diagonal()).max()
         rows.append(
             [

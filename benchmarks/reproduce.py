@@ -53,7 +53,7 @@ def results(points):
     deformer = core.Deformer(laplacian, order[-len(points) // 50 :], order[: len(points) // 20])
     yield "deformed", deformer.solve(points[deformer.handles] + [0.1 * size, 0.0, 0.0])
     if len(points) <= _PAPER:
-        paper = core.build_laplacian(points, options=core.LaplacianOptions.paper())
+        paper = core.paper.build_laplacian(points)
         yield "paper's areas", paper.areas
         yield "paper's stiffness", paper.stiffness @ functions
 

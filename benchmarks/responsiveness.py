@@ -63,7 +63,7 @@ def works(points):
     kept = []
 
     def analysis(progress):
-        laplacian = core.build_laplacian(points, options=core.LaplacianOptions(orient=True), progress=progress)
+        laplacian = core.build_laplacian(points, progress=progress)
         progress("Curvature", 1.0)
         core.mean_curvature(laplacian)
         kept.append(laplacian)

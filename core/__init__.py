@@ -29,7 +29,6 @@ def _read_homes():
 
 _HOMES = _read_homes()
 _PACKAGES = (*{home.partition(".")[0] for home in _HOMES.values()}, "files")
-_WITH_PAPER = ("operator", "applications")
 _lock = threading.RLock()  # scipy imports itself in circles, which two threads at once might enter from two sides
 
 __all__ = sorted(_HOMES)
@@ -41,8 +40,6 @@ def __getattr__(name):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = _HOMES.get(name, name)
     with _lock:
-        if home.partition(".")[0] in _WITH_PAPER:
-            _import("paper")  # whose areas become choices of the operator
         module = _import(home)
     found = module if name == home else getattr(module, name)
     globals()[name] = found

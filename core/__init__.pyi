@@ -73,6 +73,7 @@ from .operator import estimate_areas as estimate_areas
 from .operator import mean_curvature as mean_curvature
 from .operator import principal_curvatures as principal_curvatures
 from .options import LaplacianOptions as LaplacianOptions
+from .options import PaperOptions as PaperOptions
 from .paper import Stability as Stability
 from .paper import check_stability as check_stability
 from .splats import Splats as Splats

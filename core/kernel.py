@@ -19,9 +19,6 @@ NORMALIZATION = 7.0 / (478.0 * np.pi)
 SECOND_MOMENT = 2771.0 / 2868.0
 """Integral of |x|^2 W_1 over the plane: ``mu2`` of the symbol's expansion ``s(t) = t^2 - mu2 t^4 / 8 + ...``."""
 
-FOURTH_MOMENT = 27479.0 / 15774.0
-"""Integral of |x|^4 W_1 over the plane, mu4."""
-
 RESOLVED = 2.2
 """Largest ``t = k h`` whose frequency k is recovered from the symbol without multiplying noise by more than 3."""
 
@@ -79,24 +76,23 @@ def symbol(t):
     return -4.0 * np.pi * ((1.0 - j0(t[..., None] * radii)) @ weights)
 
 
-def inverse_symbol(s):
+def inverse_ratio(s):
     """Invert the symbol on its increasing branch.
 
     Parameters
     ----------
     s : array_like
-        Values of the symbol. Those past the resolved range, ``s(2.2) = 2.82``, are returned as infinity.
+        Values of the symbol, non-negative.
 
     Returns
     -------
     ndarray
-        t with ``symbol(t) = s``; negative rounding errors give 0.
+        ``t^2 / s`` for the t with ``symbol(t) = s``: smooth and close to one, so that small eigenvalues keep their
+        relative accuracy. Infinite past the resolved range, ``s(2.2) = 2.82``.
     """
     s = np.asarray(s, dtype=np.float64)
     ratio, limit = _inverse_table()
-    # t^2 / s is smooth and close to one, so that small eigenvalues keep their relative accuracy.
-    squared = np.clip(s, 0.0, limit) * ratio(np.clip(s, 0.0, limit))
-    return np.where(s <= limit, np.sqrt(squared), np.inf)
+    return np.where(s <= limit, ratio(np.clip(s, 0.0, limit)), np.inf)
 
 
 @functools.cache

@@ -33,13 +33,14 @@ _NOTICES = 6  # there at a time
 _CROSS = 44.0  # width of the cross beside a notice, and of the box around it
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
-_SETTINGS = (  # what belongs together
-    ("boundary", "boundary_group", "sheets", "projection"),
-    ("bandwidth", "neighbors", "bandwidth_factor"),
-    ("normals", "areas", "regularization"),
-    ("curvature_correction", "symbol_correction"),
-    ("point_budget", "most_points"),
-)
+_SETTINGS = {  # of each method, what belongs together
+    "DEFAULT": (
+        ("boundary", "boundary_group", "sheets", "projection"),
+        ("bandwidth", "neighbors", "bandwidth_factor"),
+    ),
+    "PAPER": (("areas", "normals", "regularization"), ("neighbors", "denoise")),
+}
+_BUDGET = "point_budget", "most_points"
 
 
 class SidebarPanel:
@@ -229,7 +230,7 @@ class Settings:
         row.operator("meshfree.add_preset", text="", icon="REMOVE").remove_active = True
         split_properties(layout, context)
         obj = context.object
-        for group in _SETTINGS:
+        for group in (("method",), *_SETTINGS[obj.meshfree.method], _BUDGET):
             column = layout.column(align=True)
             for name in group:
                 row = column.row(align=True)

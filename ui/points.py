@@ -14,7 +14,6 @@ from ..operators.objects.groups import (
     SOURCE,
     VALUE,
     has_group,
-    role_group,
 )
 from ..operators.objects.reading import TYPES
 from ..operators.tools.convert import MESHFREE_OT_convert
@@ -64,12 +63,11 @@ def _draw_group(row, obj, role, title):
     icon = {"icon_value": _swatches[0][role].icon_id} if obj.meshfree.show_groups else {}
     assign = row.operator("meshfree.group_from_selection", text=f"Assign to {title}", **icon)
     assign.role, assign.action = role.upper(), "ADD"
-    group = role_group(obj, role)
-    found = members(obj, group, glance=True)
+    found = members(obj, role, glance=True)
     held = row.row(align=True)
-    held.enabled = has_group(obj, group)
+    held.enabled = has_group(obj, role)
     text = "..." if found is None else f"{found.count:,}"
-    held.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = group
+    held.operator("meshfree.select_group", text=text, icon="RESTRICT_SELECT_OFF").name = role
     remove = held.operator("meshfree.group_from_selection", text="", icon="REMOVE")
     remove.role, remove.action = role.upper(), "REMOVE"
 

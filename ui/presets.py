@@ -9,7 +9,7 @@ from ..operators.running.ready import ReadyOperator
 
 _BUILT_IN = (
     ("DEFAULT", "Default", "What serves most scans"),
-    ("PAPER", "Paper", "As in the paper: one bandwidth for all points, areas with constraints, no corrections"),
+    ("PAPER", "Paper", "The method of the paper, with its own settings"),
     ("CLEAN", "Clean CAD", "For exact points with sharp edges: each point is taken where it is"),
     ("NOISY", "Noisy Scan", "For rough scans: a wider reach gives calmer curvature and less detail"),
 )

@@ -20,7 +20,6 @@ from ..operators.objects.groups import (
     ROLES,
     handle_names,
     has_group,
-    role_group,
 )
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
@@ -465,8 +464,7 @@ def _group_colors(obj) -> dict:
     settings = obj.meshfree
     if not settings.show_groups:
         return {}
-    there = [role for role in ROLES if role not in _LATE or has_group(obj, role)]
-    names = {role_group(obj, role): role for role in there}
+    names = {role: role for role in ROLES if role not in _LATE or has_group(obj, role)}
     if settings.boundary_group:
         names[settings.boundary_group] = BOUNDARY_GROUP
     names[settings.deform.anchors or ANCHOR] = ANCHOR

@@ -1,11 +1,11 @@
 """Figures 3, 4 and 5: the operator applied to functions on the unit sphere."""
 
 import functools
-from dataclasses import replace
 
 import numpy as np
 
 import core
+from core.geometry.cloud import read_cloud
 
 from ..accuracy import FUNCTIONS, relative
 from ..peers import METHODS, build
@@ -39,11 +39,14 @@ def figure_3():
     for sampling, printed in PRINTED.items():
         points = sphere(sampling, AT)[0]
         for k, normals in enumerate(("PCA", "WPCA", "analytic", "quadric")):
-            given = points if normals == "analytic" else None
-            way = {} if given is not None else {"normals": normals.lower()}
-            default = errors(core.build_laplacian(points, given, core.LaplacianOptions(**way)), points)
-            paper = core.LaplacianOptions.paper()
-            paper = errors(core.build_laplacian(points, given, replace(paper, **way)), points)
+            if normals in ("PCA", "WPCA"):
+                cloud = read_cloud(points, core.LaplacianOptions())
+                own = cloud.scaled.scatter(core.paper.covariance_normals(cloud.pairs, normals == "WPCA"), 0.0)
+                theirs = normals.lower()
+            else:
+                own = theirs = points if normals == "analytic" else core.estimate_normals(points)
+            default = errors(core.build_laplacian(points, own), points)
+            paper = errors(core.paper.build_laplacian(points, normals=theirs), points)
             for function, values in zip(FUNCTIONS, printed, strict=True):
                 told = values[k] if k < 3 else None
                 cells = [f"{1e3 * norm:.3g}" for found in (paper, default) for norm in found[function]]

@@ -1,7 +1,6 @@
 """Figures 6, 7 and 17, the number of neighbours, and the time to a given accuracy: eigenvalues of the unit sphere."""
 
 import time
-from dataclasses import replace
 
 import numpy as np
 
@@ -126,14 +125,14 @@ def neighbors():
     for sampling in SPHERES:
         points = sphere(sampling, AT)[0]
         for count in (50, 100):
-            for title, options in (
-                ("paper's settings", replace(core.LaplacianOptions.paper(), neighbors=count)),
-                ("default", core.LaplacianOptions(neighbors=count)),
+            for title, name, settings in (
+                ("paper's settings", "ours_paper", {"neighbors": count}),
+                ("default", "ours", {"options": core.LaplacianOptions(neighbors=count)}),
             ):
                 if title != "default" and sampling not in UNIFORM:
                     continue  # eq. (8) takes long there
                 began = time.perf_counter()
-                operator = build("ours", points, options=options)
+                operator = build(name, points, **settings)
                 off = np.abs(eigenvalue_errors(operator, exact))
                 seconds = time.perf_counter() - began
                 rows.append([sampling, title, str(count), *summary(off), str(len(off)), f"{seconds:.1f}"])
@@ -151,13 +150,12 @@ def figure_17():
     rows, curves, least = [], {}, (np.inf, "")
     exact = sphere_eigenvalues(36)
     triangles = sphere("Fibonacci", AT)[1]
-    flattened = replace(core.LaplacianOptions.paper(), projection="plane")
     for level in (*NOISE, FIVE_PERCENT):
         points = noisy_sphere(AT, level)
         best = {}
         for label, name, settings in (
             ("ours", "ours", {}),
-            *((("ours, paper, plane", "ours", {"options": flattened}),) if level in FLATTENED else ()),
+            *((("ours, paper, plane", "ours_paper", {"denoise": True}),) if level in FLATTENED else ()),
             *((name, name, {}) for name in METHODS if not name.startswith("ours")),
         ):
             off = np.abs(eigenvalue_errors(build(name, points, triangles, **settings), exact))

@@ -13,15 +13,18 @@ from .meshes import cotangent, levy, robust, tufted
 from .operator import Operator, Ours
 
 
-def ours(points, options=None):
+def ours(points, **settings):
     """This project, with its default settings or others."""
-    laplacian = core.build_laplacian(points, options=options or core.LaplacianOptions())
-    return Ours(points, laplacian.stiffness, laplacian.areas, laplacian.areas, laplacian=laplacian)
+    return _ours(core.build_laplacian(points, **settings))
 
 
-def ours_paper(points):
-    """This project with the paper's settings."""
-    return ours(points, core.LaplacianOptions.paper())
+def ours_paper(points, **settings):
+    """The paper's operator as this project has it."""
+    return _ours(core.paper.build_laplacian(points, **settings))
+
+
+def _ours(laplacian):
+    return Ours(laplacian.points, laplacian.stiffness, laplacian.areas, laplacian.areas, laplacian=laplacian)
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,8 @@ def build(name, points, triangles=None, **settings) -> Operator:
     triangles : ndarray, (m, 3), optional
         The true mesh, for the methods that need one; the others never see it.
     **settings
-        Of the method: ``options`` of ours, ``time_factor`` of pcl, ``neighbors`` of robust.
+        Of the method: those of `core.build_laplacian` and `core.paper.build_laplacian`, ``time_factor`` of pcl,
+        ``neighbors`` of robust.
     """
     method = METHODS[name]
     if method.mesh and triangles is None:

@@ -115,8 +115,7 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
         matrix = laplacian.stiffness[free][:, free]
     report("Equations", 0.5)
     result[free] = solve_symmetric(matrix, load, result[free], report)
-    if laplacian.options.symbol_correction:
-        result[loose] -= SECOND_MOMENT / 8.0 * laplacian.kernel_widths[loose] ** 2 * source[loose]
+    result[loose] -= SECOND_MOMENT / 8.0 * laplacian.kernel_widths[loose] ** 2 * source[loose]
     result[loose] += level - _means(laplacian.areas, result, component, loose)
     return result
 

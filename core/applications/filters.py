@@ -290,12 +290,12 @@ def corrected_operator(laplacian, dirichlet, raw, pool, report):
     order, root
         As of `symmetric_form`.
     multiply : callable
-        Of (m, k) arrays: ``S y + mu2 / 8 S (h^2 S y)``, or S y without the correction. Positive semi-definite.
+        Of (m, k) arrays: ``S y + mu2 / 8 S (h^2 S y)``, or S y if raw. Positive semi-definite.
     """
     stiffness = laplacian.dirichlet[0] if dirichlet else laplacian.stiffness
     order, root, matrix = symmetric_form(laplacian, stiffness, report)
     rows = Rows(matrix, pool, report)
-    if raw or not laplacian.options.symbol_correction:
+    if raw:
         return order, root, lambda y: rows @ y
     squared = (SECOND_MOMENT / 8.0) * laplacian.kernel_widths[order, None] ** 2
 

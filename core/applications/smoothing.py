@@ -221,7 +221,7 @@ def roughness(laplacian, wavelength=None, *, progress=None):
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals must agree in sign, as those from quadrics do, and others with ``LaplacianOptions(orient=True)``.
+        Its normals must agree in sign, as estimated ones do.
     wavelength : float, optional
         Size of the details [L] of which one half counts: finer ones count whole, wider ones are shape. If not given,
         6 times the median smoothing length.
@@ -273,7 +273,7 @@ def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals must agree in sign, as those from quadrics do, and others with ``LaplacianOptions(orient=True)``.
+        Its normals must agree in sign, as estimated ones do.
     mode : array_like, (n,)
         A column of the eigenvectors, or any function; only its shape matters, not its size.
     amplitude : float, optional

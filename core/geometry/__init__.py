@@ -2,8 +2,8 @@
 
 from .cloud import Discs, estimate_normals, read_cloud, surface_discs
 from .components import SMALLEST, move_apart
-from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights, projected_distance
-from .nearest import ON, ROUNDS, SMOOTH, find_nearest, nearest_rows, typical_distance
+from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights
+from .nearest import ON, ROUNDS, SMOOTH, fading_weights, find_nearest, nearest_rows, typical_distance
 from .normals import unit_normals
 from .orientation import orient_normals, toward
 from .points import FEWEST, as_indices, as_mask, check_points, check_values

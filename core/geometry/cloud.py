@@ -13,7 +13,7 @@ from .components import label_components, move_apart
 from .distances import measure_roughness
 from .nearest import Nearest, changed_rows, find_nearest
 from .noise import FILLING, LEFT, MOST, near_misfit, noise_level, project_points
-from .normals import covariance_normals, orient_outwards, unit_normals
+from .normals import orient_outwards, unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
@@ -86,7 +86,7 @@ class Cloud:
     shape_operator : ndarray, (m, 3, 3)
         Second fundamental form of local quadrics, positive where the surface bends away from the normal.
     gaussian_curvature : ndarray, (m,)
-        Of local quadrics; zero where the options do not ask for it.
+        Of local quadrics.
     cell_areas : ndarray, (m,)
         Areas of the points' Voronoi cells.
     reach : ndarray, (m,)
@@ -156,7 +156,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     oriented = orient_outwards(nearest, quadrics.normals if given is None else given)
 
     report("Neighbors", 0.2)
-    gaussian = quadrics.gaussian_curvature if options.curvature_correction else np.zeros(len(oriented))
+    gaussian = quadrics.gaussian_curvature
     gaps = None
 
     def looked():
@@ -171,7 +171,7 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
     report("Neighbors", 0.25)
     lengths = smoothing_lengths(nearest, options, sample.component, cells.reach)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
-    own = final_normals(nearest, pairs, given, oriented, options)
+    own = oriented if given is None else given
 
     report("Neighbors", 0.4)
     pairs = separate_sheets(pairs, nearest, oriented) if options.sheets else pairs
@@ -308,14 +308,14 @@ def remove_noise(surface, options):
     near = near_misfit(surface.sample.nearest)
     noise = _noise(surface, near)
     if options.projection != "auto":
-        return _project(surface, options.projection, noise, np.ones(len(noise), dtype=bool))
+        return _project(surface, noise, np.ones(len(noise), dtype=bool))
     noisy = noise > 0.0
     if noisy.mean() < _MANY:
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
     for _ in range(MOST):
         level, before = np.where(filling, first, noise), surface.sample.nearest
-        surface = _project(surface, "quadric", level, noisy)
+        surface = _project(surface, level, noisy)
         nearest = surface.sample.nearest
         rows = changed_rows(nearest, before)
         near[rows] = near_misfit(nearest, rows)
@@ -330,10 +330,10 @@ def _noise(surface, near):
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 
-def _project(surface, method, noise, moving):
+def _project(surface, noise, moving):
     sample, tree = surface.sample, surface.sample.nearest.tree
     points, rows = tree.data.copy(), np.flatnonzero(moving)
-    points[rows] = project_points(tree, rows, method, noise, sample.component)
+    points[rows] = project_points(tree, rows, noise, sample.component)
     return fit_surface(replace(sample, nearest=find_nearest(points)), surface.sheets is not None, surface)
 
 
@@ -410,16 +410,6 @@ def locate_boundary(sample, oriented, gaps=None, boundary=None, boundary_distanc
     return measured if distance is None else measured.with_nearest(distance, nearest.spacing)
 
 
-def final_normals(nearest, pairs, given, oriented, options):
-    """Return the normals that the options ask for, (m, 3): given ones, those of quadrics, or from the covariance."""
-    if given is not None:
-        return given
-    if options.normals == "quadric":
-        return oriented
-    normals = covariance_normals(pairs, weighted=options.normals == "wpca")
-    return orient_outwards(nearest, normals) if options.orient else normals
-
-
 def _notices(duplicates, left_out, share, noise, narrow):
     """Say what a user should know of the walk, where there is something to say."""
     noisy, filling = np.mean(noise > 0.0), np.mean(noise > FILLING)
@@ -451,8 +441,8 @@ def estimate_normals(points, options=LaplacianOptions()):
     Returns
     -------
     ndarray, (n, 3)
-        Unit normals. Those from quadrics agree in sign, outwards on closed surfaces, up on sheets such as terrain;
-        those from the covariance are of arbitrary sign unless ``options.orient``. Points left out get the z axis.
+        Unit normals of local quadrics. They agree in sign, outwards on closed surfaces, up on sheets such as terrain.
+        Points left out get the z axis.
 
     Raises
     ------

@@ -33,34 +33,6 @@ def circle_arc(chord, bend):
     return chord * np.where(bend > 1e-4, np.arcsin(bend) / np.maximum(bend, 1e-4), 1.0)
 
 
-def projected_distance(pairs, normals):
-    """Return the length of each pair's difference in the plane orthogonal to its mean normal, eq. (10).
-
-    Parameters
-    ----------
-    pairs : Pairs
-        With p pairs.
-    normals : ndarray, (m, 3)
-        Unit normals. The second is flipped to the first one's side, pair by pair: signs do not matter.
-
-    Returns
-    -------
-    ndarray, (p,)
-    """
-    result = np.empty(len(pairs.first))
-    points, normals = pairs.points.T.copy(), normals.T.copy()
-
-    def measure(patch):
-        _, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
-        side = np.where(cosine < 0.0, -1.0, 1.0)
-        # The mean of two unit normals has the squared length (1 + cos) / 2.
-        height = (left + side * right) ** 2 / (2.0 + 2.0 * np.abs(cosine))
-        result[patch.pairs] = np.sqrt(np.maximum(pairs.distance[patch.pairs] ** 2 - height, 0.0))
-
-    on_all_cores(measure, pairs.patches)
-    return result
-
-
 def arc_length(cloud):
     """Return the length of the arc that joins each pair within the surface.
 

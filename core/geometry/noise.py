@@ -53,8 +53,8 @@ def noise_level(nearest, near, mixed, misfit):
     return np.where(averaging @ noisy.astype(float) > 0.5, few, 0.0)
 
 
-def project_points(tree, rows, method, noise, component=None):
-    """Move some points onto the surface that their neighbours describe.
+def project_points(tree, rows, noise, component=None):
+    """Move some points onto quadrics through their neighbours.
 
     Parameters
     ----------
@@ -62,8 +62,6 @@ def project_points(tree, rows, method, noise, component=None):
         Of m points; components stand far apart in it.
     rows : ndarray, (k,) int
         Which points to move.
-    method : {"quadric", "plane"}
-        Onto a quadric through their neighbours, or onto the plane through the mean of 90, as the paper does.
     noise : ndarray, (m,)
         As a share of the spacing: little noise needs few neighbours.
     component : ndarray, (m,) int, optional
@@ -75,27 +73,21 @@ def project_points(tree, rows, method, noise, component=None):
     """
     smallest = tree.n if component is None else np.bincount(component).min()
     # A quadric has six coefficients.
-    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, *_NEIGHBORS) if method == "quadric" else _NEIGHBORS[1]
-    many = np.minimum(np.full(len(rows), asked, dtype=int), smallest - 1)
+    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, *_NEIGHBORS)
+    many = np.minimum(asked.astype(int), smallest - 1)
     order = np.argsort(many, kind="stable")  # those who ask for few neighbours do not wait for others' many
     result = np.empty((len(rows), 3))
 
     def project(part):
         block = order[part]
-        result[block] = _projected(tree, rows[block], many[block], method)
+        result[block] = _projected(tree, rows[block], many[block])
 
     on_all_cores(project, blocks(len(rows), _BLOCK))
     return result
 
 
-def _projected(tree, rows, many, method):
+def _projected(tree, rows, many):
     points = tree.data
     distance, index = tree.query(points[rows], k=many.max() + 1)
     weight = fading_weights(np.minimum(distance, distance[np.arange(len(many)), many, None]))
-    if method == "quadric":
-        return points[rows] + fit_quadrics(points, index, weight, rows).height
-    weight /= weight.sum(axis=1, keepdims=True)
-    mean = np.einsum("ik,ikc->ic", weight, points[index])
-    centered = points[index] - mean[:, None]
-    normal = np.linalg.eigh(np.swapaxes(weight[:, :, None] * centered, 1, 2) @ centered)[1][:, :, 0]
-    return points[rows] + np.einsum("ic,ic->i", mean - points[rows], normal)[:, None] * normal
+    return points[rows] + fit_quadrics(points, index, weight, rows).height

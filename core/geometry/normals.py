@@ -1,12 +1,11 @@
-"""Normals from the cloud: covariance of each neighbourhood, and a consistent orientation."""
+"""Normals: given ones checked, and a consistent orientation."""
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
 from ..arguments import as_array, as_doubles
-from ..errors import InvalidPointsError, NotASurfaceError
-from ..kernel import kernel
+from ..errors import InvalidPointsError
 
 NEIGHBORS = 12
 _BULGING = (
@@ -36,52 +35,6 @@ def unit_normals(normals, count):
         raise InvalidPointsError(f"{bad} of {count} normals are zero or not finite. Leave the normals to be estimated.")
     normals = normals / largest  # squares of what is tiny or huge are no numbers
     return normals / np.linalg.norm(normals, axis=1)[:, None]
-
-
-def covariance_normals(pairs, weighted=True):
-    """Estimate unit normals by (weighted) principal component analysis, eq. (9).
-
-    Parameters
-    ----------
-    pairs : Pairs
-        Of m distinct points.
-    weighted : bool
-        Weigh by the kernel W_h (WPCA) or count every neighbour alike (PCA).
-
-    Returns
-    -------
-    ndarray, (m, 3)
-        Unit normals of arbitrary sign: the direction of least variance.
-
-    Raises
-    ------
-    NotASurfaceError
-        The points of many neighbourhoods lie along a curve.
-    """
-    points = pairs.points
-    if weighted:
-        weights = pairs.half(kernel(pairs.distance / pairs.mean(pairs.lengths)))
-        own = kernel(0.0)
-    else:
-        weights = pairs.half(np.ones(len(pairs.first)))
-        own = 1.0
-    axes = np.triu_indices(3)
-    moments = np.column_stack([np.ones(len(points)), points, points[:, axes[0]] * points[:, axes[1]]])
-    moments = own * moments + weights @ moments + weights.T @ moments
-    moments /= moments[:, :1]
-    mean = moments[:, 1:4]
-    covariance = np.empty((len(points), 3, 3))
-    covariance[:, axes[0], axes[1]] = covariance[:, axes[1], axes[0]] = (
-        moments[:, 4:] - mean[:, axes[0]] * mean[:, axes[1]]
-    )
-    variances, directions = np.linalg.eigh(covariance)
-    curve = np.count_nonzero(variances[:, 1] < 5e-3 * variances[:, 2])
-    if curve > 0.01 * len(points):
-        raise NotASurfaceError(
-            f"Around {curve} of {len(points)} points the neighbors lie along a curve, so there is no tangent"
-            " plane. Use points of a surface."
-        )
-    return np.ascontiguousarray(directions[:, :, 0])
 
 
 def orient_outwards(nearest, normals):

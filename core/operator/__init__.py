@@ -1,8 +1,9 @@
 """The Laplace-Beltrami operator on a cloud: areas, weights, stiffness, spectrum, curvature."""
 
-from .areas import SOLVERS, AreaSolution, estimate_areas
+from .areas import KernelMatrix, estimate_areas
 from .connection import connection_laplacian, tangent_frames
 from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
 from .implicit import ImplicitSurface
-from .laplacian import LaplaceBeltrami, build_laplacian, narrow_laplacian
+from .laplacian import LaplaceBeltrami, build_laplacian, laplacian_of, narrow_laplacian
 from .spectrum import Spectrum, symmetric_form
+from .stiffness import Stiffness, stiffness_matrix

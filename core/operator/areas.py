@@ -1,14 +1,12 @@
-"""Area elements from the unit-integral condition of the kernel, eqs. (6) to (8) of the paper."""
+"""Area elements from the unit-integral condition of the kernel, eq. (6) of the paper."""
 
 import functools
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.special import expit
 
 from ..algebra import chebyshev_terms, on_all_cores
-from ..errors import SolverError
 from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
@@ -21,26 +19,6 @@ _WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degr
 _EVEN = 1e-9  # changes of h, as a share, that are none
 _MANY = 1 << 20  # pairs from which a product takes longer than to begin threads
 NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
-
-
-@dataclass(frozen=True)
-class AreaSolution:
-    """Areas and how they were found.
-
-    Attributes
-    ----------
-    areas : ndarray, (n,)
-        Area elements, all positive.
-    products : int
-        Products with the kernel matrix.
-    residual : float
-        What is left of the equations, as a share, where the solver did not reach its tolerance, and zero where it did;
-        the fast areas are a fixed number of steps.
-    """
-
-    areas: np.ndarray
-    products: int
-    residual: float = 0.0
 
 
 def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary=None, boundary_distance=None):
@@ -62,9 +40,6 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
     ------
     PointCloudError
         The points have no sound areas; see `build_laplacian`.
-    SolverError
-        The equations of 'regularized', 'constrained' or 'uniform' areas were not solved; the operator comes with a
-        notice then.
 
     See Also
     --------
@@ -84,48 +59,32 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
     (800,) 12.6
     """
     cloud = read_cloud(points, options, normals, boundary, boundary_distance)
-    distance = arc_length(cloud) if options.curvature_correction else cloud.pairs.distance
-    scaled, solution = cloud.scaled, solve_areas(cloud, distance, options)
-    if solution.residual:
-        raise SolverError(
-            f"The areas of {len(solution.areas)} points were not found in {solution.products} steps: a share of"
-            f" {solution.residual:.1g} is left. Choose the areas option 'fast', or raise the regularization."
-        )
-    return scaled.scatter(solution.areas * scaled.scale**2 / scaled.copies, NO_AREA)
+    areas = solve_areas(cloud, arc_length(cloud))
+    scaled = cloud.scaled
+    return scaled.scatter(areas * scaled.scale**2 / scaled.copies, NO_AREA)
 
 
-def solve_areas(cloud, distance, options, report=lambda: None):
-    """Solve for the areas of the distinct points, in scaled coordinates, by the method the options name.
+def solve_areas(cloud, distance, report=lambda: None):
+    """Solve for the areas of the distinct points, in scaled coordinates.
 
     Parameters
     ----------
     cloud : Cloud
         Of m distinct points, with p pairs.
     distance : ndarray, (p,)
-        Distance of each pair: in space, or along the surface.
-    options : LaplacianOptions
-        Its areas and regularization settings.
+        Distance of each pair along the surface.
     report : callable
         Called before each product with the kernel matrix; may raise `Cancelled`.
 
     Returns
     -------
-    AreaSolution
-
-    Raises
-    ------
-    AreaError
-        Eq. (7), which has no bound, gave areas that are not positive.
+    ndarray, (m,)
+        Areas, all positive.
     """
     lengths = cloud.pairs.lengths
-    target = kernel_integral(lengths, cloud.gaussian_curvature)
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
-    if options.curvature_correction:
-        target += _gain(matrix, lengths)
-    solution = SOLVERS[options.areas](matrix, target, cloud.cell_areas, options.regularization)
-    if options.areas != "fast":
-        return solution
-    return replace(solution, areas=_like_cells(matrix, solution.areas, cloud))
+    target = kernel_integral(lengths, cloud.gaussian_curvature) + _gain(matrix, lengths)
+    return _like_cells(matrix, fast_areas(matrix, target, cloud.cell_areas), cloud)
 
 
 def _like_cells(matrix, areas, cloud):
@@ -192,7 +151,7 @@ class KernelMatrix:
         return self._diagonal * values + first + second
 
 
-def fast_areas(matrix, target, cells, rho=None):
+def fast_areas(matrix, target, cells):
     """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells.
 
     M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [-1, 1]; but for pairs left out between close
@@ -211,12 +170,11 @@ def fast_areas(matrix, target, cells, rho=None):
         b, the integral that the kernel should have at each point (1 on a flat surface).
     cells : ndarray, (n,)
         Areas of the Voronoi cells.
-    rho : float, optional
-        Not used: what the kernel cannot see is regularized towards the cells.
 
     Returns
     -------
-    AreaSolution
+    ndarray, (n,)
+        v, all positive.
     """
     root = np.sqrt(cells / (matrix @ cells))
     right, y = root * target, cells / root
@@ -228,7 +186,7 @@ def fast_areas(matrix, target, cells, rho=None):
         residual[held] = 0.0
         y = np.maximum(y + _polynomial(matrix, root, residual, held, _inverse(degree)), floor)
         held = y <= floor
-    return AreaSolution(root * y, sum(_DEGREES) + 1 + len(_DEGREES))
+    return root * y
 
 
 def _polynomial(matrix, root, residual, held, coefficients):
@@ -248,7 +206,3 @@ def _inverse(degree):
     """Return the Chebyshev series over [-1, 1] of 1 / x for x well above the width; near zero and below, of nothing."""
     width = _WIDTH / degree
     return chebyshev.chebinterpolate(lambda x: expit(2.0 * x / width) * x / (x * x + width * width), degree)
-
-
-SOLVERS = {"fast": fast_areas}
-"""Function of each choice of `LaplacianOptions.areas`; the wing of the paper adds its own."""

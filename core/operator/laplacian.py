@@ -1,4 +1,4 @@
-"""The symmetrised mesh-free Laplace-Beltrami operator, eq. (10) of the paper."""
+"""The symmetrised mesh-free Laplace-Beltrami operator."""
 
 from dataclasses import dataclass, replace
 
@@ -7,7 +7,7 @@ from scipy import sparse
 
 from ..arguments import check_switches
 from ..errors import InvalidPointsError
-from ..geometry import arc_length, check_points, check_values, move_apart, projected_distance, read_cloud, toward
+from ..geometry import arc_length, check_points, check_values, move_apart, read_cloud, toward
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
@@ -41,7 +41,7 @@ class LaplaceBeltrami:
         Second fundamental form of local quadrics [1 / L]: ``t . shape_operator t`` is the curvature along the unit
         tangent t, positive where the surface bends away from the normal.
     gaussian_curvature : ndarray, (n,)
-        Product of the two principal curvatures [1 / L^2], from local quadrics; zero without the curvature correction.
+        Product of the two principal curvatures [1 / L^2], from local quadrics.
     reach : ndarray, (n,)
         Distance of the furthest corner of the Voronoi cell [L]: discs of this radius leave no hole.
     boundary : ndarray, (n,) bool
@@ -62,7 +62,7 @@ class LaplaceBeltrami:
         h of each point [L]; the kernel reaches 3 h.
     kernel_widths : ndarray, (n,)
         Smoothing length of the kernel that the balanced weights are like [L], by their fourth moment: what the symbol
-        correction goes by.
+        correction goes by. Zero in the paper's operator, which has none.
     stiffness : csr_array, (n, n)
         Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the Neumann one: no flow
         across.
@@ -177,8 +177,7 @@ class LaplaceBeltrami:
         -------
         ndarray
             Same shape as the values, their Laplacian [unit of values / L^2]: ``L f - mu2 / 8 L(h^2 L f)``, which takes
-            the kernel's width out to second order and stays self-adjoint and negative semi-definite; with `raw`, or
-            without ``options.symbol_correction``, L f.
+            the kernel's width out to second order and stays self-adjoint and negative semi-definite; with `raw`, L f.
 
         Raises
         ------
@@ -210,7 +209,7 @@ class LaplaceBeltrami:
         if values.ndim == 2:
             areas, widths = areas[:, None], widths[:, None]
         result = -(self.stiffness @ values) / areas
-        if raw or not self.options.symbol_correction:
+        if raw:
             return result
         return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (widths**2 * result)) / areas
 
@@ -282,15 +281,13 @@ class LaplaceBeltrami:
         Returns
         -------
         Spectrum
-            As of `eigenpairs`; the same one without ``options.symbol_correction``.
+            As of `eigenpairs`.
 
         Raises
         ------
         UnresolvedModesError
             Modes that vary faster than the smoothing length resolves.
         """
-        if not self.options.symbol_correction:
-            return spectrum
         values, vectors = spectrum.eigenvalues, spectrum.eigenvectors
         return Spectrum(correct_eigenvalues(self, values, vectors), vectors, spectrum.residuals)
 
@@ -335,7 +332,7 @@ def build_laplacian(
         The input has no sound answer; the text says why and what to do. Its children tell what it is: points, normals
         or a boundary of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighbourhoods need
         (`TooFewPointsError`), points along a curve (`NotASurfaceError`), components of too few points alone
-        (`ComponentError`), areas of eq. (7) that are not positive (`AreaError`), more points than the free memory is
+        (`ComponentError`), more points than the free memory is
         enough for, before the start (`NotEnoughMemoryError`).
 
     See Also
@@ -344,6 +341,7 @@ def build_laplacian(
     estimate_areas : Areas alone.
     estimate_normals : Normals alone.
     check_stability : Judges the operator.
+    paper.build_laplacian : The operator of the paper below, to the letter.
 
     References
     ----------
@@ -370,32 +368,43 @@ def build_laplacian(
     check_memory(len(points), options)
 
     cloud = read_cloud(points, options, normals, boundary, boundary_distance, report, left_out)
+    report("Areas", 0.5)
+    distance = arc_length(cloud)
+    areas = solve_areas(cloud, distance, lambda: report("Areas", 0.6))
+
+    report("Operator", 0.8)
+    cloud = replace(cloud, pairs=replace(cloud.pairs, distance=distance))  # gives back that of the ways through space
+    stiffness = assemble_stiffness(cloud, distance, areas, lambda: report("Operator", 0.8))
+    return laplacian_of(points, cloud, areas, stiffness, options)
+
+
+def laplacian_of(points, cloud, areas, assembled, options):
+    """Give the caller what was computed for the distinct points in scaled coordinates.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+        The caller's [L].
+    cloud : Cloud
+        Of m distinct points.
+    areas : ndarray, (m,)
+        Area elements in scaled coordinates.
+    assembled : Stiffness
+    options : LaplacianOptions
+        How the points were taken.
+
+    Returns
+    -------
+    LaplaceBeltrami
+    """
     scaled, pairs, notices = cloud.scaled, cloud.pairs, cloud.notices
     if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
         notices.append(
             "The kernel of most points reaches over a third of the object, which is too wide for good results."
             " Add points, or lower the number of neighbors."
         )
-
-    report("Areas", 0.5)
-    distance = arc_length(cloud) if options.curvature_correction else pairs.distance
-    solution = solve_areas(cloud, distance, options, lambda: report("Areas", 0.6))
-    if solution.residual:
-        notices.append(
-            f"The areas were not found in {solution.products} steps: a share of {solution.residual:.1g} of their"
-            " equations is left, and they may be far off. Choose the areas option 'fast', or raise the regularization."
-        )
-
-    report("Operator", 0.8)
-    if not options.curvature_correction:
-        distance = projected_distance(pairs, cloud.normals)
-    pairs = replace(pairs, distance=distance)  # gives back the memory of the ways through space
-    cloud = replace(cloud, pairs=pairs)
-    assembled = assemble_stiffness(
-        cloud, distance, solution.areas, options.curvature_correction, lambda: report("Operator", 0.8)
-    )
     trust = _trust(cloud, assembled.residual)
-    doubtful = np.sum(solution.areas[trust < 0.5]) / np.sum(solution.areas)
+    doubtful = np.sum(areas[trust < 0.5]) / np.sum(areas)
     if doubtful > _DOUBTFUL and options.bandwidth == "adaptive":  # the width of others is the caller's choice
         notices.append(
             f"On {doubtful:.0%} of the surface the points tell too little of it: they are too few for its bends, lie in"
@@ -405,7 +414,7 @@ def build_laplacian(
         points=points,
         surface_points=points + scaled.scatter(cloud.moved * scaled.scale, 0.0),
         normals=scaled.scatter(cloud.normals, (0.0, 0.0, 1.0)),
-        areas=scaled.scatter(solution.areas * scaled.scale**2 / scaled.copies, NO_AREA),
+        areas=scaled.scatter(areas * scaled.scale**2 / scaled.copies, NO_AREA),
         shape_operator=scaled.scatter(cloud.shape_operator / scaled.scale, 0.0),
         gaussian_curvature=scaled.scatter(cloud.gaussian_curvature / scaled.scale**2, 0.0),
         reach=scaled.scatter(cloud.reach * scaled.scale, np.median(cloud.reach) * scaled.scale),

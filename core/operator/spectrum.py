@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from ..algebra import coarse_to_fine, lift_lowest
 from ..arguments import real, whole
 from ..errors import PointCloudError, SolverError, TooFewPointsError, UnresolvedModesError
-from ..kernel import inverse_symbol, symbol
+from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
 
 TOLERANCE = 2e-7  # leaves eigenvalues right to ten digits and more, for their errors go by its square
@@ -142,7 +142,7 @@ def correct_eigenvalues(laplacian, values, vectors):
         Some modes lie beyond the resolved range.
     """
     squared = (laplacian.areas * laplacian.kernel_widths**2) @ vectors**2
-    corrected = inverse_symbol(values * squared) ** 2 / squared
+    corrected = values * inverse_ratio(values * squared)
     if not np.isfinite(corrected).all():
         resolved = int(np.argmin(np.isfinite(corrected)))
         raise UnresolvedModesError(

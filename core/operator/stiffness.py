@@ -24,9 +24,9 @@ class Stiffness:
         Symmetric weights of the images in one boundary that the matrix holds, those of points in their own image on the
         diagonal. (An image of an image, across a corner, has the point's value whatever holds at the boundary.)
     residual : ndarray, (m,)
-        What the moments of the weights around each distinct point are off by, relatively; zero without balance.
+        What the moments of the weights around each distinct point are off by, relatively.
     widths : ndarray, (m,)
-        Smoothing length of the kernel whose fourth moment the weights have; h without balance.
+        Smoothing length of the kernel whose fourth moment the weights have; zero for no symbol correction.
     """
 
     matrix: sparse.csr_array
@@ -56,8 +56,8 @@ class _Images:
     once: np.ndarray
 
 
-def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: None):
-    """Assemble K = -D G D of eq. (10) for the caller's points.
+def assemble_stiffness(cloud, distance, areas, report=lambda: None):
+    """Assemble K = -D G D of eq. (10) for the caller's points, with weights of the moments that the kernel has.
 
     Points at the same place take equal parts of its area and couple as neighbours at distance zero. The image of a
     point in a boundary has the point's value, so that it adds to the weight of the pair.
@@ -67,13 +67,11 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     cloud : Cloud
         Of m distinct points, with p pairs, that stand for n of the caller's.
     distance : ndarray, (p,)
-        Distance of each pair in the mean-normal plane, or along the surface.
+        Distance of each pair along the surface.
     areas : ndarray, (m,)
         Area elements in scaled coordinates.
-    balanced : bool
-        Give the weights around every point the moments of the kernel, by `balance_weights`.
     report : callable
-        Called now and then while that is done; may raise `Cancelled`.
+        Called now and then while weights are balanced; may raise `Cancelled`.
 
     Returns
     -------
@@ -81,25 +79,39 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     """
     pairs, scaled = cloud.pairs, cloud.scaled
     weights, own, images, alone = _kernel_weights(cloud, distance, areas)
-    residual, widths = np.zeros(len(areas)), pairs.lengths
-    if balanced:
-        balance = balance_weights(cloud, distance, weights, areas, report)
-        residual, factor = balance.residual, balance.factor[images.rows]
-        weights *= balance.factor
-        del balance  # its memory is needed
-        images = replace(images, weights=images.weights * factor, fourth=images.fourth * factor)
-        widths = _widths(pairs, distance, areas, weights, images, alone)
-    if scaled.shared:
-        whole = _symmetric(scaled, pairs.first, pairs.second, weights, own)
-        stiffness = (sparse.diags_array(whole.sum(axis=1), format="csr") - whole).tocsr()
-    else:
-        half = pairs.half(weights)
-        total = half.sum(axis=0) + half.sum(axis=1)
-        stiffness = _symmetric(scaled, pairs.first, pairs.second, np.negative(weights, out=weights), total)
+    balance = balance_weights(cloud, distance, weights, areas, report)
+    residual, factor = balance.residual, balance.factor[images.rows]
+    weights *= balance.factor
+    del balance  # its memory is needed
+    images = replace(images, weights=images.weights * factor, fourth=images.fourth * factor)
+    widths = _widths(pairs, distance, areas, weights, images, alone)
+    stiffness = stiffness_matrix(scaled, pairs, weights, own)
     rows = images.rows[images.once]
     mirrored = np.bincount(alone.rows[alone.once], alone.weights[alone.once], len(areas))
     images = _symmetric(scaled, pairs.first[rows], pairs.second[rows], images.weights[images.once], mirrored)
     return Stiffness(stiffness, images, residual, widths)
+
+
+def stiffness_matrix(scaled, pairs, weights, own):
+    """Return the matrix of a function's energy, half the sum of ``weights (f_i - f_j)^2`` over ordered pairs, (n, n).
+
+    Parameters
+    ----------
+    scaled : ScaledPoints
+        The m distinct points that stand for n of the caller's.
+    pairs : Pairs
+        With p pairs.
+    weights : ndarray, (p,)
+        Of the pairs; overwritten.
+    own : ndarray, (m,)
+        Of each point with itself: what points at the same place, which share its area, couple by.
+    """
+    if scaled.shared:
+        whole = _symmetric(scaled, pairs.first, pairs.second, weights, own)
+        return (sparse.diags_array(whole.sum(axis=1), format="csr") - whole).tocsr()
+    half = pairs.half(weights)
+    total = half.sum(axis=0) + half.sum(axis=1)
+    return _symmetric(scaled, pairs.first, pairs.second, np.negative(weights, out=weights), total)
 
 
 def _kernel_weights(cloud, distance, areas):

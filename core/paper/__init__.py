@@ -1,5 +1,6 @@
-"""The paper to the letter, for comparison: its area elements, which become options, its operator, its theorem."""
+"""The paper as it stands, equation by equation: its area elements, its normals, its operator, its theorem."""
 
-from .areas import algorithm_1, constrained_areas, regularized_areas  # which makes them choices of the operator
-from .operator import unsymmetrized_operator
+from .areas import algorithm_1, constrained_areas, regularized_areas
+from .normals import covariance_normals
+from .operator import build_laplacian, projected_distance, unsymmetrized_operator
 from .stability import Stability, check_stability

@@ -1,4 +1,4 @@
-"""Areas by the paper's own least squares, eqs. (7) and (8), as options of the operator, and its Algorithm 1."""
+"""Area elements by the paper's least squares, eqs. (6) to (8), and its Algorithm 1."""
 
 from dataclasses import dataclass, replace
 
@@ -7,11 +7,29 @@ from scipy.sparse.linalg import LinearOperator
 
 from ..algebra import bounded_quadratic, conjugate_gradients
 from ..errors import AreaError
-from ..operator import SOLVERS, AreaSolution
 
 _RTOL = 1e-12  # a looser one leaves areas open by as much as themselves: small eigenvalues weigh as little as rho
 _START = 1000  # products for a start that need not be exact
 TAU = 2.0**-52  # the paper's lower bound of eq. (8), in scaled coordinates
+
+
+@dataclass(frozen=True)
+class AreaSolution:
+    """Areas and how they were found.
+
+    Attributes
+    ----------
+    areas : ndarray, (n,)
+        Area elements.
+    products : int
+        Products with the kernel matrix.
+    residual : float
+        What is left of the equations, as a share, where the solver did not reach its tolerance, and zero where it did.
+    """
+
+    areas: np.ndarray
+    products: int
+    residual: float = 0.0
 
 
 def regularized_areas(matrix, target, rho, products=8000, rtol=_RTOL):
@@ -153,24 +171,21 @@ def algorithm_1(matrix, target, start, rho=1e-3, epsilon=1e-3, nu=1e-4, beta=0.1
     return DescentResult(v, np.array(objective), len(objective) - 1, residual, residual <= epsilon, stalled)
 
 
-def _regularized(matrix, target, cells, rho):
+def _positive_areas(matrix, target, rho):
     solution = regularized_areas(matrix, target, rho)
     bad = int(np.count_nonzero(solution.areas <= 0.0))
     if bad:
         raise AreaError(
-            f"The regularized areas of {bad} of {len(target)} points are not positive. Choose the areas option"
-            " 'fast' or 'constrained', or raise the regularization."
+            f"The regularized areas of {bad} of {len(target)} points are not positive. Choose the areas 'constrained',"
+            " or raise the regularization."
         )
     return solution
 
 
-def _uniform(matrix, target, cells, rho):
+def _uniform_areas(matrix, target, rho):
     solution = regularized_areas(matrix, target, rho)
     return replace(solution, areas=np.full(len(target), solution.areas.mean()))
 
 
-def _constrained(matrix, target, cells, rho):
-    return constrained_areas(matrix, target, rho)
-
-
-SOLVERS.update(regularized=_regularized, uniform=_uniform, constrained=_constrained)
+AREAS = {"constrained": constrained_areas, "regularized": _positive_areas, "uniform": _uniform_areas}
+"""Function of each choice of `PaperOptions.areas`."""

@@ -69,7 +69,7 @@ def check_stability(laplacian):
     See Also
     --------
     build_laplacian : Builds operators.
-    LaplacianOptions.paper : The setting of the paper.
+    paper.build_laplacian : Builds that of the paper.
 
     Examples
     --------

@@ -18,7 +18,6 @@ HANDLE, ANCHOR, FIXED, SOURCE, LOW, HIGH, VALUE, BOUNDARY_GROUP = ROLES = (
     "Boundary",
 )
 _GIVEN = LOW, HIGH, VALUE  # a point has one value
-_FORMER = {BOUNDARY_GROUP: "Rim"}  # what version 0.1.0 called them
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
 
 
@@ -33,12 +32,6 @@ def has_group(obj, name: str) -> bool:
         return name in obj.vertex_groups
     attribute = obj.data.attributes.get(name)
     return attribute is not None and attribute.data_type in _WEIGHTS and attribute.domain == "POINT"
-
-
-def role_group(obj, role: str) -> str:
-    """Name of an object's group for a role: that of the role, or its former one if the object has only that."""
-    former = _FORMER.get(role, role)
-    return former if has_group(obj, former) and not has_group(obj, role) else role
 
 
 def rivals(obj, role: str) -> list:

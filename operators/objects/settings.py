@@ -14,9 +14,8 @@ from bpy.props import (
 
 from . import deform_settings, notices
 from .color_choices import color_choice
-from .earlier import FormerSettings
 from .handlers import tell
-from .options import DEFAULTS
+from .options import DEFAULTS, PAPER_DEFAULTS
 
 
 def _recolor(settings, context):
@@ -51,17 +50,26 @@ class MESHFREE_PG_stage(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Seconds", description="Time that this stage took, in seconds", min=0.0)
 
 
-class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
+class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     """Settings and results of the Mesh-Free Laplacian for one object"""
 
     # What results depend on. Names and defaults are those of core's options.
+    method: EnumProperty(
+        name="Method",
+        description="How the Laplacian is built",
+        items=(
+            ("DEFAULT", "Default", "For scans: kernels as wide as the points need, curvature and boundary respected"),
+            ("PAPER", "Paper", "As in the paper: one bandwidth for all points, no boundary, no corrections"),
+        ),
+        default="DEFAULT",
+    )
     bandwidth: EnumProperty(
         name="Bandwidth",
         description="How far the kernel of each point reaches",
         items=(
             ("ADAPTIVE", "Adaptive", "As far as the widest gaps between the points around demand, point by point"),
             ("LOCAL", "Local", "Follows the spacing of the points alone"),
-            ("GLOBAL", "Global", "The same for all points, as in the paper: for even samples"),
+            ("GLOBAL", "Global", "The same for all points: for even samples"),
         ),
         default=DEFAULTS.bandwidth.upper(),
     )
@@ -87,27 +95,25 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
         name="Normals",
         description="How the normal of a point is estimated from its neighbors",
         items=(
-            ("QUADRIC", "Quadric", "From a curved surface fitted to the neighbors: the most exact on curved surfaces"),
-            ("WPCA", "Weighted Plane", "From a plane through the neighbors, near ones counting more, as in the paper"),
+            ("WPCA", "Weighted Plane", "From a plane through the neighbors, near ones counting more"),
             ("PCA", "Plain Plane", "From a plane through the neighbors, all counting alike"),
         ),
-        default=DEFAULTS.normals.upper(),
+        default=PAPER_DEFAULTS.normals.upper(),
     )
     areas: EnumProperty(
         name="Areas",
         description="How the area of each point is computed",
         items=(
-            ("FAST", "Fast", "From the Voronoi cells of the points, so that the kernel integrates to one"),
             ("REGULARIZED", "Regularized", "Least squares with regularization, equation 7 of the paper"),
             ("CONSTRAINED", "Constrained", "The same with positive areas only, equation 8 of the paper"),
             ("UNIFORM", "Uniform", "The mean area for every point: only for even samples"),
         ),
-        default=DEFAULTS.areas.upper(),
+        default=PAPER_DEFAULTS.areas.upper(),
     )
     regularization: FloatProperty(
         name="Regularization",
         description="Weight of the regularization of the areas, free of the object's size",
-        default=DEFAULTS.regularization,
+        default=PAPER_DEFAULTS.regularization,
         min=1e-9,
         soft_max=1.0,
         precision=6,
@@ -134,20 +140,14 @@ class MESHFREE_PG_settings(FormerSettings, bpy.types.PropertyGroup):
             ("AUTO", "Automatic", "Smooth if the measured noise asks for it"),
             ("OFF", "Off", "Take every point where it is"),
             ("QUADRIC", "Always", "Take every point onto a curved surface fitted to its neighbors"),
-            ("PLANE", "Tangent Planes (Paper)", "Take every point onto a plane through its neighbors, as in the paper"),
         ),
         default=DEFAULTS.projection.upper(),
     )
-    curvature_correction: BoolProperty(
-        name="Curvature Correction",
-        description="Measure distances along the surface, correct areas and weights for its Gaussian curvature, which"
-        " is 0 everywhere without this, and balance the weights around each point",
-        default=DEFAULTS.curvature_correction,
-    )
-    symbol_correction: BoolProperty(
-        name="Symbol Correction",
-        description="Correct eigenvalues and curvature for the known effect of the kernel's width",
-        default=DEFAULTS.symbol_correction,
+    denoise: BoolProperty(
+        name="Tangent Planes",
+        description="Take every point onto a plane through its neighbors first, against noise; your points stay where"
+        " they are",
+        default=PAPER_DEFAULTS.denoise,
     )
     boundary_group: StringProperty(
         name="Boundary Group",

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import OrderedDict
-from dataclasses import replace
+from dataclasses import asdict, replace
 from threading import Lock
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -14,7 +14,6 @@ from bpy.app.handlers import persistent
 from ... import core
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
-_FACTOR = 12  # bytes of each entry of sparse factors: a number and its row
 _NONE = np.arange(0)  # splats that are left out
 _kept = OrderedDict()  # value and bytes, by what it was computed from; what was used last at the end
 _sources = WeakKeyDictionary()  # what each operator was built from
@@ -34,7 +33,7 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
     Parameters
     ----------
     points : ndarray, (n, 3)
-    options : LaplacianOptions
+    options : LaplacianOptions or PaperOptions
     boundary : ndarray, (n,) bool, or None
         The points at the boundary; None leaves it to the options.
     progress : callable
@@ -47,7 +46,7 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
 
     def compute():
         fitting(len(points), options)
-        laplacian = core.build_laplacian(points, options=options, boundary=boundary, left_out=out, progress=progress)
+        laplacian = _laplacian(points, options, boundary, out, progress)
         progress("Curvature", 1.0)
         laplacian = replace(laplacian, notices=[*floating_notices(out), *laplacian.notices])
         return Built(laplacian, core.mean_curvature(laplacian))
@@ -62,6 +61,14 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
     with _lock:
         _sources[built.laplacian] = key
     return built
+
+
+def _laplacian(points, options, boundary, out, progress):
+    """Build the operator by the method of the options; the paper's knows no boundary."""
+    given = {"left_out": out, "progress": progress}
+    if isinstance(options, core.PaperOptions):
+        return core.paper.build_laplacian(points, **asdict(options), **given)
+    return core.build_laplacian(points, options=options, boundary=boundary, **given)
 
 
 def _oriented(built, orientation):
@@ -98,11 +105,12 @@ def fitting(count: int, options, modes: int = 0):
 
     Where it is not enough for a count, what is kept is given back first.
     """
-    most = core.points_that_fit(options, modes)
+    width = options.cloud if isinstance(options, core.PaperOptions) else options
+    most = core.points_that_fit(width, modes)
     if most is None or most >= count:
         return most
     clear()
-    return core.points_that_fit(options, modes)
+    return core.points_that_fit(width, modes)
 
 
 def lowest_modes(laplacian, count: int, progress, dirichlet=False, raw=False) -> "core.Spectrum":
@@ -221,7 +229,7 @@ def _put(key, value, laplacian=None):
 
 
 def memory(value, known=None) -> int:
-    """Return the bytes of all arrays and factors that a value holds, but not those of an object that is known."""
+    """Return the bytes of all arrays that a value holds, but not those of an object that is known."""
     total, found, pending = 0, {id(known)}, [value]
     while pending:
         item = pending.pop()
@@ -234,8 +242,6 @@ def memory(value, known=None) -> int:
             pending += item.values()
         elif isinstance(item, (list, tuple)):
             pending += item
-        elif hasattr(item, "nnz") and not hasattr(item, "__dict__"):  # factors
-            total += _FACTOR * item.nnz
         else:
             pending += vars(item).values() if hasattr(item, "__dict__") else ()
             pending += [item.__self__] if hasattr(item, "__self__") else ()

@@ -12,7 +12,7 @@ from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, write_attribute
 from ..objects.counting import renew_counts
 from ..objects.evaluated import POINTCLOUDS_SINCE, shown_as_own, shown_points
-from ..objects.groups import ROLES, group_weights, handle_names, has_group, role_group
+from ..objects.groups import ROLES, group_weights, handle_names, has_group
 from ..objects.modifiers import inputs_of, is_display, put_inputs, set_input
 from ..objects.result import check_writable
 from ..registration import Registration
@@ -156,7 +156,7 @@ def _points_of_nodes(context, obj):
 def _group_names(obj):
     """Names of the groups that tools take, and of the parts."""
     settings = obj.meshfree
-    names = {role_group(obj, role) for role in ROLES}
+    names = set(ROLES)
     names |= {*handle_names(obj), settings.deform.anchors, settings.boundary_group}
     kept = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
     names |= {group.name for group in kept if _SEGMENT.fullmatch(group.name)}

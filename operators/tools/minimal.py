@@ -6,7 +6,7 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 from ... import core
 from ...core import Cancelled, PointCloudError
 from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen
-from ..objects.options import laplacian_options
+from ..objects.options import default_options, laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.reading import read_points
 from ..objects.result import area_text
@@ -45,7 +45,7 @@ class MinimalSurface(Tool):
     def plan(self, context, obj):
         check_movable(obj, self.target)
         reading = read_points(context, obj)
-        options = laplacian_options(obj.meshfree)
+        options, motion = laplacian_options(obj.meshfree), default_options(obj.meshfree)
         fixed = reading.boundary
         if is_chosen(obj, self.group, FIXED):
             fixed = chosen_members(obj, self.group, "Fixed")
@@ -61,7 +61,7 @@ class MinimalSurface(Tool):
                         f'"{name}" has no boundary, so that its surface would shrink to nothing. Assign the points'
                         f' that stay to the {kind} "{FIXED}".'
                     )
-            settings = (reading.points, boundary, tolerance, steps, options)
+            settings = (reading.points, boundary, tolerance, steps, motion)
             film = cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
             gradients = None
             if carries:

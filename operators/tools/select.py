@@ -31,7 +31,6 @@ from ..objects.groups import (
     has_group,
     is_chosen,
     rivals,
-    role_group,
 )
 from ..objects.handlers import tell
 from ..objects.reading import obstacle, sharing_objects
@@ -323,7 +322,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
                     " look from the other side."
                 )
         role = self.role.title()
-        name = self.name or role_group(obj, role)
+        name = self.name or role
         check_assignable(obj, name, must_exist=self.action == "REMOVE")
         others = rivals(obj, role) if name == role and self.action != "REMOVE" else []
         for other in others:

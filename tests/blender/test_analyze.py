@@ -12,7 +12,7 @@ from tests.blender.clouds import RESULTS, add_object, attribute, local_points, r
 def expected(core, obj):
     """What the attributes should hold, by core, of the object's points in the world."""
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
-    laplacian = core.build_laplacian(local_points(obj) @ matrix.T, options=core.LaplacianOptions(orient=True))
+    laplacian = core.build_laplacian(local_points(obj) @ matrix.T)
     normals = laplacian.normals @ matrix
     squared = ((laplacian.points[:, None] - laplacian.points) ** 2).sum(axis=2)
     spacing = np.median(np.sqrt(np.sort(squared, axis=1)[:, 8] * np.pi / 8.0))
@@ -106,13 +106,25 @@ def test_scale_of_a_parent_counts(core):
 
 def test_settings_reach_core(core):
     obj = add_object(sphere_points())
-    settings = {"bandwidth": "GLOBAL", "neighbors": 60, "normals": "WPCA", "areas": "UNIFORM"}
+    settings = {"bandwidth": "GLOBAL", "neighbors": 60}
     for name, value in settings.items():
         setattr(obj.meshfree, name, value)
     bpy.ops.meshfree.analyze()
-    options = core.LaplacianOptions(bandwidth="global", neighbors=60, normals="wpca", areas="uniform", orient=True)
+    options = core.LaplacianOptions(bandwidth="global", neighbors=60)
     areas = core.build_laplacian(local_points(obj), options=options).areas
     assert_allclose(attribute(obj, "lb_area"), areas, rtol=1e-6)
+
+
+def test_settings_of_the_paper_reach_core(core):
+    obj = add_object(sphere_points())
+    settings = {"method": "PAPER", "neighbors": 60, "normals": "PCA", "areas": "UNIFORM", "denoise": True}
+    for name, value in settings.items():
+        setattr(obj.meshfree, name, value)
+    bpy.ops.meshfree.spectrum(count=3)
+    settings = {"neighbors": 60, "normals": "pca", "areas": "uniform", "denoise": True}
+    laplacian = core.paper.build_laplacian(local_points(obj), **settings)
+    assert_allclose(attribute(obj, "lb_area"), laplacian.areas, rtol=1e-6)
+    assert_allclose(obj["lb_eigenvalues"].to_list(), laplacian.eigenpairs(3).eigenvalues, rtol=1e-9, atol=1e-9)
 
 
 def test_another_object_can_be_named_by_a_script(core):

@@ -58,7 +58,7 @@ def test_vertex_group_names_the_boundary(core, boundaries):
     obj.meshfree.boundary_group, obj.meshfree.boundary = "Boundary", boundaries
     bpy.ops.meshfree.analyze()
     assert (attribute(obj, "lb_boundary") == outermost).all()
-    options = core.LaplacianOptions(orient=True, boundary=boundaries.lower())
+    options = core.LaplacianOptions(boundary=boundaries.lower())
     laplacian = core.build_laplacian(local_points(obj), options=options, boundary=np.flatnonzero(outermost))
     assert_allclose(attribute(obj, "lb_area"), laplacian.areas, rtol=1e-6)
 

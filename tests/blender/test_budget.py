@@ -61,7 +61,7 @@ def test_values_at_the_subset_are_those_of_its_operator_and_others_take_theirs_f
     bpy.ops.meshfree.analyze()
     points = local_points(obj)
     subset = core.blue_noise_subset(points, 1000)
-    laplacian = core.build_laplacian(points[subset], options=core.LaplacianOptions(orient=True))
+    laplacian = core.build_laplacian(points[subset])
     built = SimpleNamespace(laplacian=laplacian, mean_curvature=core.mean_curvature(laplacian))
     nearest = core.Prolongation(points, subset, laplacian.normals, laplacian.component).nearest
     assert obj.meshfree.subset_count == len(subset)

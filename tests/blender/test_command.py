@@ -68,7 +68,7 @@ def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
     FORMATS[name](tmp_path / name)
     code, lines = run("analyze", tmp_path / name, "--out", tmp_path / "out.npz", "--modes", 4)
     assert code == 0, lines
-    laplacian = core.build_laplacian(POINTS, options=core.LaplacianOptions(orient=True))
+    laplacian = core.build_laplacian(POINTS)
     spectrum = laplacian.eigenpairs(4)
     (line,) = lines
     assert line["file"] == str(tmp_path / name)
@@ -170,7 +170,7 @@ def test_stiffness_of_the_arrays(core, run, tmp_path):
 
     np.save(tmp_path / "in.npy", POINTS)
     run("analyze", tmp_path / "in.npy", "--out", tmp_path / "out.npz")
-    laplacian = core.build_laplacian(POINTS, options=core.LaplacianOptions(orient=True))
+    laplacian = core.build_laplacian(POINTS)
     difference = abs(load_npz(tmp_path / "out.npz") - laplacian.stiffness).max()
     assert difference < 1e-3 * laplacian.stiffness.diagonal().max()
 
@@ -198,11 +198,15 @@ def test_without_output_it_only_prints(run, tmp_path):
 
 def test_settings(core, run, tmp_path):
     write_text(" ")(tmp_path / "in.xyz")
-    given = ("--neighbors", 60, "--bandwidth", "global", "--no-symbol-correction")
+    given = ("--neighbors", 60, "--bandwidth", "global")
     code, lines = run("analyze", tmp_path / "in.xyz", "--modes", 3, *given)
     assert code == 0
-    options = core.LaplacianOptions(neighbors=60, bandwidth="global", symbol_correction=False, orient=True)
+    options = core.LaplacianOptions(neighbors=60, bandwidth="global")
     spectrum = core.build_laplacian(POINTS, options=options).eigenpairs(3)
+    assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
+    code, lines = run("analyze", tmp_path / "in.xyz", "--modes", 3, "--method", "paper", "--neighbors", 60)
+    assert code == 0
+    spectrum = core.paper.build_laplacian(POINTS, neighbors=60).eigenpairs(3)
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
 
 

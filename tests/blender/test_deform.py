@@ -117,7 +117,7 @@ class TestFollowing:
         before = local_points(strip)
         lift(bind(), 0.7)
         handles, anchors = is_end(before), before[:, 0] < 0.25
-        laplacian = core.build_laplacian(before, options=core.LaplacianOptions(orient=True))
+        laplacian = core.build_laplacian(before)
         deformer = core.Deformer(laplacian, np.flatnonzero(handles), np.flatnonzero(anchors))
         assert_allclose(shown_points(strip), deformer.solve(before[handles] + (0.0, 0.0, 0.7)), atol=1e-4)
 
@@ -279,7 +279,7 @@ class TestManyPoints:
 
     def expected(self, core, points):
         """What all points do when the handles go up by 0.7."""
-        laplacian = core.build_laplacian(points, options=core.LaplacianOptions(orient=True))
+        laplacian = core.build_laplacian(points)
         deformer = core.Deformer(laplacian, is_end(points), points[:, 0] < 0.25)
         return deformer.solve(points[deformer.handles] + (0.0, 0.0, 0.7)) - points
 

@@ -482,7 +482,7 @@ class TestExport:
         assert np.abs(arrays["points"] - SURVEY).max() <= STEP
         assert_allclose(arrays["areas"], attribute(obj, "lb_area"), rtol=1e-6)
         assert_array_equal(arrays["eigenvalues"], obj["lb_eigenvalues"])
-        laplacian = core.build_laplacian(local_points(obj), options=core.LaplacianOptions(orient=True))
+        laplacian = core.build_laplacian(local_points(obj))
         assert abs(stiffness - laplacian.stiffness).max() <= 1e-9 * abs(stiffness).max()
         vectors = arrays["eigenvectors"]
         assert vectors.shape == (1000, 5)

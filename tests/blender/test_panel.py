@@ -269,12 +269,16 @@ def test_panel_tells_of_parts_boundaries_and_points_left_out_where_there_are_any
     assert found == {"Components": "2", "Boundary Points": f"{outermost.sum()}", "Points Left Out": "1"}
 
 
-def test_panel_shows_every_setting_that_changes_results(extension):
+@pytest.mark.parametrize("method", ["DEFAULT", "PAPER"])
+def test_panel_shows_every_setting_that_changes_results(extension, method):
     options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
-    add_object(sphere_points()).meshfree.boundary_group = "Missing"
-    texts = draw()
-    drawn = (*options.NAMES, "boundary_group", "point_budget", "most_points")
+    settings = add_object(sphere_points()).meshfree
+    settings.method, settings.boundary_group = method, "Missing"
+    texts, own = draw(), options.settings_values(settings)
+    drawn = (*own, "point_budget", "most_points")
     assert [name for name in drawn if texts.count(name) != 1] == []
+    assert texts.count("boundary_group") == (method == "DEFAULT")
+    assert [name for name in options.NAMES if name in texts and name not in own] == []
 
 
 @pytest.mark.parametrize(
@@ -377,17 +381,16 @@ def test_panel_while_something_runs(extension, monkeypatch):
     assert "Filter: 25%" in texts
 
 
-def test_every_option_of_core_is_a_setting_with_its_default(extension, core):
+@pytest.mark.parametrize(("method", "kind"), [("DEFAULT", "LaplacianOptions"), ("PAPER", "PaperOptions")])
+def test_every_option_of_core_is_a_setting_with_its_default(extension, core, method, kind):
     options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
-    obj = add_object(sphere_points())
-    assert options.laplacian_options(obj.meshfree) == core.LaplacianOptions(orient=True)
-    properties = obj.meshfree.bl_rna.properties
-    for name, value in options.settings_values(obj.meshfree).items():
-        if properties[name].type == "ENUM":
-            for choice in properties[name].enum_items:
-                core.LaplacianOptions(**{name: choice.identifier.lower()})
-        else:
-            assert getattr(core.LaplacianOptions(), name) == value
+    settings, kind = add_object(sphere_points()).meshfree, getattr(core, kind)
+    settings.method = method
+    assert options.laplacian_options(settings) == kind()
+    for name in set(options.settings_values(settings)) - {"method"}:
+        prop = settings.bl_rna.properties[name]
+        for choice in prop.enum_items if prop.type == "ENUM" else ():
+            kind(**{name: choice.identifier.lower()})
 
 
 def test_tab():

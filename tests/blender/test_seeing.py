@@ -696,12 +696,8 @@ def test_presets_are_options_of_core(extension, core, preset):
     obj = add_object(sphere_points())
     obj.meshfree.neighbors, obj.meshfree.regularization = 33, 0.5
     bpy.ops.meshfree.apply_preset(preset=preset)
-    expected = options.PRESETS[preset]
-    found = options.laplacian_options(obj.meshfree)
-    assert {name: getattr(found, name) for name in options.NAMES} == {
-        name: getattr(expected, name) for name in options.NAMES
-    }
-    assert options.PRESETS["PAPER"] == core.LaplacianOptions.paper()
+    assert options.laplacian_options(obj.meshfree) == options.PRESETS[preset]
+    assert obj.meshfree.regularization == pytest.approx(core.PaperOptions().regularization)
 
 
 def test_own_presets_are_files_in_the_users_folder(extension, installed):

@@ -95,15 +95,9 @@ OPTIONS = {
     "bandwidth": ["adaptive", "local", "global"],
     "neighbors": [6, 10, 20, 40, 100],
     "bandwidth_factor": [0.4, 0.6, 1.0, 2.0],
-    "normals": ["quadric", "wpca", "pca"],
-    "orient": [True, False],
-    "areas": ["fast", "regularized", "constrained", "uniform"],
-    "regularization": [1e-9, 1e-3, 10.0],
     "boundary": ["auto", "off"],
     "sheets": [True, False],
-    "projection": ["auto", "off", "quadric", "plane"],
-    "curvature_correction": [True, False],
-    "symbol_correction": [True, False],
+    "projection": ["auto", "off", "quadric"],
 }
 JUNK = [
     None,

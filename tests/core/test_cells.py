@@ -13,8 +13,9 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
+from core.geometry.boundary import no_boundary
 from core.geometry.cells import measure_cells
-from core.geometry.cloud import read_cloud
+from core.geometry.cloud import read_cloud, read_surface
 from core.geometry.nearest import find_nearest
 from core.options import LaplacianOptions
 
@@ -75,11 +76,15 @@ def test_the_reach_is_that_of_the_wider_spacing():
 
 def test_curvature_makes_cells_smaller_than_in_the_plane():
     points = random_sphere(300)
-    cloud = read_cloud(points, LaplacianOptions())
-    flat = read_cloud(points, LaplacianOptions(curvature_correction=False))
-    unit = cloud.scaled.scale**2
-    assert cloud.cell_areas.sum() * unit == pytest.approx(4.0 * np.pi, rel=2e-3)
-    assert flat.cell_areas.sum() * unit > 4.0 * np.pi * 1.005
+    surface = read_surface(points, LaplacianOptions(), lambda *_: None)[1]
+    sample, quadrics = surface.sample, surface.quadrics
+    curved, flat = (
+        measure_cells(sample.nearest, quadrics.normals, k, no_boundary(300), sample.component).areas.sum()
+        * sample.scaled.scale**2
+        for k in (quadrics.gaussian_curvature, np.zeros(300))
+    )
+    assert curved == pytest.approx(4.0 * np.pi, rel=2e-3)
+    assert flat > 4.0 * np.pi * 1.005
 
 
 def test_without_neighbors_a_cell_ends_a_spacing_away():

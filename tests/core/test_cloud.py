@@ -13,7 +13,6 @@ from core.geometry.cells import measure_cells
 from core.geometry.cloud import (
     divide_components,
     divide_sheets,
-    final_normals,
     fit_surface,
     leave_outliers,
     locate_boundary,
@@ -86,7 +85,7 @@ def test_noise_is_removed_where_it_is_measured():
     assert remove_noise(surface, core.LaplacianOptions(projection="off")) is surface
     clean = fit_surface(sample_of(fibonacci_sphere(3000)), True)
     assert remove_noise(clean, core.LaplacianOptions()) is clean
-    assert remove_noise(clean, core.LaplacianOptions(projection="plane")) is not clean
+    assert remove_noise(clean, core.LaplacianOptions(projection="quadric")) is not clean
 
 
 def test_noise_is_removed_on_the_noisy_side_alone():
@@ -141,19 +140,10 @@ class TestBoundary:
             self.located(points, boundary=[0, 1, 2])
 
 
-def test_normals_are_the_given_ones_or_those_asked_for():
-    cloud = read_cloud(fibonacci_sphere(900), core.LaplacianOptions())
-    sample = sample_of(fibonacci_sphere(900))
-    outward = sample.nearest.points * sample.scaled.scale
-
-    def normals(given, **settings):
-        return final_normals(sample.nearest, cloud.pairs, given, outward, core.LaplacianOptions(**settings))
-
-    assert normals(-outward) is not None
-    np.testing.assert_array_equal(normals(-outward), -outward)
-    np.testing.assert_array_equal(normals(None), outward)
-    np.testing.assert_allclose(normals(None, normals="wpca", orient=True), outward, atol=0.02)
-    assert len(np.unique(np.sign(np.sum(normals(None, normals="pca") * outward, axis=1)))) == 2
+def test_normals_are_the_given_ones():
+    points = fibonacci_sphere(900)
+    cloud = read_cloud(points, core.LaplacianOptions(), -points)
+    np.testing.assert_allclose(cloud.normals, -points[cloud.scaled.first], rtol=1e-15)
 
 
 def test_the_walk_is_these_stages():

@@ -25,7 +25,7 @@ OUT = slice(900, 904)
 @pytest.fixture(scope="module")
 def parts():
     """Two components, the small one first, and four lone points between them."""
-    return core.build_laplacian(np.concatenate([SMALL, LONE, LARGE]), options=LaplacianOptions(orient=True))
+    return core.build_laplacian(np.concatenate([SMALL, LONE, LARGE]))
 
 
 @pytest.fixture(scope="module")
@@ -207,12 +207,12 @@ class TestLonePoints:
             assert np.all(np.isfinite(values))
 
     def test_the_rest_is_what_it_is_without_them(self, parts):
-        without = core.build_laplacian(np.concatenate([SMALL, LARGE]), options=LaplacianOptions(orient=True))
+        without = core.build_laplacian(np.concatenate([SMALL, LARGE]))
         np.testing.assert_allclose(np.delete(parts.areas, OUT), without.areas, rtol=1e-7)
         np.testing.assert_allclose(np.delete(parts.normals, OUT, axis=0), without.normals, atol=1e-9)
 
     def test_areas_and_normals_alone(self, parts):
-        options = LaplacianOptions(orient=True)
+        options = LaplacianOptions()
         np.testing.assert_array_equal(core.estimate_areas(parts.points, options=options), parts.areas)
         np.testing.assert_array_equal(core.estimate_normals(parts.points, options), parts.normals)
 

@@ -11,14 +11,10 @@ def torus():
     return core.build_laplacian(torus_points(2500))
 
 
-@pytest.fixture(scope="module", params=["default", "plain", "paper"])
+@pytest.fixture(scope="module", params=["default", "paper"])
 def any_operator(request):
-    options = {
-        "default": core.LaplacianOptions(),
-        "plain": core.LaplacianOptions(curvature_correction=False, normals="wpca"),
-        "paper": core.LaplacianOptions.paper(),
-    }[request.param]
-    return core.build_laplacian(random_sphere(1000) * [1.0, 0.9, 0.7], options=options)
+    build = {"default": core.build_laplacian, "paper": core.paper.build_laplacian}[request.param]
+    return build(random_sphere(1000) * [1.0, 0.9, 0.7])
 
 
 class TestStructure:
@@ -58,7 +54,7 @@ class TestPaper:
     def errors(cls):
         points = icosahedral_sphere(28)
         assert len(points) == 7842
-        laplacian = core.build_laplacian(points, options=core.LaplacianOptions.paper())
+        laplacian = core.paper.build_laplacian(points)
         return sphere_errors(laplacian), laplacian.areas.sum()
 
     def test_figure_3_uniform_sphere_with_wpca_normals(self, errors):
@@ -92,17 +88,12 @@ class TestAccuracy:
         sine = points[:, 2] / minor
         # z = r sin v has the Laplacian (1 / (w r^2)) d/dv (w d/dv z) with w = R + r cos v.
         exact = -sine / minor - sine * cosine / radius
-        errors = {
-            corrected: relative(
-                core.build_laplacian(points, options=core.LaplacianOptions(curvature_correction=corrected)).apply(
-                    points[:, 2]
-                ),
-                exact,
-            )
-            for corrected in (True, False)
-        }
-        assert errors[True] < 0.02
-        assert errors[True] < 0.5 * errors[False]
+        corrected, plain = (
+            relative(build(points).apply(points[:, 2]), exact)
+            for build in (core.build_laplacian, core.paper.build_laplacian)
+        )
+        assert corrected < 0.02
+        assert corrected < 0.5 * plain
 
     def test_symbol_correction_helps(self):
         laplacian = core.build_laplacian(fibonacci_sphere(3000))
@@ -166,7 +157,7 @@ class TestMeanCurvature:
     @pytest.mark.parametrize("radius", [0.5, 20.0])
     def test_sphere(self, radius):
         points = radius * fibonacci_sphere(3000) + [1.0, 2.0, 3.0]
-        laplacian = core.build_laplacian(points, options=core.LaplacianOptions(orient=True))
+        laplacian = core.build_laplacian(points)
         np.testing.assert_allclose(core.mean_curvature(laplacian), 1.0 / radius, rtol=2e-2)
 
     def test_inward_normals_turn_the_sign(self):
@@ -174,13 +165,13 @@ class TestMeanCurvature:
         assert np.all(core.mean_curvature(core.build_laplacian(points, normals=-points)) < -0.9)
 
     def test_torus(self, torus):
-        laplacian = core.build_laplacian(torus_points(4000), options=core.LaplacianOptions(orient=True))
+        laplacian = core.build_laplacian(torus_points(4000))
         radius = np.linalg.norm(laplacian.points[:, :2], axis=1)
         exact = (2.0 * radius - 1.0) / (2.0 * 0.4 * radius)
         assert relative(core.mean_curvature(laplacian), exact) < 0.03
 
     def test_up_to_the_boundary_of_a_hemisphere(self):
-        laplacian = core.build_laplacian(hemisphere_random(1500), options=core.LaplacianOptions(orient=True))
+        laplacian = core.build_laplacian(hemisphere_random(1500))
         assert laplacian.boundary.any()
         np.testing.assert_allclose(core.mean_curvature(laplacian), 1.0, rtol=6e-2)
 

@@ -68,7 +68,7 @@ def test_support_may_hold_every_point():
 def test_global_length_is_the_mean_distance_to_the_hundredth_neighbor():
     points = random_sphere(500)
     distance = np.sort(cdist(points, points), axis=1)[:, 100]  # column 0 is the point itself
-    lengths = smoothing_lengths(find_nearest(points), LaplacianOptions.paper())
+    lengths = smoothing_lengths(find_nearest(points), LaplacianOptions(bandwidth="global"))
     np.testing.assert_allclose(lengths, distance.mean(), rtol=1e-12)
 
 

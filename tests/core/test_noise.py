@@ -22,6 +22,7 @@ from core.geometry.nearest import find_nearest
 from core.geometry.noise import near_misfit, noise_level, project_points
 from core.geometry.sheets import fit_sheets
 from core.options import LaplacianOptions
+from core.paper.normals import tangent_planes
 
 COUNT = 2000
 LEVEL = np.full(COUNT, 0.3)
@@ -49,9 +50,9 @@ def measured(points):
     return noise_level(fitted.nearest, near, fitted.mixed.misfit, fitted.quadrics.misfit).mean()
 
 
-def projected(points, method, noise):
+def projected(points, noise):
     """All of some points, projected."""
-    return project_points(cKDTree(points), np.arange(len(points)), method, noise)
+    return project_points(cKDTree(points), np.arange(len(points)), noise)
 
 
 def off_sphere(points):
@@ -96,33 +97,32 @@ class TestLevel:
 
 class TestProjection:
     def test_quadrics_bring_the_points_back(self, noisy):
-        once = projected(noisy, "quadric", LEVEL)
+        once = projected(noisy, LEVEL)
         assert off_sphere(once) < 0.35 * off_sphere(noisy)
         assert off_sphere(projected(once, "quadric", LEVEL)) < 0.9 * off_sphere(once)
 
     def test_planes_too_but_they_cut_the_bend(self):
         noisy = 3.0 * noisy_sphere(COUNT, 0.5)
-        flat = projected(noisy, "plane", LEVEL) / 3.0
+        flat = tangent_planes(noisy) / 3.0
         assert off_sphere(flat) < 0.7 * off_sphere(noisy / 3.0)
         radius = np.linalg.norm(flat, axis=1)
         assert radius.mean() < 1.0 - 3e-3
 
-    @pytest.mark.parametrize("method", ["quadric", "plane"])
-    def test_points_of_a_plane_stay_where_they_are(self, method):
+    def test_points_of_a_plane_stay_where_they_are(self):
         points = square_random(800)
-        np.testing.assert_allclose(projected(points, method, np.full(800, 0.1)), points, atol=1e-9)
+        for moved in (projected(points, np.full(800, 0.1)), tangent_planes(points)):
+            np.testing.assert_allclose(moved, points, atol=1e-9)
 
     def test_a_quadric_hardly_moves_clean_points(self):
         points = torus_points(3000)
         spacing = np.sqrt(4.0 * np.pi**2 * 0.4 / 3000)
-        moved = projected(points, "quadric", np.full(3000, 0.3)) - points
+        moved = projected(points, np.full(3000, 0.3)) - points
         assert np.linalg.norm(moved, axis=1).max() < 0.1 * spacing
 
-    @pytest.mark.parametrize("method", ["quadric", "plane"])
-    def test_some_points_go_where_they_go_with_all(self, noisy, method):
+    def test_some_points_go_where_they_go_with_all(self, noisy):
         rows, level = np.arange(5, COUNT, 7), np.linspace(0.0, 0.6, COUNT)
-        some = project_points(cKDTree(noisy), rows, method, level)
-        np.testing.assert_allclose(some, projected(noisy, method, level)[rows], atol=1e-12)
+        some = project_points(cKDTree(noisy), rows, level)
+        np.testing.assert_allclose(some, projected(noisy, level)[rows], atol=1e-12)
 
 
 class TestOperator:
@@ -153,11 +153,10 @@ class TestOperator:
     def test_area(self, noisy, laplacian):
         areas = {
             projection: core.estimate_areas(noisy, options=LaplacianOptions(projection=projection)).sum()
-            for projection in ("quadric", "plane", "off")
+            for projection in ("quadric", "off")
         }
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
         assert areas["quadric"] == pytest.approx(4.0 * np.pi, rel=1e-2)
-        assert areas["plane"] == pytest.approx(4.0 * np.pi, rel=6e-2)
         assert areas["off"] > 1.15 * 4.0 * np.pi
 
     def test_clean_points_are_taken_as_they_are(self):
@@ -168,14 +167,19 @@ class TestOperator:
 
     def test_always_if_asked_for(self):
         points = random_sphere(900)
-        plain, quadric, plane = (
-            core.build_laplacian(points, options=LaplacianOptions(projection=p)) for p in ("off", "quadric", "plane")
+        plain, quadric = (
+            core.build_laplacian(points, options=LaplacianOptions(projection=p)) for p in ("off", "quadric")
         )
         assert np.any(quadric.areas != plain.areas)
         np.testing.assert_allclose(quadric.areas.sum(), plain.areas.sum(), rtol=4e-3)
-        # Planes lie inside the sphere.
+        assert quadric.notices == []
+
+    def test_by_planes_that_lie_inside_the_sphere(self):
+        plain, plane = (
+            core.paper.build_laplacian(random_sphere(900), denoise=d, areas="uniform") for d in (False, True)
+        )
         assert plane.areas.sum() < 0.99 * plain.areas.sum()
-        assert quadric.notices == plane.notices == []
+        assert plane.notices == plain.notices
 
     @pytest.mark.parametrize("level", [1.0, 1.5, 2.0, 3.0])
     def test_noise_beyond_the_spacing_is_smoothed_and_told(self, level):

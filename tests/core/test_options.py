@@ -5,15 +5,17 @@ import pytest
 
 import core
 
-OPTIONS = [field.name for field in dataclasses.fields(core.LaplacianOptions)]
+OPTIONS = [
+    (kind, field.name) for kind in (core.LaplacianOptions, core.PaperOptions) for field in dataclasses.fields(kind)
+]
 NONE_OF_THEM = [None, np.array([1, 2]), [1], "x", -1, np.nan, np.inf, {}, 1j]
 
 
 @pytest.mark.parametrize("value", NONE_OF_THEM, ids=repr)
-@pytest.mark.parametrize("name", OPTIONS)
-def test_what_no_option_can_be_is_told(name, value):
+@pytest.mark.parametrize(("kind", "name"), OPTIONS)
+def test_what_no_option_can_be_is_told(kind, name, value):
     with pytest.raises(core.PointCloudError, match=f"Option {name} is"):
-        core.LaplacianOptions(**{name: value})
+        kind(**{name: value})
 
 
 def test_numbers_and_truth_values_of_numpy_are_some():

@@ -175,7 +175,7 @@ def test_ours_is_the_product():
     np.testing.assert_array_equal(operator.apply(x), laplacian.apply(x))
     np.testing.assert_array_equal(operator.eigenvalues(9), laplacian.eigenpairs(9).eigenvalues)
     np.testing.assert_array_equal(operator.areas, laplacian.areas)
-    paper = core.build_laplacian(points, options=core.LaplacianOptions.paper())
+    paper = core.paper.build_laplacian(points)
     np.testing.assert_array_equal(build("ours_paper", points).apply(x), paper.apply(x))
 
 

@@ -1,3 +1,5 @@
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -60,13 +62,12 @@ def test_collinear_points():
         core.build_laplacian(np.linspace(0.0, 1.0, 500)[:, None] * [1.0, 2.0, 3.0])
 
 
-@pytest.mark.parametrize("normals", ["quadric", "wpca", "pca"])
-def test_points_along_a_curve(normals):
+@pytest.mark.parametrize("build", [core.build_laplacian, core.paper.build_laplacian], ids=["default", "paper"])
+def test_points_along_a_curve(build):
     angle = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
     circle = np.column_stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(3.0 * angle)])
-    options = core.LaplacianOptions(normals=normals, curvature_correction=normals == "quadric")
     with pytest.raises(core.NotASurfaceError, match="along a curve"):
-        core.build_laplacian(circle, options=options)
+        build(circle)
 
 
 def test_a_small_component_is_left_out_with_a_notice(sphere):
@@ -161,12 +162,14 @@ def test_sizes_at_the_bounds_follow_the_law_of_scale(sphere, size):
 
 
 @pytest.mark.parametrize(("rings", "meridians"), [(9, 18), (13, 24), (16, 18)])
-@pytest.mark.parametrize("projection", ["auto", "plane"])
-def test_globes(rings, meridians, projection):
+@pytest.mark.parametrize(
+    "build", [core.build_laplacian, partial(core.paper.build_laplacian, areas="uniform", denoise=True)]
+)
+def test_globes(rings, meridians, build):
     """Their poles are many points at one place but for rounding, and have many neighbours at one distance."""
     up, around = np.meshgrid(np.linspace(0.0, np.pi, rings), 2.0 * np.pi * np.arange(meridians) / meridians)
     points = np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], axis=2).reshape(-1, 3)
-    laplacian = core.build_laplacian(points, options=core.LaplacianOptions(projection=projection))
+    laplacian = build(points)
     assert np.all(np.isfinite(laplacian.normals))
     assert np.all(laplacian.areas > 0.0)
 
@@ -224,7 +227,7 @@ class TestDuplicates:
 
 class TestGivenNormals:
     def test_they_are_used_as_they_are(self, sphere):
-        laplacian = core.build_laplacian(sphere, normals=-2.0 * sphere, options=core.LaplacianOptions(orient=True))
+        laplacian = core.build_laplacian(sphere, normals=-2.0 * sphere)
         np.testing.assert_allclose(laplacian.normals, -sphere, atol=1e-12)
 
     def test_wrong_length(self, sphere):
@@ -246,8 +249,6 @@ class TestGivenNormals:
         {"neighbors": 20.5},
         {"bandwidth_factor": 0.0},
         {"bandwidth_factor": float("nan")},
-        {"areas": "voronoi"},
-        {"regularization": -1.0},
         {"boundary": "on"},
         {"projection": "twice"},
         {"neighbors": 10, "bandwidth_factor": 0.2},

@@ -8,7 +8,7 @@ from benchmarks.samplings import fibonacci_sphere, random_sphere, uneven_sphere
 from core.geometry.boundary import no_boundary
 from core.geometry.cloud import read_cloud
 from core.operator.areas import KernelMatrix
-from core.options import LaplacianOptions
+from core.options import LaplacianOptions, PaperOptions
 from core.paper.areas import TAU, algorithm_1, constrained_areas, regularized_areas
 from core.paper.operator import unsymmetrized_operator
 
@@ -59,7 +59,7 @@ class TestAlgorithm1:
 
     def test_feasible_start_is_kept(self):
         # The paper: on the uniform sphere the solution of eq. (7) is positive, and no iteration is made.
-        pairs = read_cloud(fibonacci_sphere(500), LaplacianOptions.paper()).pairs
+        pairs = read_cloud(fibonacci_sphere(500), PaperOptions().cloud).pairs
         matrix, target = KernelMatrix(pairs, pairs.distance, no_boundary(500)), np.ones(500)
         start = regularized_areas(matrix, target, 1e-3).areas
         np.testing.assert_allclose(algorithm_1(matrix, target, start).areas, start, rtol=1e-5)
@@ -73,11 +73,10 @@ class TestAlgorithm1:
 
 def eq_5_on_the_sphere(count):
     """The matrix of eq. (5), and -x / 2 of the unit sphere whose Laplacian is x."""
-    options = LaplacianOptions(bandwidth="global", bandwidth_factor=0.55, curvature_correction=False)
     points = fibonacci_sphere(count)
-    cloud = read_cloud(points, options)
+    cloud = read_cloud(points, PaperOptions(neighbors=30).cloud)
     scaled, pairs = cloud.scaled, cloud.pairs
-    areas = core.estimate_areas(points, options=options)[scaled.first] / scaled.scale**2
+    areas = core.paper.build_laplacian(points, neighbors=30).areas[scaled.first] / scaled.scale**2
     matrix = unsymmetrized_operator(pairs, points[scaled.first], areas) / scaled.scale**2
     return matrix, points[scaled.first, 0]
 
@@ -96,11 +95,10 @@ class TestUnsymmetrizedOperator:
         assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
 
     def test_is_not_symmetric_for_the_areas_where_normals_differ(self):
-        options = LaplacianOptions(curvature_correction=False)
         points = random_sphere(600) * [1.0, 0.7, 0.4]
-        cloud = read_cloud(points, options)
+        cloud = read_cloud(points, PaperOptions().cloud)
         scaled, pairs = cloud.scaled, cloud.pairs
-        laplacian = core.build_laplacian(points, options=options)
+        laplacian = core.paper.build_laplacian(points)
         areas = laplacian.areas[scaled.first] / scaled.scale**2
         weak = unsymmetrized_operator(pairs, laplacian.normals[scaled.first], areas).multiply(areas[:, None])
         assert abs(weak - weak.T).max() > 1e-3 * abs(weak).max()

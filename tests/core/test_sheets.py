@@ -165,7 +165,7 @@ class TestPairs:
 class TestOrientation:
     def test_outward_on_a_closed_plate(self):
         points, face, inset, _ = closed_plate(30)
-        normals = core.estimate_normals(points, LaplacianOptions(orient=True))
+        normals = core.estimate_normals(points)
         outward = np.where(face == 1, 1.0, -1.0) * normals[:, 2]
         assert np.all(outward[(face >= 0) & (inset > 0.0)] > 0.0)
         np.testing.assert_allclose(outward[(face >= 0) & (inset > 3.0)], 1.0, atol=1e-6)
@@ -176,7 +176,7 @@ class TestOrientation:
     def test_outward_on_a_thin_capsule(self, radius):
         points, along = sausage(3000, radius=radius)
         axis = np.column_stack([np.clip(along, 0.0, 6.0), 0.0 * along, 0.0 * along])
-        normals = core.estimate_normals(points, LaplacianOptions(orient=True))
+        normals = core.estimate_normals(points)
         assert np.einsum("ij,ij->i", normals, points - axis).min() > 0.9 * radius
 
     def test_outward_on_a_bent_capsule(self):
@@ -187,7 +187,7 @@ class TestOrientation:
         inside = np.clip(along, 0.0, 6.0)
         straight = np.minimum(inside - arm, 0.0) - np.maximum(inside - arm - np.pi * bend, 0.0)
         axis = np.column_stack([straight + bend * np.sin(turn), bend * np.cos(turn), 0.0 * along])
-        normals = core.estimate_normals(points, LaplacianOptions(orient=True))
+        normals = core.estimate_normals(points)
         assert np.einsum("ij,ij->i", normals, points - axis).min() > 0.7 * 0.25
 
 

@@ -120,7 +120,7 @@ def test_no_copy_of_a_multiple_eigenvalue_is_missed(symmetric_sphere, count):
 
 def test_a_kernel_that_is_far_too_wide_still_has_its_spectrum():
     # Weyl's estimate is far below these eigenvalues, so the solver's first cut is too low.
-    laplacian = core.build_laplacian(fibonacci_sphere(500), options=core.LaplacianOptions.paper())
+    laplacian = core.paper.build_laplacian(fibonacci_sphere(500))
     assert any("too wide" in notice for notice in laplacian.notices)
     root = 1.0 / np.sqrt(laplacian.areas)
     dense = np.linalg.eigvalsh(root[:, None] * laplacian.stiffness.toarray() * root)
@@ -128,7 +128,7 @@ def test_a_kernel_that_is_far_too_wide_still_has_its_spectrum():
 
 
 def test_the_paper_setting_is_raw():
-    laplacian = core.build_laplacian(fibonacci_sphere(3000), options=core.LaplacianOptions.paper())
+    laplacian = core.paper.build_laplacian(fibonacci_sphere(3000))
     assert laplacian.notices == []
     np.testing.assert_array_equal(laplacian.eigenpairs(4).eigenvalues, laplacian.eigenpairs(4, raw=True).eigenvalues)
 

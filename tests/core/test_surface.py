@@ -14,7 +14,6 @@ from benchmarks.samplings import (
 )
 from core.geometry.nearest import find_nearest
 from core.geometry.quadrics import fit_quadrics, frames
-from core.options import LaplacianOptions
 
 
 def fit(points):
@@ -129,8 +128,3 @@ class TestGaussianCurvature:
         for points, expected in ((random_sphere(1500), 4.0 * np.pi), (torus_points(3000), 0.0)):
             laplacian = core.build_laplacian(points)
             assert laplacian.areas @ laplacian.gaussian_curvature == pytest.approx(expected, abs=0.5)
-
-    def test_zero_where_it_is_not_asked_for(self):
-        for options in (LaplacianOptions(curvature_correction=False), LaplacianOptions.paper()):
-            laplacian = core.build_laplacian(random_sphere(600), options=options)
-            assert np.all(laplacian.gaussian_curvature == 0.0)

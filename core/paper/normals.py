@@ -1,0 +1,84 @@
+"""Normals by principal component analysis, eq. (9), and what the paper does against noise by such planes."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..algebra import blocks, on_all_cores
+from ..errors import NotASurfaceError
+from ..geometry import fading_weights
+from ..kernel import kernel
+
+_AROUND = 90  # neighbours of a plane that a point is taken onto
+_BLOCK = 1 << 12  # points taken at one time
+
+
+def covariance_normals(pairs, weighted=True):
+    """Estimate unit normals by (weighted) principal component analysis, eq. (9).
+
+    Parameters
+    ----------
+    pairs : Pairs
+        Of m distinct points.
+    weighted : bool
+        Weigh by the kernel W_h (WPCA) or count every neighbour alike (PCA).
+
+    Returns
+    -------
+    ndarray, (m, 3)
+        Unit normals of arbitrary sign: the direction of least variance.
+
+    Raises
+    ------
+    NotASurfaceError
+        The points of many neighbourhoods lie along a curve.
+    """
+    points = pairs.points
+    if weighted:
+        weights = pairs.half(kernel(pairs.distance / pairs.mean(pairs.lengths)))
+        own = kernel(0.0)
+    else:
+        weights = pairs.half(np.ones(len(pairs.first)))
+        own = 1.0
+    axes = np.triu_indices(3)
+    moments = np.column_stack([np.ones(len(points)), points, points[:, axes[0]] * points[:, axes[1]]])
+    moments = own * moments + weights @ moments + weights.T @ moments
+    moments /= moments[:, :1]
+    mean = moments[:, 1:4]
+    covariance = np.empty((len(points), 3, 3))
+    covariance[:, axes[0], axes[1]] = covariance[:, axes[1], axes[0]] = (
+        moments[:, 4:] - mean[:, axes[0]] * mean[:, axes[1]]
+    )
+    variances, directions = np.linalg.eigh(covariance)
+    curve = np.count_nonzero(variances[:, 1] < 5e-3 * variances[:, 2])
+    if curve > 0.01 * len(points):
+        raise NotASurfaceError(
+            f"Around {curve} of {len(points)} points the neighbors lie along a curve, so there is no tangent"
+            " plane. Use points of a surface."
+        )
+    return np.ascontiguousarray(directions[:, :, 0])
+
+
+def tangent_planes(points):
+    """Take every point onto the plane through its neighbours, as section 6 does for noisy points.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+
+    Returns
+    -------
+    ndarray, (n, 3)
+    """
+    tree, result = cKDTree(points), np.empty_like(points)
+
+    def project(part):
+        distance, index = tree.query(points[part], k=min(_AROUND + 1, len(points)))
+        weight = fading_weights(distance)
+        weight /= weight.sum(axis=1, keepdims=True)
+        mean = np.einsum("ik,ikc->ic", weight, points[index])
+        centered = points[index] - mean[:, None]
+        normal = np.linalg.eigh(np.swapaxes(weight[:, :, None] * centered, 1, 2) @ centered)[1][:, :, 0]
+        result[part] = points[part] + np.einsum("ic,ic->i", mean - points[part], normal)[:, None] * normal
+
+    on_all_cores(project, blocks(len(points), _BLOCK))
+    return result
