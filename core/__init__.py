@@ -21,6 +21,7 @@ from .errors import BrokenLibraryError
 _NAMES = {  # the public ones, by the module or package that is imported when one of them is first asked for
     "applications": (
         "CoarseDeformer",
+        "Deformation",
         "Deformer",
         "Deviation",
         "Geodesics",
@@ -34,6 +35,7 @@ _NAMES = {  # the public ones, by the module or package that is imported when on
         "band",
         "boost",
         "chebyshev_filter",
+        "coarse_deformer",
         "deformation_gradients",
         "displace_by_mode",
         "exponential",

@@ -1,7 +1,7 @@
 """What the operator is for: filters, segments, fields, distances, deformation, minimal surfaces."""
 
-from .coarse_deformation import CoarseDeformer
-from .deformation import Deformer
+from .coarse_deformation import CoarseDeformer, coarse_deformer
+from .deformation import Deformation, Deformer
 from .descriptors import heat_kernel_signature, signature_energies, signature_times, wave_kernel_signature
 from .deviation import Deviation, surface_deviation
 from .fields import harmonic_field, solve_poisson
