@@ -76,7 +76,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
     def _prepared_frames(self, progress):
         """Make the factors in a thread first, if there are none; see `_frames`."""
         obj = self._kept.find()[1]
-        if not live.is_prepared(obj):
+        if not live.is_prepared(live.find(obj)):
             make = live.plan_follower(obj)
             work = Job(self.bl_label, [], lambda report: make(report).prepare(report))
             try:
@@ -102,7 +102,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
                 )
             scene.frame_set(number)
             self._kept.expect()
-            live.update(obj, wanted=State.PREPARING if live.is_prepared(obj) else State.SETTLED)
+            live.update(obj, wanted=State.PREPARING if live.is_prepared(live.find(obj)) else State.SETTLED)
             reason = stale_reason(obj, glance=True, trusting=True)
             if reason:
                 raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')

@@ -31,7 +31,7 @@ from ..objects.reading import TYPES, boundary_points, fingerprint, sharing_objec
 from ..objects.splats import has_splats, read_splats
 from ..running import cache
 from .nodes import find_deform, is_baked
-from .pose import POSE, Pose, is_there, solver_settings
+from .pose import POSE, Pose, is_there
 
 WRITES = DISPLACEMENT, REST
 _bound = b"", ()  # session_uids of all objects when the bound ones were looked for, and the places of these
@@ -134,12 +134,6 @@ def plan_binding(obj, rest, matrix, constraints=None) -> Binding:
         boundary_points(obj),
         settings.leave_out_floaters,
     )
-
-
-def binding_key(obj) -> tuple:
-    """What the binding of an object that is not stale depends on; copies of it have the same."""
-    settings = obj.meshfree.deform
-    return settings.binding_id, solver_settings(settings)
 
 
 def read_constraints(obj) -> Constraints:

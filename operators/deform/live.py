@@ -22,10 +22,10 @@ from ...core import Cancelled
 from ..objects.handlers import add_handlers, remove_handlers, tell
 from ..running.job import STOPPED, Job, running
 from ..running.ready import TROUBLES, told
-from .binding import binding_key, bound_objects, forget_bound, is_bound, read_binding, stale_reason
+from .binding import bound_objects, forget_bound, is_bound, read_binding, stale_reason
 from .follower import Follower
 from .nodes import is_baked
-from .pose import Pose, State, read_pose, shown_state, write_displacement
+from .pose import Pose, State, binding_key, read_pose, shown_state, write_displacement
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
 _TICK = 0.05  # seconds between two looks at a thread
@@ -38,8 +38,6 @@ class _Thread:
     Attributes
     ----------
     work : Job
-    key : tuple
-        The `binding_key` that it works for.
     pose : Pose
         The pose that it works for.
     prepares : bool
@@ -47,7 +45,6 @@ class _Thread:
     """
 
     work: Job
-    key: tuple
     pose: Pose
     prepares: bool
 
@@ -117,9 +114,8 @@ def find(obj):
     return _followers.get(binding_key(obj))
 
 
-def is_prepared(obj) -> bool:
-    """Whether an object can be settled at once."""
-    follower = find(obj)
+def is_prepared(follower) -> bool:
+    """Whether what a `Follower`, or None, needs for settled results is there."""
     return follower is not None and follower.exact is not None
 
 
@@ -146,7 +142,7 @@ def plan_settled(obj, pose, waits=True):
 
     def compute(progress):
         follower = make(progress)
-        state = State.SETTLED if at_once or follower.exact is not None else State.QUICK
+        state = State.SETTLED if at_once or is_prepared(follower) else State.QUICK
         return follower, follower.move(pose, state, progress=progress)
 
     return compute
@@ -174,18 +170,16 @@ def update(obj, depsgraph=None, wanted=State.SETTLED):
     if stale_reason(obj, glance=wanted is not State.SETTLED, trusting=wanted is State.QUICK):
         return
     pose = read_pose(obj, depsgraph)
-    shown = shown_state(obj, pose)
+    shown, follower = shown_state(obj, pose), _followers.get(pose.key)
     if shown is State.SETTLED:
         _followed[obj.session_uid].trouble = ""  # it was at another pose
-    elif wanted is State.SETTLED or (wanted is State.PREPARING and is_prepared(obj)):
+    elif wanted is State.SETTLED or (wanted is State.PREPARING and is_prepared(follower)):
         follower, moved = plan_settled(obj, pose)(lambda stage, fraction: None)
         keep(obj, follower)
         write(obj, follower, moved, pose)
-    elif not shown is wanted is State.QUICK:
-        follower = find(obj)
+    elif State.PREPARING in (shown, wanted):
         if follower is not None:
-            start = follower.last.get(obj.session_uid)
-            write(obj, follower, follower.move(pose, State.QUICK, start), pose)
+            write(obj, follower, follower.move(pose, State.QUICK, follower.last.get(obj.session_uid)), pose)
         settle_later(obj)
 
 
@@ -251,14 +245,14 @@ def _attend(obj, depsgraph) -> bool:
         if stale_reason(obj, glance=True):
             _drop(followed)
             return False
-        key, pose = binding_key(obj), read_pose(obj, depsgraph)
+        pose = read_pose(obj, depsgraph)
         if thread is None:
-            return _start(obj, key, pose)
+            return _start(obj, pose)
         if thread.work.ended:
             followed.thread = None
             thread.work.close(bpy.context)
-            _take(obj, thread, key, pose)
-        elif thread.key != key:
+            _take(obj, thread, pose)
+        elif thread.pose.key != pose.key:
             _drop(followed)
         elif thread.prepares:
             thread.work.show(bpy.context)
@@ -276,25 +270,25 @@ def _drop(followed):
         thread.work.close(bpy.context)
 
 
-def _start(obj, key, pose):
+def _start(obj, pose):
     """Start a thread that settles an object, if it is time for that; say whether there is more to come."""
     followed = _followed[obj.session_uid]
     if shown_state(obj, pose) is State.SETTLED or (followed.trouble and pose.is_same(followed.troubled)):
         return False  # or it would go wrong again
     # A setting that is dragged must not start a thread for each value. Before the first factors waiting is of no use.
-    prepares = not is_prepared(obj)
+    prepares = not is_prepared(find(obj))
     if prepares and running() is not None:
         return True
-    if perf_counter() >= followed.due or all(known[0] != key[0] for known in _followers):
+    if perf_counter() >= followed.due or all(known[0] != pose.key[0] for known in _followers):
         work = Job("Bind", [], plan_settled(obj, pose, waits=False))
-        followed.thread = _Thread(work, key, pose, prepares)
+        followed.thread = _Thread(work, pose, prepares)
         if prepares:  # takes long: it is shown as other work is, and Esc ends it
             with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
                 work.open(bpy.context)
     return True
 
 
-def _take(obj, thread, key, pose):
+def _take(obj, thread, pose):
     """Write what a thread has computed, unless it is past."""
     try:
         follower, moved = thread.work.result()
@@ -303,9 +297,9 @@ def _take(obj, thread, key, pose):
             work = "Binding" if find(obj) is None else "The exact result"
             _note(obj, f"{work} was stopped. Press Update, or move a handle", pose)
         return
-    if thread.key != key:
+    if thread.pose.key != pose.key:
         return
-    if not is_prepared(obj):  # a render may have been faster
+    if not is_prepared(find(obj)):  # a render may have been faster
         keep(obj, follower)
     shown = shown_state(obj, pose)
     if pose.is_same(thread.pose.numbers) and (moved.state is State.SETTLED or shown is not State.SETTLED):

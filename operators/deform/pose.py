@@ -34,6 +34,8 @@ class Pose:
 
     Attributes
     ----------
+    key : tuple
+        The `binding_key` of the object.
     changes : dict of str to ndarray, (4, 4)
         How empties have moved their groups since they were bound, in local space.
     edited : ndarray, (n, 3), or None
@@ -47,6 +49,7 @@ class Pose:
         the numbers of all changes.
     """
 
+    key: tuple
     changes: dict
     edited: np.ndarray | None
     discs: np.ndarray | None
@@ -69,15 +72,17 @@ def read_pose(obj, depsgraph=None) -> Pose:
     moved_by = [item for item in settings.handle_items if item.has_empty and is_there(item.empty)]
     changes = {item.name: _empty_change(obj, item, depsgraph) for item in moved_by}
     edited = positions_now(obj) if any(not item.has_empty for item in settings.handle_items) else None
-    asked = (solver_settings(settings), settings.steps, *(["carried"] if carries(obj) else []))
+    key = binding_key(obj)
+    asked = (key[1], settings.steps, *(["carried"] if carries(obj) else []))
     checksums = [zlib.crc32(repr(asked).encode()), 0 if edited is None else zlib.crc32(edited)]
     numbers = np.concatenate([checksums, *(change.ravel() for change in changes.values())])
-    return Pose(changes, edited, discs_at_rest(obj), settings.steps, numbers)
+    return Pose(key, changes, edited, discs_at_rest(obj), settings.steps, numbers)
 
 
-def solver_settings(settings) -> tuple:
-    """Values of the settings that the factors depend on."""
-    return settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0
+def binding_key(obj) -> tuple:
+    """What the factors of an object that is not stale depend on: its binding, which copies share, and settings."""
+    settings = obj.meshfree.deform
+    return settings.binding_id, (settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0)
 
 
 def _empty_change(obj, item, depsgraph):

@@ -176,7 +176,7 @@ class TestFollowing:
         lift(empty, -1.0)
         assert_allclose(shown_points(strip), local_points(strip), atol=1e-6)
 
-    def test_a_quick_update_is_settled_later(self, strip, live, binding):
+    def test_a_quick_update_is_settled_later(self, strip, live):
         empty = bind()
         lift(empty, 1.0)
         settled = displacement(strip)
@@ -212,7 +212,7 @@ class TestFollowing:
         bpy.ops.meshfree.deform_update()
         assert_allclose(displacement(strip), turned, atol=1e-5)
 
-    def test_a_setting_that_is_dragged_starts_no_thread_before_it_rests(self, strip, live, binding):
+    def test_a_setting_that_is_dragged_starts_no_thread_before_it_rests(self, strip, live):
         lift(bind(soft=True), 1.0)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for weight in (0.5, 0.1, 0.01):
@@ -284,7 +284,7 @@ class TestManyPoints:
             live._followed[obj.session_uid].due = 0.0
             for thread in threads(live):
                 thread.work.wait(60.0)
-                seen.append(live.is_prepared(obj))
+                seen.append(live.is_prepared(live.find(obj)))
         return seen
 
     def expected(self, core, points):
@@ -293,7 +293,7 @@ class TestManyPoints:
         deformer = core.Deformer(laplacian, is_end(points), points[:, 0] < 0.25)
         return deformer.solve(points[deformer.handles] + (0.0, 0.0, 0.7)) - points
 
-    def test_roughly_while_dragged_and_exactly_at_rest(self, core, live, binding, strip, unattended):
+    def test_roughly_while_dragged_and_exactly_at_rest(self, core, live, strip, unattended):
         before = local_points(strip)
         lift(bind(), 0.7)
         assert live.find(strip).exact is None
@@ -308,7 +308,7 @@ class TestManyPoints:
         assert is_settled(strip)
         assert_allclose(displacement(strip), exact, atol=1e-4)
 
-    def test_an_opened_file_follows_before_it_is_exact(self, core, live, binding, strip, unattended):
+    def test_an_opened_file_follows_before_it_is_exact(self, core, live, strip, unattended):
         before = local_points(strip)
         lift(bind(), 0.7)
         live._forget()
@@ -327,7 +327,7 @@ class TestManyPoints:
     def test_the_panel_tells_that_it_will_be_exact(self, live, strip, unattended):
         bind()
         work = SimpleNamespace(stage="Factors", fraction=0.5)
-        live._followed[strip.session_uid].thread = live._Thread(work, (), None, prepares=True)
+        live._followed[strip.session_uid].thread = live._Thread(work, None, prepares=True)
         try:
             assert "Follows its handles roughly. Exact soon: Factors, 50%" in " ".join(draw())
         finally:
@@ -382,7 +382,7 @@ class TestFrames:
         assert_allclose([height[ends].mean() for height in forward], HEIGHTS, atol=1e-4)
         assert_allclose(self.heights(strip, (3, 1, 4, 2)), forward, atol=1e-5)
 
-    def test_a_jump_leaves_factors_to_a_thread_where_it_need_not_wait(self, strip, live, binding, monkeypatch):
+    def test_a_jump_leaves_factors_to_a_thread_where_it_need_not_wait(self, strip, live, monkeypatch):
         animate(bind())
         bpy.context.scene.frame_set(1)
         live._forget()
@@ -1198,8 +1198,9 @@ class TestPanel:
 
     def test_while_it_binds_and_when_that_was_stopped(self, strip, live, core):
         bind()
+        live._followers.clear()
         work = SimpleNamespace(stage="Areas", fraction=0.5)
-        live._followed[strip.session_uid].thread = live._Thread(work, (), None, prepares=True)
+        live._followed[strip.session_uid].thread = live._Thread(work, None, prepares=True)
         try:
             assert "Not up to date. Binding: Areas, 50%" in self.texts()
         finally:
