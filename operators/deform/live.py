@@ -345,7 +345,7 @@ def _on_render(scene, *_):
 @persistent
 def _forget(*_):
     """Forget everything about a file when another one is opened."""
-    for followed in _followed.values():
+    for followed in [*_followed.values()]:
         _drop(followed)
     for known in (_followers, _followed):
         known.clear()
