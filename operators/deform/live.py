@@ -325,9 +325,11 @@ def _on_depsgraph_update(scene, depsgraph):
 
 @persistent
 def _on_frame_change(scene, depsgraph):
-    rendering = bpy.app.background or depsgraph.mode == "RENDER"
-    jump = State.QUICK if _is_playing() else State.PREPARING
-    update_all(scene, depsgraph, State.SETTLED if rendering else jump)
+    if bpy.app.background or depsgraph.mode == "RENDER":
+        wanted = State.SETTLED
+    else:
+        wanted = State.QUICK if _is_playing() else State.PREPARING
+    update_all(scene, depsgraph, wanted)
 
 
 @persistent
