@@ -81,8 +81,8 @@ def bend(laplacian, quads, section):
         deformer = core.Deformer(laplacian, last, first, **chosen)
 
         def measure(deformer=deformer):
-            result = deformer.solve(target)
-            yield deformer.steps
+            result, steps, _ = deformer.deform(target)
+            yield steps
             yield np.abs(section_areas(result, section) - 1.0).max()
             angles = turns(result, section)
             yield angles.max() / angles.mean()
@@ -137,14 +137,14 @@ def cost():
         times, runs = (3, 25) if count < 50_000 else (1, 5)
 
         def measure(sets=sets, chosen=chosen, times=times, runs=runs):
-            for kind in (core.CoarseDeformer, core.Deformer):
+            for kind in (core.coarse_deformer, core.Deformer):
                 gaps, seconds = zip(*(reported(kind, *sets, **chosen) for _ in range(times)), strict=True)
                 yield min(seconds)
                 yield min(gaps)
             linear = core.Deformer(*sets, rotation_aware=False, **chosen)
             target = linear.points[linear.handles] + (0.0, 0.0, 0.5)
             yield least(runs, lambda: linear.solve(target))
-            aware, coarse = core.Deformer(*sets, **chosen), core.CoarseDeformer(*sets, **chosen)
+            aware, coarse = core.Deformer(*sets, **chosen), core.coarse_deformer(*sets, **chosen)
             result = aware.solve(target)
             yield least(runs, lambda: aware.solve(target, steps=1))
             yield least(runs, lambda: aware.solve(target, steps=1, start=result))
@@ -225,9 +225,9 @@ def scans():
         deformer = core.Deformer(core.build_laplacian(points), handles, anchors)
 
         def measure(deformer=deformer, move=move):
-            result = deformer.solve(deformer.points[deformer.handles] + move)
+            result, steps, _ = deformer.deform(deformer.points[deformer.handles] + move)
             displacement = np.linalg.norm(result - deformer.points, axis=1) / np.linalg.norm(move)
-            yield deformer.steps
+            yield steps
             yield displacement.max()
             yield np.mean(displacement > 0.01)
 

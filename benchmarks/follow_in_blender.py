@@ -55,7 +55,7 @@ def drag(obj, check=lambda empty: None):
     bpy.app.handlers.depsgraph_update_post.remove(handler)  # without a window it settles at once
 
     def dragged(scene, depsgraph):
-        live.update_all(scene, depsgraph, quick=True)
+        live.update_all(scene, depsgraph, live.State.QUICK)
 
     def measure():
         empty.location.z += 0.02

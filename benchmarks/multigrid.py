@@ -64,7 +64,7 @@ def main(points, method):
     rows = laplacian.stiffness[free]
     matrix, load = rows[:, free].tocsr(), -(rows @ (points[:, 2] >= high).astype(np.float64))
     before, marks = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, []
-    for _ in METHODS[method](matrix, load):
+    for result in METHODS[method](matrix, load):  # noqa: B007, the last is printed
         marks.append(time.process_time())
     memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0
     setup, solution = np.diff(marks)

@@ -107,7 +107,7 @@ def run_applications(count):
     geodesics = watch.run("geodesics, set-up", core.Geodesics, built)
     watch.run("geodesics, a source", geodesics.distance, [0])
     watch.run("segmentation", core.segment, built, 6)
-    watch.run("binding by a coarse cloud", core.CoarseDeformer, built, high, low)
+    watch.run("binding by a coarse cloud", core.coarse_deformer, built, high, low)
     watch.run("binding", core.Deformer, built, high, low)
     belt = np.abs(points[:, 2]) < 0.5
     ends = np.abs(points[belt, 2]) > 0.47

@@ -79,7 +79,7 @@ def follow(count):
     splats = splats_on(laplacian)
     quick = replace(splats, harmonics=splats.harmonics[:, :0])
     z = points[:, 2]
-    deformer = core.CoarseDeformer(laplacian, z > 0.8, z < -0.8)
+    deformer = core.coarse_deformer(laplacian, z > 0.8, z < -0.8)
     goal = points[deformer.handles] + [0.1, 0.0, 0.5]
     moved = timed(f"{count:,} splats: points", lambda: deformer.solve(goal, steps=1))
     gradients = timed(f"{count:,} splats: gradients", lambda: deformer.gradients(moved))
@@ -102,7 +102,7 @@ def turn_rigidly(splats):
         "operator, floaters left out", lambda: core.build_laplacian(points, left_out=floating_rows(splats)), 1
     )
     along = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0] @ points.T
-    deformer = timed("binding", lambda: core.CoarseDeformer(laplacian, along > np.quantile(along, 0.95)), 1)
+    deformer = timed("binding", lambda: core.coarse_deformer(laplacian, along > np.quantile(along, 0.95)), 1)
     turn, shift = Rotation.from_rotvec([0.5, 1.0, -2.0]).as_matrix(), np.array([1.0, 2.0, 3.0])
     goal = points[deformer.handles] @ turn.T + shift
     moved = timed("points of a quick result", lambda: deformer.solve(goal, steps=1))

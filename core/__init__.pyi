@@ -1,6 +1,8 @@
 """The public names of core, a line each, and where they are: `core/__init__.py` imports them as they are asked for."""
 
 from .applications.coarse_deformation import CoarseDeformer as CoarseDeformer
+from .applications.coarse_deformation import coarse_deformer as coarse_deformer
+from .applications.deformation import Deformation as Deformation
 from .applications.deformation import Deformer as Deformer
 from .applications.descriptors import heat_kernel_signature as heat_kernel_signature
 from .applications.descriptors import signature_energies as signature_energies

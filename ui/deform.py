@@ -4,8 +4,9 @@ import bpy
 
 from ..operators import registration
 from ..operators.deform import live
-from ..operators.deform.binding import copied_from, handled_object, is_bound, stale_reason
+from ..operators.deform.binding import copied_from, handled_object, is_bound
 from ..operators.deform.nodes import find_deform, is_baked
+from ..operators.deform.pose import State
 from ..operators.objects.groups import handle_names
 from ..operators.objects.modifiers import input_property
 from ..operators.objects.reading import obstacle
@@ -69,22 +70,22 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
                     grid.operator(tool.operator.bl_idname)
 
 
+_STATES = {  # what the panel says of them, with a detail, and its icon
+    State.BAKED: ("Baked. {}", "INFO"),
+    State.STALE: ("Not up to date. {}", "ERROR"),
+    State.PREPARING: ("Not up to date. Binding: {}", "SORTTIME"),
+    State.QUICK: ("Follows its handles roughly. Exact soon: {}", "SORTTIME"),
+    State.SETTLED: ("Bound: follows its handles", "CHECKMARK"),
+}
+
+
 def _draw_state(layout, context, obj):
     """Draw whether the points follow the handles, and what to do if not."""
-    reason, working = stale_reason(obj, glance=True) or live.trouble(obj), live.preparing(obj)
-    if reason:
-        state = "Baked" if is_baked(obj) else "Copy" if copied_from(obj) is not None else "Not up to date"
-        text = f"{state}. {reason}"
-        icon = "INFO" if is_baked(obj) else "ERROR"
-    elif working is not None:
-        stage, fraction = working
-        exact = live.find(obj) is not None and not live.is_prepared(obj)
-        state = "Follows its handles roughly. Exact soon" if exact else "Not up to date. Binding"
-        text = f"{state}: {stage}, {fraction:.0%}"
-        icon = "SORTTIME"
-    else:
-        text, icon = "Bound: follows its handles", "CHECKMARK"
-    draw_text(layout, context, text, icon)
+    state, detail = live.state(obj)
+    text, icon = _STATES[state]
+    if state is State.STALE and copied_from(obj) is not None:
+        text = "Copy. {}"
+    draw_text(layout, context, text.format(detail), icon)
 
 
 CLASSES = (MESHFREE_PT_deform,)

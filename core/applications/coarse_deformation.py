@@ -12,6 +12,7 @@ from .deformation import (
     NEIGHBORS,
     RTOL,
     STEPS,
+    Deformation,
     Deformer,
     check_constraints,
     components_held,
@@ -40,14 +41,12 @@ class CoarseDeformer:
     laplacian, handles, anchors, rotation_aware, weights, neighbors, progress
         As of `Deformer`.
     count : int
-        How many points to solve on, about. Where there are hardly more, all are.
+        How many points to solve on, about.
 
     Attributes
     ----------
-    points, handles, anchors, rotation_aware, steps, converged, notices
+    points, handles, anchors, rotation_aware, notices
         As of `Deformer`.
-    exact : Deformer or None
-        Where all points are solved on, what does it.
 
     Raises
     ------
@@ -57,6 +56,7 @@ class CoarseDeformer:
     See Also
     --------
     Deformer : Solves on all points.
+    coarse_deformer : Chooses between the two.
 
     References
     ----------
@@ -94,27 +94,10 @@ class CoarseDeformer:
         report = progress or (lambda stage, fraction: None)
         n = len(laplacian.points)
         check_switches(rotation_aware=rotation_aware)
-        if not real(count) >= 1.0:
-            raise PointCloudError(f"{count!r} points to solve on were asked for. Ask for a number of at least 1.")
-        count = real(count)
-        if n <= _ALL * count:
-            self.exact = Deformer(
-                laplacian,
-                handles,
-                anchors,
-                rotation_aware=rotation_aware,
-                weights=weights,
-                neighbors=neighbors,
-                progress=progress,
-            )
-            for name in ("points", "handles", "anchors", "rotation_aware", "steps", "converged", "notices"):
-                setattr(self, name, getattr(self.exact, name))
-            return
-        self.exact = None
+        count = _check_count(count)
         self.points = laplacian.points
         self.handles, self.anchors, weights = check_constraints(handles, anchors, weights, n)
         self.rotation_aware = bool(rotation_aware)
-        self.steps, self.converged = 0, True
         self._chosen = np.flatnonzero(weights)
         held, weights = np.concatenate([self.handles, self.anchors])[self._chosen], weights[self._chosen]
         component = laplacian.component
@@ -190,26 +173,25 @@ class CoarseDeformer:
 
     def solve(self, handle_positions, *, steps=STEPS, rtol=RTOL, start=None, progress=None):
         """Find the points for new positions of the handles; parameters and result as of `Deformer.solve`."""
-        if self.exact is not None:
-            result = self.exact.solve(handle_positions, steps=steps, rtol=rtol, start=start, progress=progress)
-            self.steps, self.converged = self.exact.steps, self.exact.converged
-            return result
+        return self.deform(handle_positions, steps=steps, rtol=rtol, start=start, progress=progress).points
+
+    def deform(self, handle_positions, *, steps=STEPS, rtol=RTOL, start=None, progress=None) -> Deformation:
+        """Find the points as `solve` does, and say how many steps that took; see `Deformer.deform`."""
         target = check_positions(handle_positions, len(self.handles), "handle positions", "handle")
         target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
-        result = self.points.copy()
+        result, taken, converged = self.points.copy(), 0, True
         if len(self._moving):
             if start is not None:
                 start = check_positions(start, len(self.points), "starting points", "point")[self._rows]
-            placed = self._coarse.solve(target[self._pulled], steps=steps, rtol=rtol, start=start, progress=progress)
-            self.steps, self.converged = self._coarse.steps, self._coarse.converged
+            placed, taken, converged = self._coarse.deform(
+                target[self._pulled], steps=steps, rtol=rtol, start=start, progress=progress
+            )
             result[self._carried_points] = self._carried(placed)
         result[self._held[self._placed]] = target[self._placed]
-        return result
+        return Deformation(result, taken, converged)
 
     def gradients(self, points):
         """Find what a deformation does to small steps around each point, as `Deformer.gradients`, from some points."""
-        if self.exact is not None:
-            return self.exact.gradients(points)
         result = np.tile(np.eye(3), (len(self.points), 1, 1))
         if len(self._moving):
             points = check_positions(points, len(self.points), "points after the deformation", "point")
@@ -228,6 +210,36 @@ class CoarseDeformer:
         shift = now - np.einsum("mab,mb->ma", turn, rest)
         maps = self._weights @ np.concatenate([turn.reshape(-1, 9), shift], axis=1)
         return np.einsum("nab,nb->na", maps[:, :9].reshape(-1, 3, 3), self._rest) + maps[:, 9:] + self._center
+
+
+def coarse_deformer(laplacian, handles, anchors=(), *, count=_COUNT, **settings) -> CoarseDeformer | Deformer:
+    """Prepare a deformation that keeps up with a hand.
+
+    Parameters
+    ----------
+    laplacian, handles, anchors, count, settings
+        As of `CoarseDeformer`, the last ones by their names.
+
+    Returns
+    -------
+    CoarseDeformer or Deformer
+        The latter, which solves on all points, where there are hardly more than the former would solve on.
+
+    Raises
+    ------
+    PointCloudError, InvalidPointsError, SolverError
+        As of `Deformer`.
+    """
+    if len(laplacian.points) <= _ALL * _check_count(count):
+        return Deformer(laplacian, handles, anchors, **settings)
+    return CoarseDeformer(laplacian, handles, anchors, count=count, **settings)
+
+
+def _check_count(count):
+    """Return how many points to solve on."""
+    if not real(count) >= 1.0:
+        raise PointCloudError(f"{count!r} points to solve on were asked for. Ask for a number of at least 1.")
+    return real(count)
 
 
 def _closer_to_border(points, areas, held, count):

@@ -1,5 +1,7 @@
 """Deformation of a surface by moved handles, with differential coordinates: Figure 13 of the paper."""
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
@@ -17,6 +19,24 @@ STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
 RTOL = 1e-5
 _BLOCK = 1 << 14  # rows
 _SMALLEST = 1e-10  # share of what steps change that the acceleration goes by
+
+
+class Deformation(NamedTuple):
+    """Where a `Deformer` moves a surface for some positions of its handles, and how it got there.
+
+    Attributes
+    ----------
+    points : ndarray, (n, 3)
+        The deformed points [L].
+    steps : int
+        Rotation-aware steps that were taken.
+    converged : bool
+        Whether the last one moved no point by more than the tolerance.
+    """
+
+    points: np.ndarray
+    steps: int
+    converged: bool
 
 
 class Deformer:
@@ -55,10 +75,6 @@ class Deformer:
         Indices of the points; positions of the handles follow their order.
     rotation_aware : bool
         As given.
-    steps : int
-        Rotation-aware steps of the last solve.
-    converged : bool
-        Whether its last step moved no point by more than the tolerance.
     notices : list of str
         What a user should know, such as points that nothing holds and that stay where they are.
 
@@ -117,7 +133,7 @@ class Deformer:
         self.handles, self.anchors, weights = check_constraints(handles, anchors, weights, n)
         check_switches(rotation_aware=rotation_aware)
         self.rotation_aware = bool(rotation_aware)
-        self.steps, self.converged, self.notices = 0, True, []
+        self.notices = []
         held = np.concatenate([self.handles, self.anchors])
 
         report("Operator", 0.0)
@@ -209,6 +225,10 @@ class Deformer:
         PointCloudError
             Steps or a tolerance below zero.
         """
+        return self.deform(handle_positions, steps=steps, rtol=rtol, start=start, progress=progress).points
+
+    def deform(self, handle_positions, *, steps=STEPS, rtol=RTOL, start=None, progress=None) -> Deformation:
+        """Find the points as `solve` does, with its parameters and errors, and say how many steps that took."""
         report = progress or (lambda stage, fraction: None)
         most, share = check_steps(steps, rtol)
         target = check_positions(handle_positions, len(self.handles), "handle positions", "handle")
@@ -217,8 +237,7 @@ class Deformer:
         loose = self._row < 0
         result[self._held[loose]] = target[loose]
         if not len(self._moving):
-            self.steps, self.converged = 0, True
-            return result
+            return Deformation(result, 0, True)
         turn, shift = self._fit_components(target)
         frame = self._turned(turn, self._rest) + shift[self._component]
         inside = ~loose
@@ -249,10 +268,9 @@ class Deformer:
                     converged = True
                     break
                 begin = acceleration.extrapolate(begin, now)
-        self.steps, self.converged = step, converged  # at once, for solves may run in several threads
         result[self._moving] = now
         self._let_follow(result)
-        return result
+        return Deformation(result, step, converged)
 
     def _let_follow(self, points):
         """Move points of no surface as the point of the surface next to them, in place."""

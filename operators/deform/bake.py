@@ -17,8 +17,9 @@ from ..running.job import Job, JobOperator, SteppedJob, all_steps
 from ..running.ready import reporting
 from ..running.stages import Stages
 from . import live
-from .binding import POSE, stale_reason, write_displacement
+from .binding import stale_reason
 from .nodes import baked_suffix, find_deform, is_baked, show_baked
+from .pose import POSE, State, write_displacement
 from .tools import BoundOperator, check_fresh, delete_bake
 
 _LAST = 1048574  # frame of Blender
@@ -77,8 +78,9 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
     def _prepared_frames(self, progress):
         """Make the factors in a thread first, if there are none; see `_frames`."""
         obj = self._kept.find()[1]
-        if not live.is_prepared(obj):
-            work = Job(self.bl_label, [], live.plan_prepared(obj))
+        if not live.is_prepared(live.find(obj)):
+            make = live.plan_follower(obj)
+            work = Job(self.bl_label, [], lambda report: make(report).prepare(report))
             try:
                 while not work.ended:
                     progress(work.stage, 0.0)
@@ -102,7 +104,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
                 )
             scene.frame_set(number)
             self._kept.expect()
-            live.update(obj, waits=not live.is_prepared(obj))
+            live.update(obj, wanted=State.PREPARING if live.is_prepared(live.find(obj)) else State.SETTLED)
             reason = stale_reason(obj, glance=True, trusting=True)
             if reason:
                 raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
@@ -163,7 +165,7 @@ class _Kept:
         self._places = self._expected = self._now()
         self._displacement = read_attribute(obj.data, DISPLACEMENT)
         self._moved = {name: read_attribute(obj.data, name) for name in moved_names(obj.data)}
-        self._pose = obj.data[POSE].to_list()
+        self._shown = obj.data[POSE].to_list()
 
     def find(self):
         """Return the scene and the object; None for what is gone."""
@@ -211,8 +213,9 @@ class _Kept:
             for name, value in place.items():
                 if tuple(getattr(thing, name)) != value:  # it had been moved since its keyframe
                     setattr(thing, name, value)
-        settled, *pose = self._pose
-        write_displacement(obj, self._displacement, np.array(pose), bool(settled), self._moved)
+        settled, *numbers = self._shown
+        state = State.SETTLED if settled else State.QUICK
+        write_displacement(obj, self._displacement, np.array(numbers), state, self._moved)
 
 
 class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):

@@ -1,7 +1,7 @@
 """What binds an object to its handles, all of it kept in the file, and whether it still holds.
 
-The points at rest are the attribute `lb_rest`, their displacements `lb_displacement`, both in local space. Which
-empties move which groups is in `Object.meshfree.deform`.
+The points at rest are the attribute `lb_rest`, in local space. Which empties move which groups is in
+`Object.meshfree.deform`.
 """
 
 import zlib
@@ -12,27 +12,28 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...core import PointCloudError
+from ... import core
+from ...core import LaplacianOptions, PointCloudError
 from ..objects.attributes import (
     REST,
     in_edit_mesh,
     point_count,
-    positions_now,
     read_attribute,
-    tag_changed,
     write_attribute,
 )
-from ..objects.carried import carries, moved_names, write_moved
+from ..objects.carried import moved_names
 from ..objects.counting import members, weighted_checksum
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
 from ..objects.handlers import tell
-from ..objects.options import settings_values
+from ..objects.options import laplacian_options, settings_values
 from ..objects.quantities import DISPLACEMENT
-from ..objects.reading import TYPES, fingerprint, sharing_objects
+from ..objects.reading import TYPES, boundary_points, fingerprint, sharing_objects
+from ..objects.splats import has_splats, read_splats
+from ..running import cache
 from .nodes import find_deform, is_baked
+from .pose import POSE, Pose, is_there
 
 WRITES = DISPLACEMENT, REST
-POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
 _bound = b"", ()  # session_uids of all objects when the bound ones were looked for, and the places of these
 
 
@@ -60,6 +61,79 @@ class Constraints:
     kept: np.ndarray
     strength: np.ndarray
     checksum: str
+
+
+@dataclass(frozen=True)
+class Binding:
+    """What an object is bound with, read from it once.
+
+    Attributes
+    ----------
+    rest : ndarray, (n, 3) float32
+        Points at rest in local space.
+    matrix : ndarray, (3, 3)
+        From local space to the lengths of the world when it was bound.
+    constraints : Constraints or None
+        None where they are to be found on the operator.
+    splats : Splats or None
+        Those at rest in local space, where the points are splats.
+    rotation_aware : bool
+    softness : float or None
+        What weights of constraints are multiplied by; None for hard ones.
+    options : LaplacianOptions
+    boundary : ndarray, (n,) bool, or None
+    leave_out_floaters : bool
+        Whether splats that float are no part of the surface.
+    """
+
+    rest: np.ndarray
+    matrix: np.ndarray
+    constraints: Constraints | None
+    splats: "core.Splats | None"
+    rotation_aware: bool
+    softness: float | None
+    options: LaplacianOptions
+    boundary: np.ndarray | None
+    leave_out_floaters: bool
+
+    def laplacian(self, progress) -> "core.LaplaceBeltrami":
+        """Return the operator of the points at rest, in lengths of the world."""
+        points, judged = self.rest.astype(np.float64) @ self.matrix.T, self.splats if self.leave_out_floaters else None
+        return cache.build(points, self.options, self.boundary, progress, splats=judged).laplacian
+
+    def handles(self, pose: Pose):
+        """Return where a pose has the moved points in local space, (h, 3)."""
+        moved, owner = self.constraints.moved, self.constraints.owner
+        placed = self.rest[moved].astype(np.float64)
+        for index, name in enumerate(self.constraints.names):
+            rows, change = owner == index, pose.changes.get(name)
+            if change is not None:
+                placed[rows] = placed[rows] @ change[:3, :3].T + change[:3, 3]
+            elif pose.edited is not None:
+                placed[rows] = pose.edited[moved[rows]]
+        return placed
+
+
+def read_binding(obj) -> Binding:
+    """Read what a bound object is bound with."""
+    matrix = np.reshape(obj.meshfree.deform.matrix, (3, 3)).astype(np.float64)
+    return plan_binding(obj, read_rest(obj), matrix, read_constraints(obj))
+
+
+def plan_binding(obj, rest, matrix, constraints=None) -> Binding:
+    """Read what else an object is to be bound with, at these points at rest; see `Binding`."""
+    settings, deform = obj.meshfree, obj.meshfree.deform
+    return Binding(
+        rest,
+        matrix,
+        constraints,
+        read_splats(obj.data) if has_splats(obj.data) else None,
+        deform.rotation_aware,
+        deform.weight if deform.soft else None,
+        laplacian_options(settings),
+        boundary_points(obj),
+        settings.leave_out_floaters,
+    )
 
 
 def read_constraints(obj) -> Constraints:
@@ -177,11 +251,6 @@ def _moved_by_empties(obj) -> set:
     return {item.name for item in obj.meshfree.deform.handle_items if item.has_empty}
 
 
-def moves_in_edit_mode(obj) -> bool:
-    """Whether some group of handles has no empty."""
-    return any(not item.has_empty for item in obj.meshfree.deform.handle_items)
-
-
 def settings_text(obj) -> str:
     """Text of the settings of the operator that deformations depend on."""
     settings = obj.meshfree
@@ -232,59 +301,6 @@ def stale_reason(obj, glance=False, trusting=False) -> str:
     return ""
 
 
-def is_there(obj, scene=None) -> bool:
-    """Whether an object, such as the empty of a handle, is still in a scene, or in some scene."""
-    if obj is None:
-        return False
-    scenes = bpy.data.scenes if scene is None else [scene]
-    if any(obj.visible_get(view_layer=layer) for each in scenes for layer in each.view_layers):
-        return True
-    found = obj.users_scene  # takes 1 ms for 5,000 objects
-    return scene in found if scene is not None else bool(found)
-
-
-def relative_matrix(obj, empty, depsgraph=None):
-    """Return the matrix of an empty in the space of an object, (4, 4) float64, as a depsgraph has evaluated them."""
-    if depsgraph is not None:
-        obj, empty = obj.evaluated_get(depsgraph), empty.evaluated_get(depsgraph)
-    matrix = np.array(obj.matrix_world, dtype=np.float64)
-    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
-        raise PointCloudError(
-            f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
-        )
-    return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
-
-
-def read_pose(obj, depsgraph=None):
-    """Read all that the displacements depend on while the binding holds, to compare it with `written_pose`.
-
-    Returns
-    -------
-    ndarray
-        Checksum of the settings, of positions where handles are moved in Edit Mode, and for each empty the 16 numbers
-        of the matrix that takes its group, in local space, from rest to where it is now.
-    """
-    settings = obj.meshfree.deform
-    positions = zlib.crc32(positions_now(obj)) if moves_in_edit_mode(obj) else 0
-    asked = (solver_settings(settings), settings.steps, *(["carried"] if carries(obj) else []))
-    numbers = [zlib.crc32(repr(asked).encode()), positions]
-    for item in settings.handle_items:
-        there = item.has_empty and is_there(item.empty)
-        numbers += empty_change(obj, item, depsgraph).ravel().tolist() if there else []
-    return np.array(numbers)
-
-
-def empty_change(obj, item, depsgraph=None):
-    """Return how an empty has moved its handles since they were bound, in local space, (4, 4)."""
-    rest = np.reshape(item.rest, (4, 4)).astype(np.float64)
-    return relative_matrix(obj, item.empty, depsgraph) @ np.linalg.inv(rest)
-
-
-def solver_settings(settings) -> tuple:
-    """Values of the settings that the factors depend on."""
-    return settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0
-
-
 def read_rest(obj):
     """Read the points at rest in local space, (n, 3) float32."""
     if not in_edit_mesh(obj):
@@ -295,16 +311,13 @@ def read_rest(obj):
 
 
 def record(obj, rest, matrix, constraints, empties):
-    """Keep in the file what an object is bound with.
+    """Keep in the file what an object is bound with: of a `Binding` the first three.
 
     Parameters
     ----------
     obj : bpy.types.Object
-    rest : ndarray, (n, 3)
-        Points at rest in local space.
-    matrix : ndarray, (3, 3)
-        From local space to the lengths of the world.
-    constraints : Constraints
+    rest, matrix, constraints
+        As of `Binding`.
     empties : list
         For each group of handles the empty that moves it and its matrix at rest in local space, (4, 4), or None.
     """
@@ -344,62 +357,3 @@ def forget(obj):
     if modifier is not None:
         obj.modifiers.remove(modifier)
         tell("shape_changed", obj)
-
-
-def goal(obj, constraints, rest, depsgraph=None):
-    """Return where the moved points are to be in local space, (h, 3).
-
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    constraints : Constraints
-    rest : ndarray, (n, 3)
-        Points at rest in local space.
-    depsgraph : bpy.types.Depsgraph, optional
-        Where the empties are read; otherwise as the viewport shows them.
-    """
-    placed = rest[constraints.moved].astype(np.float64)
-    edited = edited_rows(obj, constraints)
-    if edited.any():
-        placed[edited] = positions_now(obj)[constraints.moved[edited]]
-    for item in obj.meshfree.deform.handle_items:
-        if item.has_empty and is_there(item.empty) and item.name in constraints.names:
-            change = empty_change(obj, item, depsgraph)
-            rows = constraints.owner == constraints.names.index(item.name)
-            placed[rows] = placed[rows] @ change[:3, :3].T + change[:3, 3]
-    return placed
-
-
-def written_pose(obj):
-    """Return what the displacements were computed for, and whether in full, or None."""
-    known = obj.data.get(POSE)
-    return (np.array(known[1:]), bool(known[0])) if known is not None else (None, False)
-
-
-def same_pose(one, other) -> bool:
-    """Whether the displacements of two poses are the same up to rounding."""
-    return (
-        one is not None
-        and one.shape == other.shape
-        and (one[:2] == other[:2]).all()
-        and np.allclose(one[2:], other[2:], rtol=1e-6, atol=1e-7)
-    )
-
-
-def write_displacement(obj, displacement, pose, settled: bool, moved):
-    """Write displacements in local space, (n, 3), what was carried along, by name, and what both are for.
-
-    In Edit Mode displacements alone are in reach.
-    """
-    data = obj.data
-    if in_edit_mesh(obj):
-        edited = bmesh.from_edit_mesh(data)
-        layer = edited.verts.layers.float_vector[DISPLACEMENT]
-        for vertex, step in zip(edited.verts, displacement.tolist(), strict=True):
-            vertex[layer] = step
-        bmesh.update_edit_mesh(data, loop_triangles=False, destructive=False)
-    else:
-        write_attribute(data, DISPLACEMENT, displacement)
-        write_moved(data, moved)
-        tag_changed(data)
-    data[POSE] = [float(settled), *pose.tolist()]

@@ -8,287 +8,154 @@ once.
 """
 
 import threading
-from collections.abc import Callable
+from collections import defaultdict
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
-from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ... import core
 from ...core import Cancelled
-from ..objects.attributes import MOVED_DISC
-from ..objects.carried import discs_at_rest, local_gradients, moved_discs, moved_splats
 from ..objects.handlers import add_handlers, remove_handlers, tell
-from ..objects.options import laplacian_options
-from ..objects.reading import boundary_points
-from ..objects.splats import has_splats, read_splats
-from ..running import cache
 from ..running.job import STOPPED, Job, running
 from ..running.ready import TROUBLES, told
-from . import binding
+from .binding import bound_objects, forget_bound, is_bound, read_binding, stale_reason
+from .follower import Follower
+from .nodes import is_baked
+from .pose import Pose, State, binding_key, read_pose, shown_state, write_displacement
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
 _TICK = 0.05  # seconds between two looks at a thread
 
 
 @dataclass
-class Live:
-    """What a bound object follows its handles by.
-
-    Attributes
-    ----------
-    constraints : binding.Constraints
-    rest : ndarray, (n, 3) float32
-        Points at rest in local space.
-    matrix : ndarray, (3, 3)
-        From local space to the lengths of the world when it was bound.
-    follower : CoarseDeformer
-        For quick updates.
-    make_exact : callable
-        From a progress callback to the `Deformer` for settled ones.
-    exact : Deformer or CoarseDeformer or None
-        That, once it was needed; of splats the follower.
-    splats : Splats or None
-        Those at rest in local space, where the points are splats.
-    last : dict of int to ndarray
-        The last result by the object's session_uid: copies of an object have one binding.
-    """
-
-    constraints: binding.Constraints
-    rest: np.ndarray
-    matrix: np.ndarray
-    follower: "core.CoarseDeformer"
-    make_exact: Callable
-    exact: "core.Deformer | core.CoarseDeformer | None"
-    splats: "core.Splats | None" = None
-    last: dict = field(default_factory=dict)
-
-    def prepare(self, progress):
-        """Make the factors for settled updates, if there are none, and return this."""
-        if self.exact is None:
-            self.exact = self.make_exact(progress)
-        return self
-
-
-class Moved(NamedTuple):
-    """Where handles have moved a bound object.
-
-    Attributes
-    ----------
-    points : ndarray, (n, 3)
-        As `Live.matrix` places them.
-    displacement : ndarray, (n, 3)
-        In local space.
-    carried : dict of str to ndarray
-        What goes along, by the names of its attributes: nothing at rest, and no harmonics if the result is quick.
-    """
-
-    points: np.ndarray
-    displacement: np.ndarray
-    carried: dict
-
-
-@dataclass
-class _Settling:
+class _Thread:
     """A thread that settles an object, for the timer to look at.
 
     Attributes
     ----------
     work : Job
-    key : tuple
-        The `live_key` that it works for.
-    pose : ndarray
+    pose : Pose
         The pose that it works for.
     prepares : bool
         Whether it may make factors first.
     """
 
     work: Job
-    key: tuple
-    pose: np.ndarray
+    pose: Pose
     prepares: bool
 
 
-_lives = {}  # by `live_key`
-_jobs = {}  # by the object's session_uid, which undo does not change
-_troubles = {}  # what went wrong at the last update and at which pose, by session_uid
-_due = 0.0  # when to settle what was updated quickly
-_lock = threading.Lock()
-_owner = None  # the thread that updates
+@dataclass
+class _Followed:
+    """What is kept in memory of an object that follows its handles.
+
+    Attributes
+    ----------
+    thread : _Thread or None
+    due : float
+        When to settle what was updated quickly.
+    trouble : str
+        What went wrong at the last update; empty if nothing did.
+    troubled : ndarray or None
+        The numbers of the pose at which it would go wrong again.
+    """
+
+    thread: _Thread | None = None
+    due: float = 0.0
+    trouble: str = ""
+    troubled: np.ndarray | None = None
 
 
-def live_key(obj) -> tuple:
-    """What the factors of a bound object that is not stale depend on."""
-    settings = obj.meshfree.deform
-    return settings.binding_id, binding.solver_settings(settings)
+class _Turn:
+    """Lets one thread at a time update: a render has one of its own."""
+
+    def __init__(self):
+        self._lock, self._owner = threading.Lock(), None
+
+    @contextmanager
+    def taken(self):
+        """Wait for the turn, and say whether this thread was not updating already, which updates call up."""
+        if self._owner == threading.get_ident():
+            yield False
+            return
+        with self._lock:
+            self._owner = threading.get_ident()
+            try:
+                yield True
+            finally:
+                self._owner = None
 
 
-def trouble(obj) -> str:
-    """What went wrong when an object was updated last; empty if nothing did."""
-    return _troubles.get(obj.session_uid, ("",))[0]
+_followers = {}  # by `binding_key`
+_followed = defaultdict(_Followed)  # by the object's session_uid, which undo does not change
+_turn = _Turn()
 
 
-def preparing(obj):
-    """Return stage and fraction of the thread that makes the factors of an object, or None."""
-    job = _jobs.get(obj.session_uid)
-    return (job.work.stage, job.work.fraction) if job is not None and job.prepares else None
+def state(obj) -> tuple:
+    """Return how a bound object follows its handles, as far as a glance tells, and what to say of that, a text."""
+    reason = stale_reason(obj, glance=True)
+    if reason:
+        return State.BAKED if is_baked(obj) else State.STALE, reason
+    followed = _followed[obj.session_uid]
+    if followed.trouble:
+        return State.STALE, followed.trouble
+    if followed.thread is None or not followed.thread.prepares:
+        return State.SETTLED, ""
+    work, known = followed.thread.work, find(obj)
+    return State.PREPARING if known is None else State.QUICK, f"{work.stage}, {work.fraction:.0%}"
 
 
 def find(obj):
-    """Return the factors of a bound object, or None."""
-    return _lives.get(live_key(obj))
+    """Return the `Follower` of a bound object, or None."""
+    return _followers.get(binding_key(obj))
 
 
-def is_prepared(obj) -> bool:
-    """Whether an object can be settled at once."""
-    live = find(obj)
-    return live is not None and live.exact is not None
+def is_prepared(follower) -> bool:
+    """Whether what a `Follower`, or None, needs for settled results is there."""
+    return follower is not None and follower.exact is not None
 
 
-def keep(obj, live):
+def keep(obj, follower):
     """Keep the factors of an object, and drop those that no object needs."""
-    used = {live_key(other) for other in binding.bound_objects()}
-    for key in _lives.keys() - used:
-        del _lives[key]
-    _lives[live_key(obj)] = live
+    used = {binding_key(other) for other in bound_objects()}
+    for key in _followers.keys() - used:
+        del _followers[key]
+    _followers[binding_key(obj)] = follower
 
 
-def plan_factors(obj, rest, matrix, constraints):
-    """Read the settings of an object; return a function of a progress callback that makes its `Live`.
-
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    rest : ndarray, (n, 3) float32
-        Points at rest in local space.
-    matrix : ndarray, (3, 3)
-        From local space to the lengths of the world.
-    constraints : binding.Constraints or callable
-        Or a function of the `LaplaceBeltrami` and a progress callback that finds them.
-    """
-    settings = obj.meshfree.deform
-    softness = settings.weight if settings.soft else None
-    options, boundary, aware = laplacian_options(obj.meshfree), boundary_points(obj), settings.rotation_aware
-    splats = read_splats(obj.data) if has_splats(obj.data) else None
-    judged = splats if obj.meshfree.leave_out_floaters else None
-
-    def operator(progress):
-        return cache.build(rest.astype(np.float64) @ matrix.T, options, boundary, progress, splats=judged).laplacian
-
-    def make_by(kind, known, progress):
-        return kind(
-            operator(progress),
-            known.moved,
-            known.kept,
-            rotation_aware=aware,
-            weights=None if softness is None else softness * known.strength,
-            progress=progress,
-        )
-
-    def make(progress):
-        known = constraints(operator(progress), progress) if callable(constraints) else constraints
-        follower = make_by(core.CoarseDeformer, known, progress)
-        # Splats scatter about their surface: motions of some points that carry the others even that out.
-        exact = follower if splats is not None else follower.exact
-        return Live(known, rest, matrix, follower, partial(make_by, core.Deformer, known), exact, splats)
-
-    return make
-
-
-def is_at_rest(live, goal) -> bool:
-    """Whether handles in local space, (h, 3), are where they were bound."""
-    return np.allclose(goal, live.rest[live.constraints.moved], rtol=0.0, atol=1e-6 * np.ptp(live.rest, axis=0).max())
-
-
-def displaced(live, goal, discs, steps=None, start=None, progress=None):
-    """Solve for handles in local space, (h, 3), with discs at rest, (n, 3), or none; return a `Moved`.
-
-    With a number of steps the result is exact, otherwise it is a quick one.
-    """
-    rest = live.follower.points
-    if is_at_rest(live, goal):
-        return Moved(rest, np.zeros_like(rest), {})
-    if steps is None:
-        solver = live.follower
-        points = solver.solve(goal @ live.matrix.T, steps=1, start=start)
-    else:
-        solver = live.prepare(progress).exact
-        points = solver.solve(goal @ live.matrix.T, steps=steps, progress=progress)
-    displacement = (points - rest) @ np.linalg.inv(live.matrix).T
-    splats = live.splats
-    if splats is None and discs is None:
-        return Moved(points, displacement, {})
-    gradients = local_gradients(solver.gradients(points), live.matrix)
-    if splats is None:
-        return Moved(points, displacement, {MOVED_DISC: moved_discs(discs, gradients)})
-    if steps is None:  # harmonics take longer than all else, and can wait
-        splats = replace(splats, harmonics=splats.harmonics[:, :0])
-    return Moved(points, displacement, moved_splats(splats.deformed(live.rest + displacement, gradients)))
-
-
-def plan_prepared(obj):
-    """Read a bound object; return a function of a progress callback that makes what settled updates need."""
+def plan_follower(obj):
+    """Read a bound object; return what makes its `Follower` from a progress callback, or has it already."""
     known = find(obj)
-    if known is not None:
-        return known.prepare
-    make, _, _ = _plan_bound(obj)
-    return lambda progress: make(progress).prepare(progress)
+    return partial(Follower, read_binding(obj)) if known is None else lambda progress: known
 
 
-def plan_settled(obj, depsgraph=None, waits=True):
-    """Read a bound object and where its handles are.
+def plan_settled(obj, pose, waits=True):
+    """Read a bound object; return what finds, from a progress callback, its `Follower` and where a pose moves it.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    depsgraph : bpy.types.Depsgraph, optional
-        Where the handles are read; otherwise as the viewport shows them.
-    waits : bool
-        Take the time to make all that is missing; otherwise, if nothing is there yet, a quick result has to do.
-
-    Returns
-    -------
-    callable
-        From a progress callback to the `Live`, made if there is none, the `Moved`, and whether it is settled.
-    ndarray
-        The pose.
+    Without the time to make all that is missing, if nothing is there yet, a quick result has to do.
     """
-    known = find(obj)
-    if known is None:
-        make, rest, constraints = _plan_bound(obj)
-    else:
-        rest, constraints = known.rest, known.constraints
-    goal, steps = binding.goal(obj, constraints, rest, depsgraph), obj.meshfree.deform.steps
-    discs = discs_at_rest(obj)
+    make, at_once = plan_follower(obj), waits or find(obj) is not None
 
     def compute(progress):
-        live = known or make(progress)
-        settled = waits or known is not None or live.exact is not None
-        return live, displaced(live, goal, discs, steps if settled else None, progress=progress), settled
+        follower = make(progress)
+        state = State.SETTLED if at_once or is_prepared(follower) else State.QUICK
+        return follower, follower.move(pose, state, progress=progress)
 
-    return compute, binding.read_pose(obj, depsgraph)
-
-
-def _plan_bound(obj):
-    """Read a bound object; return what makes its `Live`, its points at rest, and its constraints."""
-    rest, constraints = binding.read_rest(obj), binding.read_constraints(obj)
-    matrix = np.reshape(obj.meshfree.deform.matrix, (3, 3)).astype(np.float64)
-    return plan_factors(obj, rest, matrix, constraints), rest, constraints
+    return compute
 
 
-def write(obj, live, moved, pose, settled=True):
+def write(obj, follower, moved, pose):
     """Write where an object is moved, and keep what the next result starts from."""
-    live.last[obj.session_uid] = moved.points
-    binding.write_displacement(obj, moved.displacement, pose, settled, moved.carried)
-    _troubles.pop(obj.session_uid, None)
+    follower.last[obj.session_uid] = moved.points
+    write_displacement(obj, moved.displacement, pose.numbers, moved.state, moved.carried)
+    _followed[obj.session_uid].trouble = ""
 
 
-def update(obj, depsgraph=None, quick=False, waits=True):
+def update(obj, depsgraph=None, wanted=State.SETTLED):
     """Let a bound object follow its handles, if they have moved and the binding holds.
 
     Parameters
@@ -296,74 +163,58 @@ def update(obj, depsgraph=None, quick=False, waits=True):
     obj : bpy.types.Object
     depsgraph : bpy.types.Depsgraph, optional
         Where the handles are read; otherwise as the viewport shows them.
-    quick : bool
-        Take one step only and leave the rest to the timer; if factors have to be made, all of it.
-    waits : bool
-        If factors have to be made, make them now and do not leave that to the timer.
+    wanted : State
+        SETTLED whatever that takes; PREPARING to leave factors that have to be made to the timer; QUICK to take one
+        step only, and leave the rest to it.
     """
-    if binding.stale_reason(obj, glance=quick or not waits, trusting=quick):
+    if stale_reason(obj, glance=wanted is not State.SETTLED, trusting=wanted is State.QUICK):
         return
-    pose = binding.read_pose(obj, depsgraph)
-    written, settled = binding.written_pose(obj)
-    if binding.same_pose(written, pose) and (settled or quick):
-        if settled:
-            _troubles.pop(obj.session_uid, None)  # it was at another pose
-        return
-    live = find(obj)
-    if not quick and (waits or is_prepared(obj)):
-        live, moved, _ = plan_settled(obj, depsgraph)[0](lambda stage, fraction: None)
-        keep(obj, live)
-        write(obj, live, moved, pose)
-        return
-    if live is not None:
-        goal = binding.goal(obj, live.constraints, live.rest, depsgraph)
-        start = live.last.get(obj.session_uid)
-        write(obj, live, displaced(live, goal, discs_at_rest(obj), start=start), pose, settled=False)
-    settle_later(obj)
+    pose = read_pose(obj, depsgraph)
+    shown, follower = shown_state(obj, pose), _followers.get(pose.key)
+    if shown is State.SETTLED:
+        _followed[obj.session_uid].trouble = ""  # it was at another pose
+    elif wanted is State.SETTLED or (wanted is State.PREPARING and is_prepared(follower)):
+        follower, moved = plan_settled(obj, pose)(lambda stage, fraction: None)
+        keep(obj, follower)
+        write(obj, follower, moved, pose)
+    elif State.PREPARING in (shown, wanted):
+        if follower is not None:
+            write(obj, follower, follower.move(pose, State.QUICK, follower.last.get(obj.session_uid)), pose)
+        settle_later(obj)
 
 
-def update_all(scene, depsgraph, quick, waits=True):
+def update_all(scene, depsgraph, wanted):
     """Let all bound objects of a scene follow; what goes wrong is for the panel, since nobody called this."""
-    with _guarded() as free:
-        for obj in _bound_objects(scene) if free else ():
+    with _turn.taken() as free:
+        for obj in _editable(scene) if free else ():
             try:
-                update(obj, depsgraph, quick, waits)
+                update(obj, depsgraph, wanted)
             except TROUBLES as error:
-                _troubles[obj.session_uid] = told(error), None
+                _note(obj, told(error))
 
 
-def _bound_objects(scene):
-    return [obj for obj in binding.bound_objects(scene) if obj.data.is_editable]
+def _note(obj, trouble, pose=None):
+    """Keep what went wrong with an object for the panel, and the pose at which it would again."""
+    followed = _followed[obj.session_uid]
+    followed.trouble, followed.troubled = trouble, None if pose is None else pose.numbers
 
 
-@contextmanager
-def _guarded():
-    """Let one thread at a time update, and say whether this one was not updating already."""
-    global _owner
-    if _owner == threading.get_ident():
-        yield False
-        return
-    with _lock:
-        _owner = threading.get_ident()
-        try:
-            yield True
-        finally:
-            _owner = None
+def _editable(scene):
+    return [obj for obj in bound_objects(scene) if obj.data.is_editable]
 
 
 def _on_settings(obj):
     """Let an object follow by its new settings of the deformation, in a window; scripts update when they are done."""
-    if binding.is_bound(obj):
+    if is_bound(obj):
         settle_later(obj)
 
 
 def settle_later(obj):
     """Settle an object when its handles have come to rest."""
-    global _due
-    _due = perf_counter() + _IDLE
-    job = _jobs.get(obj.session_uid)
-    if job is not None and not job.prepares:
-        job.work.stop()  # what it settles is past
+    followed = _followed[obj.session_uid]
+    followed.due = perf_counter() + _IDLE
+    if followed.thread is not None and not followed.thread.prepares:
+        followed.thread.work.stop()  # what it settles is past
     if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=_TICK)
 
@@ -376,10 +227,10 @@ def _tick():
     for window in bpy.context.window_manager.windows:
         with bpy.context.temp_override(window=window):
             depsgraph = bpy.context.evaluated_depsgraph_get()
-        shown.update((obj.session_uid, (obj, depsgraph)) for obj in _bound_objects(window.scene))
-    for uid in _jobs.keys() - shown.keys():
-        _drop(uid)
-    with _guarded():
+        shown.update((obj.session_uid, (obj, depsgraph)) for obj in _editable(window.scene))
+    for uid in _followed.keys() - shown.keys():
+        _drop(_followed[uid])
+    with _turn.taken():
         waiting = [_attend(obj, depsgraph) for obj, depsgraph in shown.values()]
     if any(waiting):
         tell("panels_changed")
@@ -388,77 +239,71 @@ def _tick():
 
 def _attend(obj, depsgraph) -> bool:
     """Take the result of an object's thread, or start one; say whether there is more to come."""
-    uid = obj.session_uid
-    job = _jobs.get(uid)
+    followed = _followed[obj.session_uid]
+    thread = followed.thread
     try:
-        if binding.stale_reason(obj, glance=True):
-            _drop(uid)
+        if stale_reason(obj, glance=True):
+            _drop(followed)
             return False
-        key, pose = live_key(obj), binding.read_pose(obj, depsgraph)
-        if job is None:
-            return _start(obj, key, pose, depsgraph)
-        if job.work.ended:
-            del _jobs[uid]
-            job.work.close(bpy.context)
-            _take(obj, job, key, pose)
-        elif job.key != key:
-            _drop(uid)
-        elif job.prepares:
-            job.work.show(bpy.context)
+        pose = read_pose(obj, depsgraph)
+        if thread is None:
+            return _start(obj, pose)
+        if thread.work.ended:
+            followed.thread = None
+            thread.work.close(bpy.context)
+            _take(obj, thread, pose)
+        elif thread.pose.key != pose.key:
+            _drop(followed)
+        elif thread.prepares:
+            thread.work.show(bpy.context)
     except TROUBLES as error:
-        _troubles[uid] = told(error), None if job is None else job.pose
-        return job is not None  # else wait for another pose, not to go wrong again at once
+        _note(obj, told(error), thread and thread.pose)
+        return thread is not None  # else wait for another pose, not to go wrong again at once
     return True
 
 
-def _drop(uid):
+def _drop(followed):
     """End the thread of an object, if there is one."""
-    job = _jobs.pop(uid, None)
-    if job is not None:
-        job.work.stop()
-        job.work.close(bpy.context)
+    thread, followed.thread = followed.thread, None
+    if thread is not None:
+        thread.work.stop()
+        thread.work.close(bpy.context)
 
 
-def _start(obj, key, pose, depsgraph):
+def _start(obj, pose):
     """Start a thread that settles an object, if it is time for that; say whether there is more to come."""
-    if _is_settled(obj, pose):
-        return False
-    if binding.same_pose(_troubles.get(obj.session_uid, (None, None))[1], pose):
-        return False  # it would go wrong again
+    followed = _followed[obj.session_uid]
+    if shown_state(obj, pose) is State.SETTLED or (followed.trouble and pose.is_same(followed.troubled)):
+        return False  # or it would go wrong again
     # A setting that is dragged must not start a thread for each value. Before the first factors waiting is of no use.
-    prepares = not is_prepared(obj)
+    prepares = not is_prepared(find(obj))
     if prepares and running() is not None:
         return True
-    if perf_counter() >= _due or all(known[0] != key[0] for known in _lives):
-        compute, pose = plan_settled(obj, depsgraph, waits=False)
-        job = _jobs[obj.session_uid] = _Settling(Job("Bind", [], compute), key, pose, prepares)
+    if perf_counter() >= followed.due or all(known[0] != pose.key[0] for known in _followers):
+        work = Job("Bind", [], plan_settled(obj, pose, waits=False))
+        followed.thread = _Thread(work, pose, prepares)
         if prepares:  # takes long: it is shown as other work is, and Esc ends it
             with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-                job.work.open(bpy.context)
+                work.open(bpy.context)
     return True
 
 
-def _take(obj, job, key, pose):
+def _take(obj, thread, pose):
     """Write what a thread has computed, unless it is past."""
     try:
-        live, moved, settled = job.work.result()
+        follower, moved = thread.work.result()
     except Cancelled:
-        if job.prepares and job.work.reason == STOPPED:  # by somebody, who does not want it to begin again by itself
+        if thread.prepares and thread.work.reason == STOPPED:  # by somebody, who does not want it to begin again
             work = "Binding" if find(obj) is None else "The exact result"
-            _troubles[obj.session_uid] = f"{work} was stopped. Press Update, or move a handle", pose
+            _note(obj, f"{work} was stopped. Press Update, or move a handle", pose)
         return
-    if job.key != key:
+    if thread.pose.key != pose.key:
         return
-    if not is_prepared(obj):  # a render may have been faster
-        keep(obj, live)
-    if binding.same_pose(job.pose, pose) and (settled or not _is_settled(obj, pose)):
-        write(obj, live, moved, pose, settled)
-
-
-def _is_settled(obj, pose):
-    """Whether what an object shows is exact for a pose."""
-    written, settled = binding.written_pose(obj)
-    return settled and binding.same_pose(written, pose)
+    if not is_prepared(find(obj)):  # a render may have been faster
+        keep(obj, follower)
+    shown = shown_state(obj, pose)
+    if pose.is_same(thread.pose.numbers) and (moved.state is State.SETTLED or shown is not State.SETTLED):
+        write(obj, follower, moved, pose)
 
 
 def _is_playing():
@@ -467,38 +312,46 @@ def _is_playing():
     return any(window.screen.is_animation_playing or window.screen.is_scrubbing for window in windows)
 
 
+def _soon():
+    """What to want of an update while somebody may be dragging: without a window nobody is."""
+    return State.SETTLED if bpy.app.background else State.QUICK
+
+
 @persistent
 def _on_depsgraph_update(scene, depsgraph):
     if any(change.is_updated_transform or change.is_updated_geometry for change in depsgraph.updates):
-        update_all(scene, depsgraph, quick=not bpy.app.background)
+        update_all(scene, depsgraph, _soon())
 
 
 @persistent
 def _on_frame_change(scene, depsgraph):
-    rendering = bpy.app.background or depsgraph.mode == "RENDER"
-    update_all(scene, depsgraph, quick=not rendering and _is_playing(), waits=rendering)
+    if bpy.app.background or depsgraph.mode == "RENDER":
+        wanted = State.SETTLED
+    else:
+        wanted = State.QUICK if _is_playing() else State.PREPARING
+    update_all(scene, depsgraph, wanted)
 
 
 @persistent
 def _on_undo(scene, *_):
-    binding.forget_bound()
-    update_all(scene, bpy.context.evaluated_depsgraph_get(), quick=not bpy.app.background)
+    forget_bound()
+    update_all(scene, bpy.context.evaluated_depsgraph_get(), _soon())
 
 
 @persistent
 def _on_render(scene, *_):
     """Settle what a still picture would show on its way; frames of an animation come with a change of the frame."""
-    update_all(scene, None, quick=False)
+    update_all(scene, None, State.SETTLED)
 
 
 @persistent
 def _forget(*_):
     """Forget everything about a file when another one is opened."""
-    for uid in [*_jobs]:
-        _drop(uid)
-    for known in (_lives, _troubles):
+    for followed in [*_followed.values()]:
+        _drop(followed)
+    for known in (_followers, _followed):
         known.clear()
-    binding.forget_bound()
+    forget_bound()
 
 
 _HANDLERS = {
@@ -510,7 +363,7 @@ _HANDLERS = {
     "render_init": _on_render,
     "load_pre": _forget,
     "deform_changed": _on_settings,
-    "bound_changed": binding.forget_bound,
+    "bound_changed": forget_bound,
 }
 
 

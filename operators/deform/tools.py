@@ -1,5 +1,7 @@
 """Deform objects by handles: bind once, then move the handles; take the result over, or take it back."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 from bpy.props import BoolProperty
@@ -33,7 +35,6 @@ from ..running.ready import ReadyOperator, reporting
 from ..tools.select import SelectionOperator, groups_changed, selected
 from . import live
 from .binding import (
-    POSE,
     WRITES,
     bound_objects,
     constrain,
@@ -42,16 +43,15 @@ from .binding import (
     forget,
     handled_object,
     is_bound,
-    is_there,
+    plan_binding,
     read_constraints,
-    read_pose,
     record,
-    relative_matrix,
     renew,
     stale_reason,
-    write_displacement,
 )
+from .follower import Follower
 from .nodes import add_deform, add_shape, find_deform, is_baked, show_live, stored_name
+from .pose import POSE, State, is_there, read_pose, relative_matrix, write_displacement, write_rest
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -125,38 +125,40 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
             )
         if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
             rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
-        make = live.plan_factors(obj, rest, reading.matrix, constraints)
-        return lambda progress: (make(progress), by_empty, False)
+        binding = plan_binding(obj, rest, reading.matrix, constraints)
+        return lambda progress: (Follower(binding, progress), by_empty, False)
 
     def write(self, context, obj, result):
-        made, by_empty, chosen = result
+        follower, by_empty, chosen = result
+        binding = follower.binding
+        rest, constraints = binding.rest, binding.constraints
         if chosen:
-            _assign_ends(obj, made.constraints)
+            _assign_ends(obj, constraints)
         items = obj.meshfree.deform.handle_items
         kept = {item.name: (item.empty, tuple(item.rest)) for item in items if item.has_empty and is_there(item.empty)}
         if copied_from(obj) is not None:
             kept = {name: (_copy_empty(obj, empty), rest) for name, (empty, rest) in kept.items()}
         empties = []
-        for index, name in enumerate(made.constraints.names):
+        for index, name in enumerate(constraints.names):
             moved_by = kept.get(name)
             if by_empty[index] and moved_by is None:
-                rows = made.constraints.moved[made.constraints.owner == index]
-                empty = _add_empty(context, obj, name, made.rest, rows)
+                rows = constraints.moved[constraints.owner == index]
+                empty = _add_empty(context, obj, name, rest, rows)
                 moved_by = empty, relative_matrix(obj, empty)
             empties.append(moved_by)
-        record(obj, made.rest, made.matrix, made.constraints, empties)
+        record(obj, rest, binding.matrix, constraints, empties)
         add_deform(obj)
         tell("shape_changed", obj)
         # Blender crashes when it draws what a render's handlers change, and handles are there to be animated.
         context.scene.render.use_lock_interface = True
-        live.keep(obj, made)
+        live.keep(obj, follower)
         obj.data.pop(POSE, None)
-        write_displacement(obj, np.zeros_like(made.rest), np.zeros(0), settled=False, moved={})
-        live.update(obj, waits=bpy.app.background)
-        moved, stay = len(made.constraints.moved), len(made.constraints.kept)
+        write_displacement(obj, np.zeros_like(rest), np.zeros(0), State.PREPARING, {})
+        live.update(obj, wanted=State.SETTLED if bpy.app.background else State.PREPARING)
+        moved, stay = len(constraints.moved), len(constraints.kept)
         press = "Press G or R to move" if self.at_once else "Move"
         way = f'{press} "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
-        return [*made.follower.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
+        return [*follower.quick.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
 
     def conclude(self, context, objects):
         item = objects[0].meshfree.deform.handle_items[0]
@@ -194,9 +196,13 @@ def _plan_ends(context, obj):
         stay = held if kept.any() else np.isin(np.arange(len(points)), ends[0]).astype(np.float64)
         return constrain([name], np.where(stay > 0.0, 0.0, weights)[None], stay)
 
-    rest = reading.local(reading.points).astype(np.float32)
-    make = live.plan_factors(obj, rest, reading.matrix, choose)
-    return lambda progress: (make(progress), [True], True)
+    binding = plan_binding(obj, reading.local(reading.points).astype(np.float32), reading.matrix)
+
+    def compute(progress):
+        found = choose(binding.laplacian(progress), progress)
+        return Follower(replace(binding, constraints=found), progress), [True], True
+
+    return compute
 
 
 def _assign_ends(obj, constraints):
@@ -285,16 +291,16 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
 
     def plan(self, context, obj):
         check_fresh(obj)
-        compute, pose = live.plan_settled(obj)
+        pose = read_pose(obj)
+        compute = live.plan_settled(obj, pose)
         return lambda progress: (pose, *compute(progress))
 
     def write(self, context, obj, result):
-        pose, made, moved, _ = result
-        live.keep(obj, made)
-        live.write(obj, made, moved, pose)
-        distance = np.linalg.norm(moved.points - made.follower.points, axis=1)
-        converged = made.exact is None or made.exact.converged
-        notices = [] if converged else ["The turns of details were still changing. Raise Steps."]
+        pose, follower, moved = result
+        live.keep(obj, follower)
+        live.write(obj, follower, moved, pose)
+        distance = np.linalg.norm(moved.points - follower.quick.points, axis=1)
+        notices = [] if moved.converged else ["The turns of details were still changing. Raise Steps."]
         return [*notices, f"{obj.name}: moved at most by {length_text(distance.max())}"]
 
 
@@ -332,7 +338,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
             for values in shown_moved(obj, get_input(find_deform(obj), "Strength")).values():
                 write_attribute(obj.data, DISC, values)
         record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
-        write_displacement(obj, np.zeros_like(positions), read_pose(obj), settled=True, moved={})
+        write_rest(obj)
         if keyed and not self.keep_keyframes:
             for empty in keyed:
                 stop_moving(empty)
@@ -463,7 +469,7 @@ def put_back(context, obj):
         write_own_positions(obj.data, positions)
     context.view_layer.update()
     if same:
-        write_displacement(obj, np.zeros((point_count(data), 3)), read_pose(obj), settled=True, moved={})
+        write_rest(obj)
 
 
 def delete_bake(obj):

@@ -29,6 +29,16 @@ def live(extension):
     return importlib.import_module(f"{extension.__name__}.operators.deform.live")
 
 
+def threads(live):
+    """The threads that work for bound objects."""
+    return [followed.thread for followed in live._followed.values() if followed.thread is not None]
+
+
+def is_settled(obj):
+    """Whether what a bound object shows is exact."""
+    return bool(obj.data["lb_pose"][0])
+
+
 @pytest.fixture
 def binding(extension):
     return importlib.import_module(f"{extension.__name__}.operators.deform.binding")
@@ -166,7 +176,7 @@ class TestFollowing:
         lift(empty, -1.0)
         assert_allclose(shown_points(strip), local_points(strip), atol=1e-6)
 
-    def test_a_quick_update_is_settled_later(self, strip, live, binding):
+    def test_a_quick_update_is_settled_later(self, strip, live):
         empty = bind()
         lift(empty, 1.0)
         settled = displacement(strip)
@@ -178,13 +188,13 @@ class TestFollowing:
         following = handlers.pop(place)
         try:
             bpy.context.view_layer.update()
-            live.update(strip, bpy.context.evaluated_depsgraph_get(), quick=True)
-            assert not binding.written_pose(strip)[1]
+            live.update(strip, bpy.context.evaluated_depsgraph_get(), live.State.QUICK)
+            assert not is_settled(strip)
             assert_allclose(displacement(strip)[is_end(local_points(strip)), 2], 1.0, atol=1e-5)
             live.update(strip, bpy.context.evaluated_depsgraph_get())
         finally:
             handlers.insert(place, following)
-        assert binding.written_pose(strip)[1]
+        assert is_settled(strip)
         assert_allclose(displacement(strip), settled, atol=1e-5)
 
     def test_soft_handles_give_way(self, strip):
@@ -202,20 +212,20 @@ class TestFollowing:
         bpy.ops.meshfree.deform_update()
         assert_allclose(displacement(strip), turned, atol=1e-5)
 
-    def test_a_setting_that_is_dragged_starts_no_thread_before_it_rests(self, strip, live, binding):
+    def test_a_setting_that_is_dragged_starts_no_thread_before_it_rests(self, strip, live):
         lift(bind(soft=True), 1.0)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for weight in (0.5, 0.1, 0.01):
             strip.meshfree.deform.weight = weight
             assert live._attend(strip, depsgraph)
-            assert not live._jobs
-        live._due = 0.0
+            assert not threads(live)
+        live._followed[strip.session_uid].due = 0.0
         assert live._attend(strip, depsgraph)
-        (job,) = live._jobs.values()
-        job.work.wait(30.0)
+        (thread,) = threads(live)
+        thread.work.wait(30.0)
         live._attend(strip, depsgraph)
         assert not live._attend(strip, depsgraph)
-        assert binding.written_pose(strip)[1]
+        assert is_settled(strip)
         assert np.abs(displacement(strip)[is_end(local_points(strip)), 2] - 1.0).max() > 1e-3
 
     def test_strength(self, modifiers, strip):
@@ -255,7 +265,7 @@ class TestManyPoints:
     @pytest.fixture(autouse=True)
     def few(self, core, live, monkeypatch):
         """Take a strip for many points."""
-        monkeypatch.setattr(core, "CoarseDeformer", functools.partial(core.CoarseDeformer, count=300))
+        monkeypatch.setattr(core, "coarse_deformer", functools.partial(core.coarse_deformer, count=300))
 
     @pytest.fixture
     def unattended(self, live):
@@ -269,12 +279,12 @@ class TestManyPoints:
     def rest(self, live, obj):
         """Do what the timer does, until nothing is left to do."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        live._due, seen = 0.0, []
+        live._followed[obj.session_uid].due, seen = 0.0, []
         while live._attend(obj, depsgraph):
-            live._due = 0.0
-            for job in [*live._jobs.values()]:
-                job.work.wait(60.0)
-                seen.append(live.is_prepared(obj))
+            live._followed[obj.session_uid].due = 0.0
+            for thread in threads(live):
+                thread.work.wait(60.0)
+                seen.append(live.is_prepared(live.find(obj)))
         return seen
 
     def expected(self, core, points):
@@ -283,30 +293,30 @@ class TestManyPoints:
         deformer = core.Deformer(laplacian, is_end(points), points[:, 0] < 0.25)
         return deformer.solve(points[deformer.handles] + (0.0, 0.0, 0.7)) - points
 
-    def test_roughly_while_dragged_and_exactly_at_rest(self, core, live, binding, strip, unattended):
+    def test_roughly_while_dragged_and_exactly_at_rest(self, core, live, strip, unattended):
         before = local_points(strip)
         lift(bind(), 0.7)
         assert live.find(strip).exact is None
-        live.update(strip, quick=True)
-        live.update(strip, quick=True)
+        live.update(strip, wanted=live.State.QUICK)
+        live.update(strip, wanted=live.State.QUICK)
         rough, exact = displacement(strip), self.expected(core, before)
         assert live.find(strip).exact is None
-        assert not binding.written_pose(strip)[1]
+        assert not is_settled(strip)
         assert_allclose(rough[is_end(before)], np.tile([0.0, 0.0, 0.7], (is_end(before).sum(), 1)), atol=1e-5)
         assert 1e-5 < np.abs(rough - exact).max() < 0.05
         assert self.rest(live, strip)
-        assert binding.written_pose(strip)[1]
+        assert is_settled(strip)
         assert_allclose(displacement(strip), exact, atol=1e-4)
 
-    def test_an_opened_file_follows_before_it_is_exact(self, core, live, binding, strip, unattended):
+    def test_an_opened_file_follows_before_it_is_exact(self, core, live, strip, unattended):
         before = local_points(strip)
         lift(bind(), 0.7)
         live._forget()
-        live.update(strip, quick=True)
+        live.update(strip, wanted=live.State.QUICK)
         assert not displacement(strip).any()
         live._attend(strip, bpy.context.evaluated_depsgraph_get())
-        (job,) = live._jobs.values()
-        job.work.wait(60.0)
+        (thread,) = threads(live)
+        thread.work.wait(60.0)
         live._attend(strip, bpy.context.evaluated_depsgraph_get())
         assert live.find(strip).exact is None
         assert_allclose(displacement(strip)[is_end(before), 2], 0.7, atol=1e-5)
@@ -317,23 +327,23 @@ class TestManyPoints:
     def test_the_panel_tells_that_it_will_be_exact(self, live, strip, unattended):
         bind()
         work = SimpleNamespace(stage="Factors", fraction=0.5)
-        live._jobs[strip.session_uid] = live._Settling(work, (), np.zeros(2), prepares=True)
+        live._followed[strip.session_uid].thread = live._Thread(work, None, prepares=True)
         try:
             assert "Follows its handles roughly. Exact soon: Factors, 50%" in " ".join(draw())
         finally:
-            live._jobs.clear()
+            live._followed.clear()
 
     def test_esc_leaves_what_was_dragged(self, core, live, strip, unattended):
         lift(bind(), 0.7)
-        live.update(strip, quick=True)
+        live.update(strip, wanted=live.State.QUICK)
         rough = displacement(strip)
-        live._due = 0.0
+        live._followed[strip.session_uid].due = 0.0
         live._attend(strip, bpy.context.evaluated_depsgraph_get())
-        (job,) = live._jobs.values()
-        job.work.stop()
+        (thread,) = threads(live)
+        thread.work.stop()
         live._attend(strip, bpy.context.evaluated_depsgraph_get())
         assert not live._attend(strip, bpy.context.evaluated_depsgraph_get())
-        assert "The exact result was stopped" in live.trouble(strip)
+        assert "The exact result was stopped" in live.state(strip)[1]
         assert_allclose(displacement(strip), rough)
 
     def test_a_script_waits_for_what_is_exact(self, core, strip):
@@ -372,7 +382,7 @@ class TestFrames:
         assert_allclose([height[ends].mean() for height in forward], HEIGHTS, atol=1e-4)
         assert_allclose(self.heights(strip, (3, 1, 4, 2)), forward, atol=1e-5)
 
-    def test_a_jump_leaves_factors_to_a_thread_where_it_need_not_wait(self, strip, live, binding, monkeypatch):
+    def test_a_jump_leaves_factors_to_a_thread_where_it_need_not_wait(self, strip, live, monkeypatch):
         animate(bind())
         bpy.context.scene.frame_set(1)
         live._forget()
@@ -387,14 +397,14 @@ class TestFrames:
         drawing = others.pop(other)
         try:
             bpy.context.scene.frame_set(3)
-            live.update(strip, waits=False)
+            live.update(strip, wanted=live.State.PREPARING)
             assert asked == [strip]
             assert_allclose(displacement(strip), before)
             live.update(strip)  # as a render does
         finally:
             handlers.insert(place, following)
             others.insert(other, drawing)
-        assert binding.written_pose(strip)[1]
+        assert is_settled(strip)
         assert displacement(strip)[:, 2].max() == pytest.approx(1.5, abs=0.01)
 
     def test_lock_interface_is_set(self, strip):
@@ -797,12 +807,12 @@ class TestHolding:
         bind()
         strip.scale.x = 0.0
         bpy.context.view_layer.update()
-        assert "scaled to nothing along an axis" in live.trouble(strip)
+        assert "scaled to nothing along an axis" in live.state(strip)[1]
         with pytest.raises(RuntimeError, match="scaled to nothing along an axis"):
             bpy.ops.meshfree.deform_update()
         strip.scale.x = 1.0
         bpy.context.view_layer.update()
-        assert live.trouble(strip) == ""
+        assert live.state(strip)[1] == ""
 
     def test_a_mesh_that_another_object_edits(self, strip):
         bind(add_empties=False)
@@ -996,9 +1006,9 @@ class TestMemory:
     def test_factors_end_with_their_binding_and_with_the_file(self, strip, live):
         bind()
         bind()
-        assert len(live._lives) == 1
+        assert len(live._followers) == 1
         bpy.ops.wm.read_homefile(use_empty=True)
-        assert not live._lives
+        assert not live._followers
 
     def test_switching_off_leaves_no_handler(self, extension, strip):
         name = extension.__name__
@@ -1188,14 +1198,15 @@ class TestPanel:
 
     def test_while_it_binds_and_when_that_was_stopped(self, strip, live, core):
         bind()
+        live._followers.clear()
         work = SimpleNamespace(stage="Areas", fraction=0.5)
-        live._jobs[strip.session_uid] = live._Settling(work, (), np.zeros(2), prepares=True)
+        live._followed[strip.session_uid].thread = live._Thread(work, None, prepares=True)
         try:
             assert "Not up to date. Binding: Areas, 50%" in self.texts()
         finally:
-            live._jobs.clear()
+            live._followed.clear()
         stopped = "Binding was stopped. Press Update, or move a handle"
-        live._troubles[strip.session_uid] = stopped, None
+        live._followed[strip.session_uid].trouble = stopped
         assert "Not up to date. Binding was stopped. Press Update, or move a handle" in self.texts()
 
     def test_buttons_for_the_object_of_the_empty(self, strip):

@@ -113,7 +113,7 @@ def fresh(extension):
         bpy.ops.wm.read_homefile(use_empty=True)
         made = make()
         cache.clear()
-        live._lives.clear()
+        live._followers.clear()
         return made
 
     return start

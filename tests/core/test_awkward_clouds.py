@@ -274,7 +274,7 @@ USES = {
     "grown": (0, lambda on: core.grow(on, [0], 0.2 * extent(on))),
     "displaced": (1, lambda on: core.displace_by_mode(on, on.points[:, 0] - on.points[:, 0].mean())),
     "deformed": (1, lambda on: lifted(on, core.Deformer)),
-    "deformed coarsely": (1, lambda on: lifted(on, functools.partial(core.CoarseDeformer, count=60, neighbors=12))),
+    "deformed coarsely": (1, lambda on: lifted(on, functools.partial(core.coarse_deformer, count=60, neighbors=12))),
     "subset": (0, lambda on: core.blue_noise_subset(on.points, 30)),
     "carried": (0, carried),
     "minimal": (1, lambda on: core.minimal_surface(on.points, on.boundary | ends(on)[0], max_steps=1).points),
@@ -418,8 +418,8 @@ def calls():
     )
     solve = core.Deformer(laplacian, top, bottom).solve
     yield solve, {}, {"handle_positions": points[top], "steps": 3, "rtol": 1e-3, "start": None}
-    yield core.CoarseDeformer, on, {"handles": top, "anchors": bottom, "count": 100}
-    yield core.CoarseDeformer(laplacian, top, bottom).solve, {}, {"handle_positions": points[top]}
+    yield core.coarse_deformer, on, {"handles": top, "anchors": bottom, "count": 100}
+    yield core.coarse_deformer(laplacian, top, bottom).solve, {}, {"handle_positions": points[top]}
     yield core.minimal_surface, {"max_steps": 2}, {"points": grid, "fixed": edge, "options": core.LaplacianOptions()}
     yield core.minimal_surface, {"points": grid, "fixed": edge}, {"max_steps": 2, "epsilon": 1e-3}
 

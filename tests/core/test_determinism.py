@@ -34,7 +34,7 @@ def everything(points):
         "harmonic": core.harmonic_field(laplacian, [0, 1], [0.0, 1.0]),
         "distance": core.geodesic_distance(laplacian, [0]),
         "deformed": core.Deformer(laplacian, top, bottom).solve(moved),
-        "coarse": core.CoarseDeformer(laplacian, top, bottom).solve(moved),
+        "coarse": core.coarse_deformer(laplacian, top, bottom).solve(moved),
     }
 
 

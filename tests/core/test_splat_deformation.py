@@ -103,7 +103,7 @@ def test_points_of_no_surface_go_with_the_point_next_to_them(count, aware):
     assert (laplacian.component[-3:] < 0).all()
     z = laplacian.points[:, 2]
     own = np.arange(2003) < 2000
-    kind = core.Deformer if count is None else functools.partial(core.CoarseDeformer, count=count)
+    kind = core.Deformer if count is None else functools.partial(core.coarse_deformer, count=count)
     deformer = kind(laplacian, (z > 0.7) & own, rotation_aware=aware)
     turn = TURN if aware else np.eye(3)
     found = deformer.solve(laplacian.points[deformer.handles] @ turn.T + [1.0, 2.0, 3.0])
@@ -126,7 +126,7 @@ def test_rigid_handles_turn_covariances_and_harmonics(count):
     splats, deformer = bound_bar()
     points, handles = deformer.points, np.concatenate([deformer.handles, deformer.anchors])
     laplacian = core.build_laplacian(points)
-    kind = core.Deformer if count is None else functools.partial(core.CoarseDeformer, count=count)
+    kind = core.Deformer if count is None else functools.partial(core.coarse_deformer, count=count)
     free = kind(laplacian, handles)
     moved = free.solve(points[free.handles] @ TURN.T + [1.0, 2.0, 3.0])
     found = splats.deformed(moved, free.gradients(moved))

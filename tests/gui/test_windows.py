@@ -67,6 +67,7 @@ def part(name):
 
 live, job = part("operators.deform.live"), part("operators.running.job")
 """
+RESTING = "all(followed.thread is None for followed in live._followed.values())"
 BINDING = "job.running() is not None and job.running().label == 'Bind'"
 
 
@@ -116,7 +117,7 @@ class TestDrag:
         assert gui.python(WORKING) == []
         assert gui.python("[list(row) for row in bpy.context.object.matrix_world]") == place
         gui.wait_until(f"{MOVED} == 0.0")
-        gui.wait_until("not live._jobs")
+        gui.wait_until(RESTING)
         assert gui.python(MOVED) == 0.0
 
 
@@ -133,7 +134,7 @@ class TestTwoWindows:
         bound.shot("two_windows")
         bound.key("Return")
         bound.wait_until(f"{MOVED} == 1.0")
-        bound.wait_until("not live._jobs")
+        bound.wait_until(RESTING)
         bound.point_at_first()
         bound.key("g", "z", "1", "Return")
         bound.wait_until(f"{MOVED} == 2.0")
@@ -202,7 +203,7 @@ class TestRender:
         opened.key("F12")
         opened.wait_until("finished", 120)
         assert opened.python("seen[12][:, 2].max()") == pytest.approx(0.7, abs=0.05)
-        opened.wait_until("not live._jobs", 60)
+        opened.wait_until(RESTING, 60)
         opened.move(300, 300)  # Blender's own operator ends with the next event after the render
         finish(opened)
         assert opened.python("np.abs(places(bpy.context.evaluated_depsgraph_get()) - seen[12]).max()") < 1e-5
@@ -218,11 +219,11 @@ class TestOpenedFile:
         opened.key("shift+Right")
         opened.wait_until(BINDING)
         opened.shot("binding")
-        assert opened.python("live.preparing(bpy.data.objects['Cloud']) is not None")
+        assert opened.python("live.state(bpy.data.objects['Cloud'])[0].name == 'PREPARING'")
         assert opened.python(MOVED) < 0.01
         opened.wait_until(f"{MOVED} > 0.25", 60)
         assert opened.python(MOVED) == pytest.approx(0.3, abs=0.01)
-        opened.wait_until(f"not live._jobs and not {WORKING}")
+        opened.wait_until(f"{RESTING} and not {WORKING}")
         assert opened.python("job.running() is None")
 
     def test_escape(self, opened):
@@ -232,10 +233,10 @@ class TestOpenedFile:
         opened.wait_until("job.running() is None", 5)
         finish(opened, 5)
         assert opened.python(MOVED) < 0.01
-        assert "Press Update" in opened.python("live.trouble(bpy.data.objects['Cloud'])")
+        assert "Press Update" in opened.python("live.state(bpy.data.objects['Cloud'])[1]")
         opened.search("Mesh-Free Update")
         opened.wait_until(f"{MOVED} > 0.25", 60)
-        assert opened.python("live.trouble(bpy.data.objects['Cloud'])") == ""
+        assert opened.python("live.state(bpy.data.objects['Cloud'])[1]") == ""
 
 
 class TestApply:
@@ -251,7 +252,7 @@ with bpy.context.temp_override(window=main_window(), area=area, region=region):
     def test_esc_and_return(self, bound):
         bound.python(ANIMATED)
         bound.python("bpy.context.scene.frame_set(6)")
-        bound.wait_until(f"not live._jobs and {MOVED} > 0.4")
+        bound.wait_until(f"{RESTING} and {MOVED} > 0.4")
         bound.python("bpy.ops.ed.undo_push(message='Pose'); pose = everything(bpy.data.objects['Cloud'])")
         bound.point_at_view()
         bound.python(self.PRESS)
@@ -279,7 +280,7 @@ class TestBake:
         bound.python("bpy.context.scene.frame_set(4)")
         bound.python("handle.location.x = 0.25")  # without a keyframe
         bound.python("bpy.context.view_layer.update()")
-        bound.wait_until(f"not live._jobs and {MOVED} > 0.2")
+        bound.wait_until(f"{RESTING} and {MOVED} > 0.2")
         bound.settle()
         bound.python("before, place = everything(bpy.data.objects['Cloud']), list(handle.matrix_basis)")
         bound.python("bent = attribute(bpy.data.objects['Cloud'], 'lb_displacement')")

@@ -1,0 +1,148 @@
+"""Where the handles of a bound object are, and what its displacements were computed for.
+
+These are the attribute `lb_displacement`, in local space.
+"""
+
+import zlib
+from dataclasses import dataclass
+from enum import Enum
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...core import PointCloudError
+from ..objects.attributes import DISPLACEMENT, in_edit_mesh, point_count, positions_now, tag_changed, write_attribute
+from ..objects.carried import carries, discs_at_rest, write_moved
+
+POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
+
+
+class State(Enum):
+    """How far a bound object follows its handles."""
+
+    BAKED = "baked"  # it shows a baked animation, which no handle changes
+    STALE = "stale"  # something has changed since it was bound
+    PREPARING = "preparing"  # its handles were moved, and factors have to be made first
+    QUICK = "quick"  # by one step from the last result, on some of the points
+    SETTLED = "settled"  # exactly: by all steps from rest, on all points
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the handles of a bound object are, and all else that displacements depend on while the binding holds.
+
+    Attributes
+    ----------
+    key : tuple
+        The `binding_key` of the object.
+    changes : dict of str to ndarray, (4, 4)
+        How empties have moved their groups since they were bound, in local space.
+    edited : ndarray, (n, 3), or None
+        Positions in local space, where some handles are moved in Edit Mode.
+    discs : ndarray, (n, 3), or None
+        Those that the display draws at rest, normals times radii: they go along.
+    steps : int
+        How many a settled result takes.
+    numbers : ndarray
+        What tells it from others, and is kept in the file: checksums of the settings and of the edited positions, and
+        the numbers of all changes.
+    """
+
+    key: tuple
+    changes: dict
+    edited: np.ndarray | None
+    discs: np.ndarray | None
+    steps: int
+    numbers: np.ndarray
+
+    def is_same(self, numbers) -> bool:
+        """Whether the displacements of another pose, given by its numbers or None, are the same up to rounding."""
+        return (
+            numbers is not None
+            and numbers.shape == self.numbers.shape
+            and (numbers[:2] == self.numbers[:2]).all()
+            and np.allclose(numbers[2:], self.numbers[2:], rtol=1e-6, atol=1e-7)
+        )
+
+
+def read_pose(obj, depsgraph=None) -> Pose:
+    """Read where the handles of an object are, as a depsgraph has evaluated them; otherwise as the viewport does."""
+    settings = obj.meshfree.deform
+    moved_by = [item for item in settings.handle_items if item.has_empty and is_there(item.empty)]
+    changes = {item.name: _empty_change(obj, item, depsgraph) for item in moved_by}
+    edited = positions_now(obj) if any(not item.has_empty for item in settings.handle_items) else None
+    key = binding_key(obj)
+    asked = (key[1], settings.steps, *(["carried"] if carries(obj) else []))
+    checksums = [zlib.crc32(repr(asked).encode()), 0 if edited is None else zlib.crc32(edited)]
+    numbers = np.concatenate([checksums, *(change.ravel() for change in changes.values())])
+    return Pose(key, changes, edited, discs_at_rest(obj), settings.steps, numbers)
+
+
+def binding_key(obj) -> tuple:
+    """What the factors of an object that is not stale depend on: its binding, which copies share, and settings."""
+    settings = obj.meshfree.deform
+    return settings.binding_id, (settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0)
+
+
+def _empty_change(obj, item, depsgraph):
+    """Return how an empty has moved its handles since they were bound, in local space, (4, 4)."""
+    rest = np.reshape(item.rest, (4, 4)).astype(np.float64)
+    return relative_matrix(obj, item.empty, depsgraph) @ np.linalg.inv(rest)
+
+
+def relative_matrix(obj, empty, depsgraph=None):
+    """Return the matrix of an empty in the space of an object, (4, 4) float64, as a depsgraph has evaluated them."""
+    if depsgraph is not None:
+        obj, empty = obj.evaluated_get(depsgraph), empty.evaluated_get(depsgraph)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
+        raise PointCloudError(
+            f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
+        )
+    return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
+
+
+def is_there(obj, scene=None) -> bool:
+    """Whether an object, such as the empty of a handle, is still in a scene, or in some scene."""
+    if obj is None:
+        return False
+    scenes = bpy.data.scenes if scene is None else [scene]
+    if any(obj.visible_get(view_layer=layer) for each in scenes for layer in each.view_layers):
+        return True
+    found = obj.users_scene  # takes 1 ms for 5,000 objects
+    return scene in found if scene is not None else bool(found)
+
+
+def shown_state(obj, pose) -> State:
+    """Return how an object that is not stale follows its handles to a pose: settled, quick, or not yet."""
+    known = obj.data.get(POSE)
+    if known is None or not pose.is_same(np.array(known[1:])):
+        return State.PREPARING
+    return State.SETTLED if known[0] else State.QUICK
+
+
+def write_displacement(obj, displacement, numbers, state, moved):
+    """Write displacements in local space, (n, 3), what was carried along, by name, and the pose that both are for.
+
+    The state is SETTLED, or else they are to be found again.
+
+    In Edit Mode displacements alone are in reach.
+    """
+    data = obj.data
+    if in_edit_mesh(obj):
+        edited = bmesh.from_edit_mesh(data)
+        layer = edited.verts.layers.float_vector[DISPLACEMENT]
+        for vertex, step in zip(edited.verts, displacement.tolist(), strict=True):
+            vertex[layer] = step
+        bmesh.update_edit_mesh(data, loop_triangles=False, destructive=False)
+    else:
+        write_attribute(data, DISPLACEMENT, displacement)
+        write_moved(data, moved)
+        tag_changed(data)
+    data[POSE] = [float(state is State.SETTLED), *numbers.tolist()]
+
+
+def write_rest(obj):
+    """Write that all points are at rest, where the handles are now."""
+    write_displacement(obj, np.zeros((point_count(obj.data), 3)), read_pose(obj).numbers, State.SETTLED, {})
