@@ -12,8 +12,9 @@ import bpy
 import numpy as np
 
 from ...core import PointCloudError
-from ..objects.attributes import DISPLACEMENT, in_edit_mesh, point_count, positions_now, tag_changed, write_attribute
+from ..objects.attributes import in_edit_mesh, point_count, positions_now, tag_changed, write_attribute
 from ..objects.carried import carries, discs_at_rest, write_moved
+from ..objects.quantities import DISPLACEMENT
 
 POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
 
