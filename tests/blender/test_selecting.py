@@ -143,7 +143,7 @@ def draw_points():
         def __getattr__(self, name):
             return lambda *_, **__: self
 
-    panel = SimpleNamespace(layout=Layout())
+    panel = SimpleNamespace(layout=Layout(), bl_label="Points and Groups")
     bpy.types.MESHFREE_PT_points.draw(panel, bpy.context)
     return buttons
 
