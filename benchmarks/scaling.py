@@ -1,4 +1,4 @@
-"""How time and memory of every stage grow with the number of points, with two peers beside it.
+"""Time and memory of every stage against the number of points, compared with two peers.
 
     python -m benchmarks.scaling [points ...]
 
