@@ -187,7 +187,7 @@ def _stages(title, results, counts):
         seconds = [result["seconds"][name] for result in results]
         pairs = zip(seconds, (result["gigabytes"].get(name, 0.0) for result in results), strict=True)
         rows.append([name, *(f"{value:.2f}" for pair in pairs for value in pair), growth(seconds, counts)])
-    return Table(title, header, rows, "Seconds, and the most memory of the process meanwhile, on two cores.")
+    return Table(title, header, rows, "Seconds, and peak memory of the process, on two cores.")
 
 
 def _whole(results, counts):
