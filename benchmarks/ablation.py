@@ -51,12 +51,13 @@ UNTUNED = (  # memory, rounding, counts, and what only notices go by
 )
 DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"
 NOTE = """\
-What each correction and each constant between the coordinates and the stiffness matrix does. Every figure is an error
-with the change over the error without it, in the geometric mean of a group; above 1 the change makes it worse. *Zoo*:
-seven shapes of 3,000 random points, one of them open, vertices of three meshes, points as seen from four places, noise
-of 0.3 spacings, 5 % of outliers. *Awkward*: a sphere whose halves differ 30 : 1 in density, a sphere on circles of
-latitude. *Smooth*: spheres of 2,000 random and even points, half a sphere. Errors of area and eigenvalues below 0.1 %
-count as that, on smooth shapes below 0.01 %. Boundary: points wrongly found, plus one.
+The effect of each correction and each constant between the coordinates and the stiffness matrix. Every figure is the
+ratio of the error with the change to the error without it, as geometric mean of a group; above 1 the change increases
+the error. *Zoo*: seven shapes of 3,000 random points, one of them open, vertices of three meshes, points seen from four
+viewpoints, noise of 0.3 spacings, 5 % of outliers. *Awkward*: a sphere whose halves have densities of 30 : 1, and a
+sphere sampled on circles of latitude. *Smooth*: spheres of 2,000 random and even points, and a hemisphere. Errors of
+area and eigenvalues below 0.1 % count as 0.1 %, on smooth shapes below 0.01 % as 0.01 %. Boundary: number of points
+wrongly found at a boundary, plus one.
 
 Made by `MESHFREE_ZOO=folder python -m benchmarks.ablation`.
 """

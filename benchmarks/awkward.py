@@ -21,13 +21,13 @@ from .tables import Table
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "awkward.md"
 ABOUT = """\
-Area: off from the exact one. Told: by a notice, or by `lb_trust` on more than a fiftieth of the area. Doubtful: the
-share of the area that `lb_trust` marks. Made by `python -m benchmarks.awkward`.
+Area: error against the exact one. Told: whether a notice, or `lb_trust` on more than a fiftieth of the area, reports
+the problem. Doubtful: share of the area with `lb_trust` below one half. Made by `python -m benchmarks.awkward`.
 """
 ABOUT_RAW = """\
 Clouds from the data of CGAL, MeshLab, VTK, PCL and others, which are not part of the project. Where they come with a
-mesh, the area is compared with that of its triangles; Human, brain and man are nested shells in part, and their
-meshes fold.
+mesh, the area is compared with that of its triangles; parts of Human, brain and man are nested shells, and their meshes
+have folds.
 """
 SPHERE = 4.0 * np.pi
 

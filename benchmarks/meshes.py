@@ -28,19 +28,19 @@ COUNT = 10_000  # random points
 SAMPLES = 200_000  # of a surface that distances are measured to
 SLIVER = 10.0  # degrees
 ABOUT = """\
-[Surface from Points](operators/mesh_surface.md) on eleven shapes of which the true mesh is known, from its vertices and
-from 10,000 random points on it, and on clouds as scanners give them; beside it the screened Poisson surface of
-pymeshlab 2025.7 with the same normals, and with cells of at most our voxels. In brackets is what the true mesh has: a
-mesh is watertight with no open edges where that has none. Distances are in spacings of the points, the root of the
-median area: the mean, that which 95 % are below, and the largest; of the true surface from the vertices, and of the
-mesh from even samples of the true surface. With a scan alone, marked *, they are those from the points. Slivers:
-triangles with an angle below 10 degrees, quads divided along their better diagonal. The operator is built before, and
-its time is left out; the machine did other things, too.
+[Surface from Points](operators/mesh_surface.md) on eleven shapes with known meshes, from their vertices and from 10,000
+random points on them, and on raw clouds of scanners, compared with the screened Poisson reconstruction of pymeshlab
+2025.7 with the same normals, and with cells no larger than our voxels. Values of the true mesh are in brackets: a mesh
+is watertight if it has no open edges where the true mesh has none. Distances are in spacings of the points, the square
+root of the median area: the mean, the 95th percentile, and the maximum; from the vertices to the true surface, and from
+even samples of the true surface to the mesh. For scans without a mesh, marked *, the distances are those from the
+points. Slivers: share of triangles with an angle below 10 degrees, quads divided along their better diagonal. The time
+excludes that of the operator; the machine ran other jobs, too.
 
-The rules were found by looking at cheburashka, featuretype, arm, cat, screwdriver, rocker-arm, brain and scannet; on
-others, marked *, they were only run. The 1,722 vertices of featuretype lie along the edges of a machine part: nothing
-tells what is between them, and hardly any mesh is made. Brain's own mesh folds and has 14 pieces: shells closer to each
-other than the points are lost, which Poisson loses less of.
+The rules were developed on cheburashka, featuretype, arm, cat, screwdriver, rocker-arm, brain and scannet; the others,
+marked *, were only run. The 1,722 vertices of featuretype lie along the edges of a machine part, with no points between
+them, and give hardly any mesh. The mesh of brain has folds and 14 pieces: shells closer to each other than the points
+are lost, fewer of them by Poisson.
 
 Made by `MESHFREE_ZOO=folder MESHFREE_RAW=folder python -m benchmarks.meshes`; the shapes are not part of the project.
 """

@@ -308,9 +308,9 @@ def unknown(found):
         agree = [written(result["as", name]) for name in ("outside", "Open3D")]
         rows.append([case.name, f"{len(case.points):,}", *shares, *agree, f"{result['seconds']:.1f}"])
     note = (
-        "Nobody knows their sides. Instead: the share of pairs of neighbors, twelve of each point, whose normals differ"
-        " by more than a right angle, which edges and leaves do as well; and the share of points where winding agrees"
-        " with outside and with Open3D, each connected part taken as it fits better."
+        "Without ground truth: *torn* is the share of pairs of neighbors, twelve of each point, whose normals differ by"
+        " more than a right angle, as they also do at edges and leaves; and the share of points where winding agrees"
+        " with outside and with Open3D, each connected component with its better sign."
     )
     columns = ["cloud", "n", *(f"{method}: torn" for method in METHODS), "winding as outside", "as Open3D", "CPU s"]
     return Table("Raw clouds of unknown sides", columns, rows, note)

@@ -22,16 +22,16 @@ from .tables import Table
 MODES = 21
 DOCUMENT = Path(__file__).parents[1] / "docs" / "real_shapes.md"
 ABOUT = """\
-Eleven shapes (meshes of area 1, from the data of geometry libraries), their points taken in several ways: the
-vertices of the mesh, random points, points seen from four places with a density that falls with the squared distance,
-noise of a share of the spacing along the normals, and outliers in a box around. Beside each figure stands that of the
-tufted cover (Sharp and Crane 2020, robust_laplacian) on the same points. Eigenvalues: mean error of the first 20
-above the constant one, against those of the mesh, refined. Face is an open surface; the 1,722 vertices of featuretype
-are those of a technical drawing, too few for its walls. Boundary: points found at one. Zero modes: as many as
-components, or parts would hang loose. Least share: of the area that the most local of the first 21 modes lives on, its
-participation. Doubtful: share of the area that `lb_trust` marks. The constants were chosen on rocker-arm, cat, arm,
-cheburashka, screwdriver and fandisk; on the others the same ones were only run. Seconds are of a machine that did other
-things, too.
+Eleven shapes (meshes of area 1, from the data of geometry libraries) in several samplings: the vertices of the mesh,
+random points, points seen from four viewpoints with a density that falls with the squared distance, noise along the
+normals given in spacings, and outliers in a box around the shape. Each figure is given beside that of the tufted cover
+(Sharp and Crane 2020, robust_laplacian) on the same points. Eigenvalues: mean error of the first 20 above the constant
+one, against those of the refined mesh. Face is an open surface; the 1,722 vertices of featuretype are those of a
+technical drawing, too few for its walls. Boundary: number of points found at a boundary. Zero modes: as many as
+components, unless parts are disconnected. Least share: share of the area that the most localized of the first 21 modes
+covers, its participation ratio. Doubtful: share of the area with `lb_trust` below one half. The constants were chosen
+on rocker-arm, cat, arm, cheburashka, screwdriver and fandisk; the others were run with the same ones. Seconds were
+measured on a machine that ran other jobs, too.
 
 Made by `MESHFREE_ZOO=folder python -m benchmarks.real_shapes`; the shapes are not part of the project.
 """

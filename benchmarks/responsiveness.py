@@ -99,7 +99,8 @@ def responsiveness(sizes=SIZES):
         "Responsiveness",
         ["computation", "seconds", "window waits at most", "in", "no report for at most", "in"],
         rows,
-        "Random points on a sphere; every computation runs in a thread beside one that wants Python's lock. Seconds.",
+        "Random points on a sphere; every computation runs in a thread while another one requests"
+        " Python's global interpreter lock. Seconds.",
     )
 
 

@@ -47,11 +47,8 @@ OTHERS = {
     "window": interaction.window,
     "stages": speed.stages_and_memory,
 }
-SUMMARY = "What must come out"
-ABOUT = (
-    "Of the figures and tables below, which hold the rows. A peer is better than this project where it is above, by the"
-    " factor that is given."
-)
+SUMMARY = "Goals"
+ABOUT = "Goals of the figures and tables below. Peer over ours: the error of the peer divided by that of this project."
 
 
 def main(names):
@@ -75,8 +72,8 @@ def main(names):
     summary = Table(SUMMARY, ["quantity", "target", "measured", "met"], [goals[key] for key in sorted(goals)], ABOUT)
     head = (
         "# Results\n\nMade by `make benchmark`, on two cores in 20 minutes; the tables after the peers'"
-        ' by their names, such as `make benchmark ARGUMENTS="targets applications"`. Times are of the machine it ran'
-        f" on, compare only those of one table. Python {platform.python_version()}, numpy {numpy.__version__},"
+        ' by their names, such as `make benchmark ARGUMENTS="targets applications"`. Times depend on the machine:'
+        f" compare only those of one table. Python {platform.python_version()}, numpy {numpy.__version__},"
         f" scipy {scipy.__version__}.\n"
     )
     # The figures by their numbers, then the other tables as they stood.

@@ -1,4 +1,4 @@
-"""How time and memory of every stage grow with the number of points, with two peers beside it.
+"""Time and memory of every stage against the number of points, compared with two peers.
 
     python -m benchmarks.scaling [points ...]
 
@@ -187,7 +187,7 @@ def _stages(title, results, counts):
         seconds = [result["seconds"][name] for result in results]
         pairs = zip(seconds, (result["gigabytes"].get(name, 0.0) for result in results), strict=True)
         rows.append([name, *(f"{value:.2f}" for pair in pairs for value in pair), growth(seconds, counts)])
-    return Table(title, header, rows, "Seconds, and the most memory of the process meanwhile, on two cores.")
+    return Table(title, header, rows, "Seconds, and peak memory of the process, on two cores.")
 
 
 def _whole(results, counts):

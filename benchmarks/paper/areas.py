@@ -61,8 +61,8 @@ def figure_1():
         ["points", "areas", "not positive", "deviation / mean", "total", "seconds"],
         rows,
         "Radii 0.8 and 0.2, 16,000 points. The kernel of the paper's settings, in which a support holds some 900"
-        f" points, but for the default; each way but the last may take {PRODUCTS} products with A."
-        " The paper does not say how its torus was sampled.",
+        f" points, except for the default; each method but the last is limited to {PRODUCTS} products with A."
+        " The paper does not state the sampling of its torus.",
         plots=[plots.histograms("figure01", panels, "area of a point, thousandths")],
     )
 
@@ -107,9 +107,8 @@ def figure_2():
         "Figure 2: areas",
         ["cloud", "points", "area", "default, error", "seconds", *(METHODS[peer].label for peer in peers)],
         rows,
-        "Errors against the known area, of scans against that of the triangles they came with; the goal is"
-        " for those that are closed. Seconds are those of the areas with all that comes before them. The paper's models"
-        " are not at hand, but its 12k one may be max-planck.",
+        "Errors against the known area, for scans against that of their triangles; the goal is for closed ones. Seconds"
+        " include all stages up to the areas. The paper's models are not available, but its 12k one may be max-planck.",
         goals=goals,
     )
 

@@ -26,6 +26,5 @@ def pictures():
         "Figures 9 to 16: pictures",
         ["figure", "what", "picture"],
         rows,
-        "Rendered in Blender by `make pictures`; the numbers that belong to them are among the targets of the"
-        " applications.",
+        "Rendered in Blender by `make pictures`; their numbers are among the targets of the applications.",
     )

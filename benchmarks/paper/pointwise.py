@@ -154,8 +154,8 @@ def figure_4():
         ["sphere", "function", "method", *(f"{count:,}" for count in COUNTS), "order"],
         rows,
         "Relative l2 errors on unit spheres; of the icosahedral one the plots show the maximum norm too. The order is"
-        ' in the spacing, fitted to all numbers of points. "wider": h grows as the root of the spacing,'
-        ' `bandwidth="global"`, 0.35 (n / 2000)^(1/4) of the distance to the 100th neighbor.',
+        ' in the spacing, fitted to all numbers of points. "wider": h is proportional to the square root of the'
+        ' spacing, `bandwidth="global"`, 0.35 (n / 2000)^(1/4) of the distance to the 100th neighbor.',
         plots=names,
         goals=goals,
     )
@@ -183,6 +183,6 @@ def figure_5():
         "Figure 5: pointwise error on 8,000 points",
         ["sphere", "n", "method", *header],
         rows,
-        "Relative errors. The paper prints no numbers beside its bars.",
+        "Relative errors. The paper gives no numbers for its bars.",
         plots=[plots.bars("figure05", dict(sorted(panels.items(), key=lambda item: item[0].endswith("max"))))],
     )

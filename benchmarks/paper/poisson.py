@@ -50,7 +50,7 @@ def figure_8():
         "Figure 8: Poisson's equation on tori",
         ["torus", "norm", "method", *(f"{count:,}" for count in COUNTS), "order"],
         rows,
-        "-Delta u = -x / sqrt(x^2 + y^2) on a torus with radii 1 and 0.4 (the paper names none), relative errors of u"
+        "-Delta u = -x / sqrt(x^2 + y^2) on a torus with radii 1 and 0.4 (the paper gives none), relative errors of u"
         " without its mean, against a solution that is exact to rounding. Triangles: Delaunay in conformal"
         " coordinates.",
         plots=[plots.convergence("figure08", panels)],

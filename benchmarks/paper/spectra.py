@@ -63,7 +63,7 @@ def figure_7():
         "Figure 7: eigenvalues of the unit sphere on 8,000 points",
         ["sphere", "method", "mean", "max", "resolved"],
         rows,
-        f"Relative errors of the first {MODES} eigenvalues without the zero. Those of GMLS are its real parts.",
+        f"Relative errors of the first {MODES} eigenvalues without the zero one. For GMLS the real parts are used.",
         plots=pictures,
         goals=goals,
     )
@@ -110,7 +110,7 @@ def figure_6():
         ["surface", "method", "n", "mean", "max", "eigenvalues", "order"],
         rows,
         "Relative errors; the order is in the spacing, from the row before. The default's kernel holds about 120 points"
-        " of an even cloud and comes to the noise of its sums, below 1e-6, at 32,000 points; with twice as many,"
+        " of an even cloud and reaches the noise of its sums, below 1e-6, at 32,000 points; with twice as many,"
         f' `bandwidth="global"`, `bandwidth_factor={FIXED.bandwidth_factor}`, errors are larger and fall with the'
         " fourth order throughout.",
         plots=[plots.convergence("figure06", panels)],
@@ -140,8 +140,8 @@ def neighbors():
         "50 against 100 neighbors for the spectrum",
         ["sphere", "settings", "neighbors", "mean", "max", "eigenvalues", "seconds"],
         rows,
-        "The paper says that 50 neighbors serve the spectrum. Its own settings leave the eigenvalues with the error of"
-        " the kernel's width, which falls with fewer neighbors; the default corrects it.",
+        "According to the paper 50 neighbors suffice for the spectrum. With its own settings eigenvalues have the error"
+        " of the kernel's width, which falls with fewer neighbors; the default corrects it.",
     )
 
 
@@ -172,7 +172,7 @@ def figure_17():
         ["noise", "method", "mean", "max", "resolved"],
         rows,
         f"8,000 Fibonacci points with Gaussian noise in all directions, in spacings ({FIVE_PERCENT:.2f} are 5 % of the"
-        " radius); relative errors of the first 36 eigenvalues. The methods that need a mesh keep the true triangles of"
+        " radius); relative errors of the first 36 eigenvalues. Methods that need a mesh use the true triangles of"
         " the points without noise.",
         plots=[
             plots.convergence(
@@ -223,8 +223,8 @@ def race(aim=5e-3, modes=50):
         "Time to eigenvalues within 0.5 %",
         ["method", "points", f"{modes} eigenvalues, mean", "seconds"],
         rows,
-        "Random points on the unit sphere, the fewest that suffice of 1,000, 1,500, 2,000, 3,000, 4,000, 6,000, 8,000,"
-        f" 16,000: operator and {modes} eigenpairs, the best of three runs. The time that a mesh took to make is not"
-        " counted.",
+        "Random points on the unit sphere, the smallest sufficient number of 1,000, 1,500, 2,000, 3,000, 4,000, 6,000,"
+        f" 8,000, 16,000: operator and {modes} eigenpairs, the best of three runs. The time for making a mesh is not"
+        " included.",
         goals=goals,
     )
