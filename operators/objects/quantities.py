@@ -77,7 +77,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         AREA,
         "Area",
-        "Part of the surface that belongs to each point",
+        "Area of the surface element of each point",
         "analyze",
         "laplacian.areas",
         power=2,
@@ -111,7 +111,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         BOUNDARY,
         "Boundary",
-        "True for the points at which the surface ends",
+        "True for points on the boundary of the surface",
         "analyze",
         "laplacian.boundary",
         "BOOLEAN",
@@ -120,7 +120,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         COMPONENT,
         "Component",
-        "Number of the component that a point belongs to, the largest 0; -1 for points left out",
+        "Number of the point's component, the largest 0; -1 for points left out",
         "analyze",
         "laplacian.component",
         "INT",
@@ -130,7 +130,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         TRUST,
         "Trust",
-        "How far the points around carry the answer, 0 to 1",
+        "Reliability of the results at the point, 0 to 1",
         "analyze",
         "laplacian.trust",
         left_out=0.0,
@@ -140,14 +140,14 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         SHAPE_INDEX,
         "Shape Index",
-        "The kind of shape: 1 a cap, 0 a saddle, -1 a cup, others between",
+        "1 a cap, 0.5 a ridge, 0 a saddle, -0.5 a valley, -1 a cup",
         "principal_curvatures",
         "shape_index",
     ),
     Quantity(
         CURVEDNESS,
         "Curvedness",
-        "How strongly the surface bends, whatever its shape",
+        "Root mean square of both curvatures",
         "principal_curvatures",
         "curvedness",
         power=-1,
@@ -155,7 +155,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         CURVATURE_1,
         "Curvature 1",
-        "Curvature where the surface bends outwards most",
+        "Greatest principal curvature",
         "principal_curvatures",
         "first",
         power=-1,
@@ -163,7 +163,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         CURVATURE_2,
         "Curvature 2",
-        "Curvature where the surface bends outwards least",
+        "Least principal curvature",
         "principal_curvatures",
         "second",
         power=-1,
@@ -178,12 +178,12 @@ QUANTITIES = (  # in the order of the panel
         carried="label",
         along_surface=True,
     ),
-    Quantity(ROUGHNESS, "Roughness", "How far each point sticks out of the smooth surface", "roughness", power=1),
+    Quantity(ROUGHNESS, "Roughness", "Signed height of each point above the smoothed surface", "roughness", power=1),
     Quantity(FIELD, "Field", "The smoothest field between given values", "harmonic_field"),
     Quantity(
         DISTANCE,
         "Distance",
-        "Distance along the surface from the nearest of some points",
+        "Geodesic distance, along the surface, to the nearest of the given points",
         "geodesic_distance",
         power=1,
         color_range="positive",
@@ -191,7 +191,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         SIGNED_DISTANCE,
         "Signed Distance",
-        "Distance along the surface from a curve that lies on it, with a sign that tells the side",
+        "Geodesic distance from a curve on the surface, with the side as its sign",
         "signed_distance",
         power=1,
         color_range="symmetric",
@@ -199,7 +199,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         DEVIATION,
         "Deviation",
-        "How far each point of a cloud is from the surface of another one, along its normal",
+        "Signed distance of each point of a cloud from the surface of another one, along its normal",
         "compare",
         power=1,
         color_range="symmetric",
@@ -214,12 +214,12 @@ QUANTITIES = (  # in the order of the panel
         along_surface=True,
     ),
     Quantity(
-        UV, "UV", "Texture coordinates: 0.5, 0.5 in the middle, 0 and 1 at the borders", "unwrap", data_type="FLOAT2"
+        UV, "UV", "Texture coordinates: 0.5, 0.5 at the center, 0 and 1 at the borders", "unwrap", data_type="FLOAT2"
     ),
     Quantity(
         DISPLACEMENT,
         "Displacement",
-        "How far each point moved",
+        "Displacement of each point",
         "deform_bind",
         data_type="FLOAT_VECTOR",
         power=1,
