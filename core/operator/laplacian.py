@@ -332,8 +332,7 @@ def build_laplacian(
         The input has no sound answer; the text says why and what to do. Its children tell what it is: points, normals
         or a boundary of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighbourhoods need
         (`TooFewPointsError`), points along a curve (`NotASurfaceError`), components of too few points alone
-        (`ComponentError`), more points than the free memory is
-        enough for, before the start (`NotEnoughMemoryError`).
+        (`ComponentError`), more points than the free memory is enough for, before the start (`NotEnoughMemoryError`).
 
     See Also
     --------

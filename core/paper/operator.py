@@ -61,6 +61,11 @@ def build_laplacian(
     PointCloudError
         A setting out of range, or points without a sound answer, as of the default operator.
 
+    See Also
+    --------
+    build_laplacian : The default, for scans.
+    check_stability : Measures what Theorem 1 of the paper assumes.
+
     References
     ----------
     Petronetto, Paiva, Helou, Stewart, Nonato. Mesh-free discrete Laplace-Beltrami operator. 2013.

@@ -16,7 +16,7 @@ SHOWN = [
     "LaplaceBeltrami.eigenpairs",
     "LaplaceBeltrami.toward",
     "LaplacianOptions",
-    "LaplacianOptions.paper",
+    "paper.build_laplacian",
     "Prolongation",
     "Slopes",
     "Transport",
@@ -60,6 +60,11 @@ FOUND = {
     test.name: test
     for name in core.__all__
     for test in doctest.DocTestFinder(exclude_empty=False).find(getattr(core, name), name, globs={})
+} | {
+    test.name: test
+    for test in doctest.DocTestFinder(exclude_empty=False).find(
+        core.paper.build_laplacian, "paper.build_laplacian", globs={}
+    )
 }
 RUNNABLE = [name for name, test in FOUND.items() if test.examples]
 

@@ -99,7 +99,7 @@ class TestProjection:
     def test_quadrics_bring_the_points_back(self, noisy):
         once = projected(noisy, LEVEL)
         assert off_sphere(once) < 0.35 * off_sphere(noisy)
-        assert off_sphere(projected(once, "quadric", LEVEL)) < 0.9 * off_sphere(once)
+        assert off_sphere(projected(once, LEVEL)) < 0.9 * off_sphere(once)
 
     def test_planes_too_but_they_cut_the_bend(self):
         noisy = 3.0 * noisy_sphere(COUNT, 0.5)
