@@ -41,9 +41,8 @@ def archive():
     return path
 
 
-@pytest.fixture(autouse=True)
-def empty_scene(installed):
-    """Start every test from an empty scene; what others computed is still known, for many use the same clouds.
+def new_file():
+    """Start from an empty scene; what was computed is still known, for many tests use the same clouds.
 
     Tests of the computation itself empty the cache.
     """
@@ -52,8 +51,16 @@ def empty_scene(installed):
     cache = importlib.import_module(f"{MODULE}.operators.running.cache")
     kept = dict(cache._kept)
     bpy.ops.wm.read_homefile(use_empty=True)  # which gives the memory back
-    assert MODULE in bpy.context.preferences.addons
     cache._kept.update(kept)
+
+
+@pytest.fixture(autouse=True)
+def empty_scene(installed):
+    """Start every test from an empty scene."""
+    import bpy
+
+    new_file()
+    assert MODULE in bpy.context.preferences.addons
 
 
 @pytest.fixture
