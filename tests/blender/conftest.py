@@ -70,12 +70,38 @@ def extension(installed):
 
 
 @pytest.fixture
-def core(installed):
-    """The installed extension's package of mathematics."""
-    return importlib.import_module(f"{MODULE}.core")
+def module(extension):
+    """Get a module of the extension by its name."""
+    return lambda name: importlib.import_module(f"{extension.__name__}.{name}")
 
 
 @pytest.fixture
-def modifiers(extension):
+def core(module):
+    """The installed extension's package of mathematics."""
+    return module("core")
+
+
+@pytest.fixture
+def modifiers(module):
     """The module that sets inputs of the extension's own modifiers."""
-    return importlib.import_module(f"{extension.__name__}.operators.objects.modifiers")
+    return module("operators.objects.modifiers")
+
+
+@pytest.fixture
+def display(module):
+    """The module of colors on points."""
+    return module("ui.display")
+
+
+@pytest.fixture
+def overlay(module):
+    """The module that draws over the view."""
+    return module("ui.overlay")
+
+
+@pytest.fixture
+def cache(module):
+    """The module that keeps what was computed, emptied."""
+    cache = module("operators.running.cache")
+    cache.clear()
+    return cache
