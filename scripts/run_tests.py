@@ -1,7 +1,8 @@
 """Run the tests: core without Blender, the installed extension in Blender's module, and in a window with real keys.
 
-As many suites run side by side as there are processors, while this program makes the environments of the next ones.
-What pytest prints goes to a file per suite in build/tests/, and from there to the screen where a test fails.
+As many suites run side by side as there are processors, while this program makes the environments of the next ones;
+each but the window's in two halves, of every second file, so that no processor waits long for the last. What pytest
+prints goes to a file per suite in build/tests/, and from there to the screen where a test fails.
 """
 
 import argparse
@@ -43,19 +44,24 @@ class Suites:
                 _end(process)
         self._pool.shutdown()
 
-    def start(self, name, python, folder, **variables):
-        """Run the tests of a folder in an environment as soon as a processor is free; see `isolated`."""
-        self._runs.append(self._pool.submit(self._run, name, python, folder, variables))
+    def start(self, name, python, *tests, **variables):
+        """Run some tests in an environment as soon as a processor is free; see `isolated`."""
+        self._runs.append(self._pool.submit(self._run, name, python, tests, variables))
+
+    def start_half(self, number, name, python, folder, **variables):
+        """Run the first or the second half of the tests of a folder, by their files."""
+        files = sorted(path.relative_to(ROOT) for path in (ROOT / folder).glob("test_*.py"))
+        self.start(f"{name}-{number}", python, *files[number - 1 :: 2], **variables)
 
     def results(self):
         """Wait for all; return their outcomes by name."""
         return dict(run.result() for run in as_completed(self._runs))
 
-    def _run(self, name, python, folder, variables):
+    def _run(self, name, python, tests, variables):
         report, log = RESULTS / f"{name}.xml", RESULTS / f"{name}.txt"
         report.unlink(missing_ok=True)
-        command = [str(python), "-m", "pytest", folder, "-p", "no:cacheprovider", f"--junitxml={report}"]
-        print(f"{name:12} runs {folder}, see {log.relative_to(ROOT)}", flush=True)
+        command = [str(python), "-m", "pytest", *map(str, tests), "-p", "no:cacheprovider", f"--junitxml={report}"]
+        print(f"{name:13} runs, see {log.relative_to(ROOT)}", flush=True)
         began = time.monotonic()
         with log.open("wb") as output:
             # In a session of its own, so that Ctrl-C reaches it once: by `_end`.
@@ -79,7 +85,7 @@ class Suites:
         sound = process.returncode == 0 and ending.startswith("exit")
         if not sound and not counts["failed"] and not counts["errors"]:
             counts["errors"] = 1
-        words = f"{name:12} {_words(counts, time.monotonic() - began)}"
+        words = f"{name:13} {_words(counts, time.monotonic() - began)}"
         text = "" if sound else _failures(log.read_text(encoding="utf-8", errors="replace"))
         print(text + words + ("" if sound else f", {ending}"), flush=True)
         return name, counts
@@ -143,16 +149,21 @@ def main():
     began = time.monotonic()
     found = [] if options.gui else list(pythons.find().items())[: None if options.all else 1]
     with Suites() as suites:
-        for version, python in found:
-            # Results must not depend on the number of threads: the last one has as many as in Blender.
-            threads = {"OPENBLAS_NUM_THREADS": None} if options.all and version == found[-1][0] else {}
-            suites.start(f"core-{version}", ensure(f"core-{version}", "test", python), "tests/core", **threads)
+        cores = {f"core-{version}": ensure(f"core-{version}", "test", python) for version, python in found}
+        # Results must not depend on the number of threads: the last one has as many as in Blender.
+        threads = {name: {"OPENBLAS_NUM_THREADS": None} for name in list(cores)[-1:] if options.all}
+        for name, python in cores.items():
+            suites.start_half(1, name, python, "tests/core", **threads.get(name, {}))
         package.build([package.this_platform()])
         if options.gui or options.all:  # the longest: not the last
             start_gui(suites, required=options.gui)
         for version, python in found:
             for blender in pythons.BLENDERS[version][: None if options.all else 1]:
-                suites.start(f"blender-{blender}", ensure_blender(blender, python), "tests/blender")
+                environment = ensure_blender(blender, python)
+                for number in (1, 2):
+                    suites.start_half(number, f"blender-{blender}", environment, "tests/blender")
+        for name, python in cores.items():
+            suites.start_half(2, name, python, "tests/core")
         results = suites.results()
     for version in () if options.gui else pythons.BLENDERS.keys() - pythons.find().keys():
         print(f"Left out: Blender {' and '.join(pythons.BLENDERS[version])}, no Python {version} is found")

@@ -41,9 +41,8 @@ def archive():
     return path
 
 
-@pytest.fixture(autouse=True)
-def empty_scene(installed):
-    """Start every test from an empty scene; what others computed is still known, for many use the same clouds.
+def new_file():
+    """Start from an empty scene; what was computed is still known, for many tests use the same clouds.
 
     Tests of the computation itself empty the cache.
     """
@@ -52,8 +51,16 @@ def empty_scene(installed):
     cache = importlib.import_module(f"{MODULE}.operators.running.cache")
     kept = dict(cache._kept)
     bpy.ops.wm.read_homefile(use_empty=True)  # which gives the memory back
-    assert MODULE in bpy.context.preferences.addons
     cache._kept.update(kept)
+
+
+@pytest.fixture(autouse=True)
+def empty_scene(installed):
+    """Start every test from an empty scene."""
+    import bpy
+
+    new_file()
+    assert MODULE in bpy.context.preferences.addons
 
 
 @pytest.fixture
@@ -63,12 +70,38 @@ def extension(installed):
 
 
 @pytest.fixture
-def core(installed):
-    """The installed extension's package of mathematics."""
-    return importlib.import_module(f"{MODULE}.core")
+def module(extension):
+    """Get a module of the extension by its name."""
+    return lambda name: importlib.import_module(f"{extension.__name__}.{name}")
 
 
 @pytest.fixture
-def modifiers(extension):
+def core(module):
+    """The installed extension's package of mathematics."""
+    return module("core")
+
+
+@pytest.fixture
+def modifiers(module):
     """The module that sets inputs of the extension's own modifiers."""
-    return importlib.import_module(f"{extension.__name__}.operators.objects.modifiers")
+    return module("operators.objects.modifiers")
+
+
+@pytest.fixture
+def display(module):
+    """The module of colors on points."""
+    return module("ui.display")
+
+
+@pytest.fixture
+def overlay(module):
+    """The module that draws over the view."""
+    return module("ui.overlay")
+
+
+@pytest.fixture
+def cache(module):
+    """The module that keeps what was computed, emptied."""
+    cache = module("operators.running.cache")
+    cache.clear()
+    return cache

@@ -3,25 +3,29 @@
 import importlib
 import inspect
 import sys
+from collections import Counter
 
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender.clouds import add_group, add_object, differences, everything, grid_points, sphere_points
-from tests.blender.conftest import MODULE
+from tests.blender.conftest import MODULE, new_file
 from tests.blender.operators import applications
 from tests.blender.splats import add_splats, bar_splats
 
 SKIPPED = inspect.CO_GENERATOR, "all_or_nothing.py"  # what Python ends by itself, and what puts things back
 
 
-class Fault:
-    """Memory that runs out at one of the calls of the extension's functions while results are written."""
+class Calls:
+    """Calls of the extension's functions while results are written, by their places; at one the memory runs out.
 
-    def __init__(self, extension, number):
-        self._folder, self._left = extension.__path__[0], number
-        self._writing, self.happened = False, False
+    A place is a function and the line that calls it. The fault is the one of that number at its place.
+    """
+
+    def __init__(self, extension, place=None, number=0):
+        self._folder, self._place, self._number = extension.__path__[0], place, number
+        self._writing, self.seen = False, Counter()
 
     def _trace(self, frame, event, argument):
         code = frame.f_code
@@ -30,10 +34,10 @@ class Fault:
         self._writing |= code.co_name in ("write_all", "_convert", "_add", "change", "show_attribute", "_join")
         if not self._writing or code.co_flags & SKIPPED[0] or code.co_filename.endswith(SKIPPED[1]):
             return
-        self._left -= 1
-        if self._left < 0:
+        place = code, frame.f_back.f_code, frame.f_back.f_lineno
+        self.seen[place] += 1
+        if (place, self.seen[place]) == (self._place, self._number):
             sys.settrace(None)
-            self.happened = True
             raise MemoryError("injected")
 
     def __enter__(self):
@@ -49,28 +53,36 @@ def scene():
     return {obj.name: everything(obj) for obj in bpy.data.objects}
 
 
-def fail_everywhere(extension, make, name, step=3, **settings):
-    """Let an operator fail at one call after the other, and find everything as it was; return how often it failed."""
-    failures, spoiled = 0, True
-    for number in range(0, 4000, step):
-        if spoiled:
-            bpy.ops.wm.read_homefile(use_empty=True)
-            make()
-            before, spoiled = scene(), False
-            active = bpy.context.object.name
-        with Fault(extension, number) as fault:
+def fail_everywhere(extension, make, name, every=2, **settings):
+    """Let an operator fail at the last call from every second place, and find everything as it was, then let it end.
+
+    Return how often it failed.
+    """
+
+    def start():
+        new_file()
+        make()
+        return scene(), bpy.context.object.name
+
+    start()
+    with Calls(extension) as calls:
+        getattr(bpy.ops.meshfree, name)(**settings)
+    failures, (before, active) = 0, start()
+    for place, number in list(calls.seen.items())[::every]:
+        with Calls(extension, place, number):
             try:
                 getattr(bpy.ops.meshfree, name)(**settings)
-                spoiled = True
+                failed = False  # it did not get there, or Blender goes on when a setting's own function fails
             except RuntimeError:
-                failures += 1
-        if spoiled and not fault.happened:
-            return failures
-        assert spoiled or bpy.context.object.name == active
-        assert spoiled or not differences(scene(), before), (
-            number
-        )  # spoiled: Blender goes on when a setting's own function fails
-    raise AssertionError("it never ends")
+                failed = True
+        if failed:
+            failures += 1
+            assert bpy.context.object.name == active
+            assert not differences(scene(), before), (place, number)
+        else:
+            before, active = start()
+    assert getattr(bpy.ops.meshfree, name)(**settings) == {"FINISHED"}
+    return failures
 
 
 def handled():
@@ -207,7 +219,7 @@ def test_failure_while_any_tool_writes_changes_nothing(extension):
     others = [(make, name, told) for make, name, told in by_default() if name not in tried]
     assert len(others) > 10
     for make, name, told in others:
-        assert fail_everywhere(extension, make, name, step=97, **told) > 0, name
+        assert fail_everywhere(extension, make, name, every=6, **told) > 0, name
 
 
 def test_parts_stay_one_object_if_separating_fails(extension):
@@ -249,7 +261,7 @@ def test_nothing_is_left_of_a_sequence_whose_import_fails(extension, tmp_path):
     for number in (1, 2):
         np.save(tmp_path / f"points_{number}.npy", sphere_points(50))
     path = str(tmp_path / "points_1.npy")
-    assert fail_everywhere(extension, handled, "import_points", filepath=path, sequence=True, step=3) > 2
+    assert fail_everywhere(extension, handled, "import_points", filepath=path, sequence=True) > 2
 
 
 def two_of_splats():
@@ -262,7 +274,7 @@ def two_of_splats():
 
 
 def test_splats_stay_if_joining_fails(extension):
-    assert fail_everywhere(extension, two_of_splats, "join_splats", step=1) > 10
+    assert fail_everywhere(extension, two_of_splats, "join_splats", every=1) > 10
 
 
 def shown():
@@ -273,7 +285,7 @@ def shown():
 
 @pytest.mark.parametrize("make", [handled, shown])
 def test_colors_stay_if_showing_others_fails(extension, make):
-    assert fail_everywhere(extension, make, "colormap", attribute="lb_area", color_map="MAGMA", step=7) > 2
+    assert fail_everywhere(extension, make, "colormap", every=4, attribute="lb_area", color_map="MAGMA") > 2
 
 
 def partly_selected():
@@ -283,4 +295,4 @@ def partly_selected():
 
 
 def test_groups_stay_if_assigning_fails(extension):
-    assert fail_everywhere(extension, partly_selected, "group_from_selection", step=1, role="BOUNDARY") > 2
+    assert fail_everywhere(extension, partly_selected, "group_from_selection", every=1, role="BOUNDARY") > 2

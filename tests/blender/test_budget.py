@@ -13,13 +13,6 @@ from tests.blender.clouds import RESULTS, add_object, attribute, everything, loc
 
 
 @pytest.fixture
-def cache(extension):
-    cache = importlib.import_module(f"{extension.__name__}.operators.running.cache")
-    cache.clear()
-    return cache
-
-
-@pytest.fixture
 def free(core, cache, monkeypatch):
     """Function that sets how many points the free memory is enough for."""
     memory = importlib.import_module(f"{core.__name__}.memory")

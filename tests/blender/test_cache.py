@@ -63,13 +63,6 @@ COSTLY = {  # where each is called from
 
 
 @pytest.fixture
-def cache(extension):
-    module = importlib.import_module(f"{extension.__name__}.operators.running.cache")
-    module.clear()
-    return module
-
-
-@pytest.fixture
 def calls(extension, monkeypatch):
     """Names of the costly functions that were called."""
     called = []

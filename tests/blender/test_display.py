@@ -10,11 +10,6 @@ from tests.blender.clouds import FACES, add_object, attribute, grid_points, sphe
 
 
 @pytest.fixture
-def display(extension):
-    return importlib.import_module(f"{extension.__name__}.ui.display")
-
-
-@pytest.fixture
 def obj():
     obj = add_object(sphere_points() * (1.0, 1.3, 1.7))
     obj.meshfree.point_shape = "DOTS"

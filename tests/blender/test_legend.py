@@ -1,6 +1,5 @@
 """The legend over the view and in renders: its height, its place, when it is there, and its digits."""
 
-import importlib
 from types import SimpleNamespace
 
 import bpy
@@ -9,15 +8,6 @@ import pytest
 
 from tests.blender.clouds import add_group, add_object, sphere_points
 from tests.blender.test_panel import draw
-
-
-def module(extension, name):
-    return importlib.import_module(f"{extension.__name__}.{name}")
-
-
-@pytest.fixture
-def overlay(extension):
-    return module(extension, "ui.overlay")
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """What artists do with objects: copies, joins, conversions, other files; and colors of groups."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
@@ -13,12 +11,6 @@ from tests.blender.test_panel import draw
 
 POINT_CLOUDS = pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
 ROLES = ("Handle", "Anchor", "Fixed", "Source", "Low", "High", "Value", "Boundary")
-
-
-@pytest.fixture
-def module(extension):
-    """Get a module of the extension by its name."""
-    return lambda name: importlib.import_module(f"{extension.__name__}.{name}")
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """Colors that points have of their own: shown at import, everywhere, and again after results; and the own material."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
@@ -12,11 +10,6 @@ from tests.blender.test_panel import draw
 
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 POINT_CLOUDS = pytest.mark.skipif(bpy.app.version < (4, 5), reason="meshes become point clouds from Blender 4.5 on")
-
-
-@pytest.fixture
-def module(extension):
-    return lambda name: importlib.import_module(f"{extension.__name__}.{name}")
 
 
 @pytest.fixture

@@ -14,11 +14,6 @@ SLOPES = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
 
 
 @pytest.fixture
-def display(extension):
-    return importlib.import_module(f"{extension.__name__}.ui.display")
-
-
-@pytest.fixture
 def obj():
     obj = add_object(sphere_points(2000))
     bpy.ops.meshfree.show_surface()

@@ -36,7 +36,6 @@ CLOSED = {
     "another random sphere": random_sphere(3000, 5),
     "marching cubes": marching_cubes_sphere(25),
     "density jump": uneven_sphere(4000),
-    "another density jump": uneven_sphere(4000, 1),
     "random torus": torus_points(3000),
     "even torus": torus_low_discrepancy(2000),
     "thin torus": torus_points(3000, minor=0.15),
@@ -122,7 +121,7 @@ class TestFinding:
     def test_none_on_closed_surfaces(self, name):
         assert np.count_nonzero(read_cloud(CLOSED[name], LaplacianOptions()).boundary.at_boundary) == 0
 
-    @pytest.mark.parametrize("seed", range(3))
+    @pytest.mark.parametrize("seed", range(2))
     def test_none_at_the_edge_of_a_thin_lens(self, seed):
         # Two caps that meet at an acute edge, and hardly bend elsewhere.
         rng = np.random.default_rng(seed)
@@ -268,17 +267,12 @@ class TestImages:
         assert values[0] >= -1e-10 * values[-1]
         assert values[1] > 1e-8 * values[-1]
 
-    def test_areas_shrink_at_the_boundary(self):
-        points = square_grid(60)
-        areas = core.estimate_areas(points) * 59.0**2
-        at_boundary = side_distances(points, 1.0, 1.0)[:, 0] < 1e-9
-        assert 0.4 < areas[at_boundary].mean() < 0.75
-        assert areas[~at_boundary].mean() == pytest.approx(1.0, rel=0.05)
-
-    def test_areas_of_a_grid_are_even_up_to_its_boundary(self):
-        points = square_grid(60)
-        exact = 0.5 ** (side_distances(points, 1.0, 1.0) < 1e-9).sum(axis=1) / 59.0**2
-        ratio = core.estimate_areas(points) / exact
+    def test_areas_of_a_grid_are_even_up_to_its_boundary(self, operators):
+        laplacian = operators("square grid")
+        areas, sides = laplacian.areas * 59.0**2, (side_distances(laplacian.points, 1.0, 1.0) < 1e-9).sum(axis=1)
+        assert 0.4 < areas[sides > 0].mean() < 0.75
+        assert areas[sides == 0].mean() == pytest.approx(1.0, rel=0.05)
+        ratio = areas / 0.5**sides
         assert ratio.min() > 0.3
         assert ratio.max() < 3.0
 
@@ -291,21 +285,14 @@ class TestImages:
 
 
 class TestGiven:
-    def test_indices_and_a_mask_are_the_same(self):
+    def test_the_boundary_that_would_be_found_changes_nothing_as_a_mask_or_as_indices(self):
         points = square_random(900)
-        mask = core.build_laplacian(points).boundary
-        by_mask = core.build_laplacian(points, boundary=mask)
-        by_index = core.build_laplacian(points, boundary=np.flatnonzero(mask))
-        np.testing.assert_array_equal(by_mask.boundary, mask)
-        np.testing.assert_array_equal(by_index.boundary, mask)
-        np.testing.assert_array_equal(by_index.areas, by_mask.areas)
-        np.testing.assert_array_equal(by_index.stiffness.data, by_mask.stiffness.data)
-
-    def test_the_boundary_that_would_be_found_changes_nothing(self):
-        points = square_random(700)
         found = core.build_laplacian(points)
-        given = core.build_laplacian(points, boundary=found.boundary)
-        np.testing.assert_array_equal(given.areas, found.areas)
+        for boundary in (found.boundary, np.flatnonzero(found.boundary)):
+            given = core.build_laplacian(points, boundary=boundary)
+            np.testing.assert_array_equal(given.boundary, found.boundary)
+            np.testing.assert_array_equal(given.areas, found.areas)
+            np.testing.assert_array_equal(given.stiffness.data, found.stiffness.data)
 
     def test_a_given_boundary_wins_over_the_options(self):
         points = square_grid(30)
@@ -322,13 +309,12 @@ class TestGiven:
         areas = core.estimate_areas(points, options=options, boundary=boundary)
         np.testing.assert_allclose(areas, core.estimate_areas(points, boundary=boundary), rtol=1e-6)
 
-    @pytest.mark.parametrize("empty", [[], np.zeros(900, dtype=bool), np.zeros(0, dtype=int)])
-    def test_no_points_mean_no_boundary(self, empty):
-        laplacian = core.build_laplacian(square_grid(30), boundary=empty)
-        assert not np.any(laplacian.boundary)
-        np.testing.assert_array_equal(
-            laplacian.areas, core.estimate_areas(square_grid(30), options=LaplacianOptions(boundary="off"))
-        )
+    def test_no_points_mean_no_boundary(self):
+        expected = core.estimate_areas(square_grid(30), options=LaplacianOptions(boundary="off"))
+        for empty in ([], np.zeros(900, dtype=bool), np.zeros(0, dtype=int)):
+            laplacian = core.build_laplacian(square_grid(30), boundary=empty)
+            assert not np.any(laplacian.boundary)
+            np.testing.assert_array_equal(laplacian.areas, expected)
 
     def test_exact_distances_give_the_eigenvalues_of_the_disc(self):
         points, distance = disc_random(3000, 3)

@@ -173,7 +173,7 @@ class TestInvariance:
 class TestPinching:
     @pytest.mark.parametrize("height", [2.8, 5.0])
     def test_rings_too_far_apart(self, height):
-        points, fixed = tube(40, round(4.0 * height), height=height)
+        points, fixed = tube(30, round(3.0 * height), height=height)
         film = core.minimal_surface(points, fixed)
         assert not film.converged
         assert film.reason == "pinching"

@@ -181,11 +181,10 @@ class TestOperator:
         assert plane.areas.sum() < 0.99 * plain.areas.sum()
         assert plane.notices == plain.notices
 
-    @pytest.mark.parametrize("level", [1.0, 1.5, 2.0, 3.0])
+    @pytest.mark.parametrize("level", [1.0, 2.0, 3.0])
     def test_noise_beyond_the_spacing_is_smoothed_and_told(self, level):
-        points = random_sphere(4000)
-        spacing = np.sqrt(4.0 * np.pi / 4000)
-        noise = level * spacing * np.random.default_rng(1).standard_normal((4000, 1))
+        points = random_sphere(COUNT)
+        noise = level * SPACING * np.random.default_rng(1).standard_normal((COUNT, 1))
         laplacian = core.build_laplacian(points * (1.0 + noise))
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=0.15)
         assert any("more than half the spacing" in notice for notice in laplacian.notices)
@@ -206,7 +205,7 @@ class TestOperator:
 
 def test_rows_of_a_scan_finer_along_than_across_are_no_curves():
     # The 20 neighbours of the measure of noise lie in one row, the 40 of the quadrics in several.
-    y, x = np.mgrid[:40, :280]
+    y, x = np.mgrid[:25, :175]
     z = 0.05 * np.random.default_rng(0).standard_normal(x.size)
     laplacian = core.build_laplacian(np.column_stack([x.ravel() / 7.0, y.ravel(), z]))
-    assert laplacian.areas.sum() == pytest.approx(39.0 * 279.0 / 7.0, rel=0.2)  # some of the noise counts as shape
+    assert laplacian.areas.sum() == pytest.approx(24.0 * 174.0 / 7.0, rel=0.2)  # some of the noise counts as shape

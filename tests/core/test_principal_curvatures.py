@@ -22,7 +22,7 @@ def torus():
     return laplacian, core.principal_curvatures(laplacian)
 
 
-@pytest.mark.parametrize("radius", [0.01, 1.0, 3000.0])
+@pytest.mark.parametrize("radius", [0.01, 3000.0])
 def test_sphere_is_a_cap(radius):
     found = core.principal_curvatures(core.build_laplacian(radius * random_sphere(4000)))
     assert_allclose(np.stack([found.first, found.second]), 1.0 / radius, rtol=0.06)

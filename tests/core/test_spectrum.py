@@ -142,14 +142,15 @@ def test_order_of_the_points_does_not_matter(laplacian, spectrum):
     assert abs(overlap) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_unresolved_modes_are_refused_with_the_number_that_is_resolved(laplacian):
-    with pytest.raises(core.UnresolvedModesError, match="on 2000 points") as caught:
-        laplacian.eigenpairs(600)
+def test_unresolved_modes_are_refused_with_the_number_that_is_resolved():
+    laplacian = core.build_laplacian(fibonacci_sphere(600) * [1.0, 0.9, 0.75])
+    with pytest.raises(core.UnresolvedModesError, match="on 600 points") as caught:
+        laplacian.eigenpairs(180)
     resolved = caught.value.resolved
-    assert 50 < resolved < 600
+    assert 15 < resolved < 180
     assert f"at most {resolved}" in str(caught.value)
     assert len(laplacian.eigenpairs(resolved).eigenvalues) == resolved
-    assert len(laplacian.eigenpairs(600, raw=True).eigenvalues) == 600
+    assert len(laplacian.eigenpairs(180, raw=True).eigenvalues) == 180
 
 
 @pytest.mark.parametrize("count", [0, -3, 2.5, 1999])
@@ -210,8 +211,10 @@ def cloud(request):
     return laplacian, dirichlet, all_eigenvalues(laplacian, dirichlet)
 
 
-@pytest.mark.parametrize("coarse", [True, False])
-@pytest.mark.parametrize("count", [1, 3, 8, 10, 33, 40, 72, 120])
+@pytest.mark.parametrize(
+    ("count", "coarse"),
+    [(1, True), (3, False), (8, True), (10, False), (33, True), (40, False), (72, False), (120, True)],
+)
 def test_no_copy_is_lost(cloud, count, coarse, monkeypatch):
     monkeypatch.setattr("core.operator.spectrum._FEW", float(coarse))
     laplacian, dirichlet, exact = cloud

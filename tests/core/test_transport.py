@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse import diags_array
 from scipy.sparse.linalg import splu
 
 import core
@@ -54,15 +55,13 @@ def test_it_is_hermitian_and_positive_with_the_pairs_of_the_stiffness(sphere):
     for _ in range(5):
         x = rng.standard_normal(4000) + 1j * rng.standard_normal(4000)
         assert (x.conj() @ (matrix @ x)).real > 0.0
-    pairs = sphere.stiffness.copy()
-    assert_allclose(abs(matrix).toarray(), abs(pairs).toarray(), atol=1e-12)
+    assert abs(abs(matrix) - abs(sphere.stiffness)).max() < 1e-12
 
 
 def test_a_mass_comes_onto_the_diagonal(sphere):
     frames = tangent_frames(sphere.normals)
     matrix = connection_laplacian(sphere.stiffness, sphere.normals, frames, sphere.areas)
-    change = (matrix - connection(sphere)).toarray()
-    assert_allclose(change, np.diag(sphere.areas), atol=1e-12)
+    assert abs(matrix - connection(sphere) - diags_array(sphere.areas)).max() < 1e-12
 
 
 def test_pairs_that_face_opposite_ways_are_left_out(square):
@@ -97,18 +96,18 @@ def test_the_lowest_fields_on_the_sphere_have_the_eigenvalue_one(sphere):
 
 class TestTwoGrid:
     @pytest.mark.parametrize("reach", [0.1, 0.3])
-    def test_each_value_is_right_to_a_share_of_itself(self, reach):
+    def test_each_value_is_right_to_a_share_of_itself(self, operators, reach):
         """Although the largest is many powers of ten larger than the least."""
-        laplacian = core.build_laplacian(torus_points(3000))
+        laplacian = operators("coarse torus")
         mass = laplacian.areas / reach**2
         frames = tangent_frames(laplacian.normals)
         matrix = connection_laplacian(laplacian.stiffness, laplacian.normals, frames, mass)
-        load = np.zeros(3000, dtype=complex)
+        load = np.zeros(2000, dtype=complex)
         load[[7, 900]] = 1.0, 1j
         exact = splu(matrix.tocsc()).solve(load)
         assert np.abs(exact).min() < 1e-3 * np.abs(exact).max()
         solver = TwoGrid(matrix, mass, laplacian.points, lambda stage, fraction: None)
-        found = solver.solve(load, np.ones(3000, dtype=bool), lambda stage, fraction: None)
+        found = solver.solve(load, np.ones(2000, dtype=bool), lambda stage, fraction: None)
         assert np.max(np.abs(found - exact) / np.abs(exact)) < 1e-3
 
     def test_points_that_nothing_is_coupled_with_keep_their_own(self, square):
