@@ -3,14 +3,12 @@
 `build_laplacian` makes the operator of a cloud, and nearly all else takes that operator. Lengths are in the unit of the
 points, [L].
 
-Examples in the docstrings can be copied as they are. All but one begin with the same five lines, which make 800 points
-of the unit sphere, where answers are known:
+Examples in the docstrings can be copied as they are. All but one begin with the same three lines, for 800 points of the
+unit sphere, where answers are known:
 
 >>> import numpy as np
 >>> import core
->>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
->>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
->>> points = np.column_stack([ring.real, ring.imag, z])
+>>> points = core.example_sphere()
 """
 
 import importlib
@@ -80,6 +78,7 @@ _NAMES = {  # the public ones, by the module or package that is imported when on
         "TooFewPointsError",
         "UnresolvedModesError",
     ),
+    "example": ("example_sphere",),
     "geometry": (
         "Discs",
         "Prolongation",

@@ -72,9 +72,7 @@ class LaplacianOptions:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> options = core.LaplacianOptions(bandwidth="local", bandwidth_factor=0.5)
     >>> lengths = core.build_laplacian(points, options=options).smoothing_lengths
     >>> print(lengths.mean().round(2))
@@ -140,9 +138,7 @@ class LaplacianOptions:
 
         >>> import numpy as np
         >>> import core
-        >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-        >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-        >>> points = np.column_stack([ring.real, ring.imag, z])
+        >>> points = core.example_sphere()
         >>> options = core.LaplacianOptions.paper()
         >>> print(options.bandwidth, options.areas, options.boundary)
         global constrained off

@@ -101,9 +101,7 @@ def heat_kernel_signature(spectrum, times=None, *, count=100, normalized=False):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> spectrum = core.build_laplacian(points).eigenpairs(16)
     >>> heat = core.heat_kernel_signature(spectrum, [1.0])
     >>> print(heat.shape, heat.min().round(3), heat.max().round(3))
@@ -163,9 +161,7 @@ def wave_kernel_signature(spectrum, energies=None, *, count=100):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> spectrum = core.build_laplacian(points).eigenpairs(16)
     >>> waves = core.wave_kernel_signature(spectrum, count=8)
     >>> print(waves.shape, waves.min().round(2), waves.max().round(2))

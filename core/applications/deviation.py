@@ -73,9 +73,7 @@ def surface_deviation(points, normals, laplacian, greatest=None, *, progress=Non
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> deviation = core.surface_deviation(1.1 * points[::2], points[::2], core.build_laplacian(points))
     >>> print(np.allclose(deviation.distance, 0.1, atol=1e-3), deviation.known.all())
     True True

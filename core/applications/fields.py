@@ -77,9 +77,8 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> solution = core.solve_poisson(laplacian, 2 * z)
     >>> print(np.abs(solution - z).max().round(2))
@@ -163,9 +162,7 @@ def harmonic_field(laplacian, fixed, fixed_values, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> field = core.harmonic_field(laplacian, [0, 799], [1, -1])
     >>> print(field[[0, 400, 799]].round(1))

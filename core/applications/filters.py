@@ -187,9 +187,8 @@ def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> values = z + points[:, 0] * points[:, 1]
     >>> smooth = core.spectral_filter(values, laplacian.eigenpairs(9), laplacian.areas, 4)

@@ -62,9 +62,7 @@ def geodesic_distance(laplacian, sources, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> distance = core.geodesic_distance(laplacian, [0])
     >>> print(distance.max().round(2), np.arccos((points @ points[0]).min()).round(2))
@@ -94,9 +92,7 @@ class Geodesics:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> geodesics = core.Geodesics(core.build_laplacian(points))
     >>> print(*(geodesics.distance([pole])[400].round(1) for pole in (0, 799)))
     1.6 1.6
@@ -307,9 +303,8 @@ def nearest_source(laplacian, sources, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> label = core.nearest_source(core.build_laplacian(points), [0, 799])
     >>> print(label[z > 0.1].max(), label[z < -0.1].min())
     0 1
@@ -360,9 +355,7 @@ def signed_distance(laplacian, curve, closed=False, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> distance = core.signed_distance(core.build_laplacian(points), [100, 101, 102], closed=True)
     >>> print(np.sign(distance[0] * distance[799]))
     -1.0

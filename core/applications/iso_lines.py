@@ -62,9 +62,7 @@ def iso_lines(vertices, faces, values, levels):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> mesh = core.mesh_surface(core.build_laplacian(points))
     >>> (circle,) = core.iso_lines(mesh.vertices, mesh.faces, mesh.vertices[:, 2], [0.5])
     >>> steps = circle.points - np.roll(circle.points, 1, axis=0)

@@ -83,9 +83,7 @@ def match_modes(spectrum, areas, points, spectrum_before, points_before, *, tole
     --------
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> before = laplacian.eigenpairs(4)
     >>> after = core.Spectrum(before.eigenvalues, -before.eigenvectors)  # as another run may give them

@@ -87,9 +87,7 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> mesh = core.mesh_surface(core.build_laplacian(points))
     >>> print(len(mesh.vertices) - len(mesh.faces))
     2

@@ -71,9 +71,8 @@ def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> print(np.bincount(core.nodal_domains(z, laplacian)))
     [400 400]
@@ -153,9 +152,8 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> dumbbell = points * (0.4 + np.abs(z))[:, None]
     >>> labels = core.segment(core.build_laplacian(dumbbell), 2)
     >>> print(labels.max() + 1, np.ptp(labels[z > 0.1]), np.ptp(labels[z < -0.1]))

@@ -50,9 +50,7 @@ def grow(laplacian, chosen, distance):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> print(core.grow(laplacian, [0], np.pi / 3).mean().round(2))
     0.25
@@ -103,9 +101,7 @@ def front_point(points, eye, direction, reach):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> seen = core.front_point(points, eye=[0, 0, 5], direction=[0, 0, -1], reach=0.25)
     >>> print(points[seen, 2].round(1))
     1.0
@@ -172,9 +168,7 @@ def opposite_ends(laplacian, share=0.03):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> one, other = core.opposite_ends(laplacian, share=0.05)
     >>> print((points[one].mean(axis=0) @ points[other].mean(axis=0)).round(1))

@@ -50,9 +50,8 @@ class Slopes:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> slopes = core.Slopes(points, core.surface_discs(points)).of(z)
     >>> print(slopes[abs(z) < 0.1].mean(axis=0).round(1) + 0.0)
     [0. 0. 1.]

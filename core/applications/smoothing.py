@@ -94,9 +94,7 @@ def smooth_points(
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> smaller = core.smooth_points(laplacian, core.exponential(0.1))
     >>> print(np.linalg.norm(smaller, axis=1).mean().round(2))
@@ -192,9 +190,7 @@ def fair_points(
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
     >>> smooth = core.fair_points(core.build_laplacian(noisy))
     >>> print(np.linalg.norm(noisy, axis=1).std().round(3), np.linalg.norm(smooth, axis=1).std().round(3))
@@ -250,9 +246,7 @@ def roughness(laplacian, wavelength=None, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> points[400] *= 1.02
     >>> rough = core.roughness(core.build_laplacian(points))
     >>> print(np.argmax(np.abs(rough)), rough[400].round(2))
@@ -304,9 +298,8 @@ def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> moved = core.displace_by_mode(laplacian, z, 0.2)
     >>> print(moved[:, 2].min().round(1), moved[:, 2].max().round(1))

@@ -57,9 +57,7 @@ def transport(laplacian, sources, directions, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> direction = core.transport(laplacian, [0], [1, 0, 0])
     >>> ahead = np.argmax(points[:, 0])
@@ -100,9 +98,7 @@ class Transport:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> carried = core.Transport(core.build_laplacian(points))
     >>> print(np.abs(carried.extend([0], [1, 0, 0]) + carried.extend([0], [-1, 0, 0])).max().round(6))
     0.0
@@ -266,9 +262,7 @@ def logarithmic_map(laplacian, source, direction=None, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> place = core.logarithmic_map(core.build_laplacian(points), 0)
     >>> print(place[0], np.hypot(*place.T).max().round(1))
     [0. 0.] 3.1

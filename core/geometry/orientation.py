@@ -91,9 +91,7 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> given = points * np.random.default_rng(0).choice([-1, 1], (800, 1))
     >>> print(np.abs(core.orient_normals(points, given) - points).max().round(6))
     0.0

@@ -60,9 +60,7 @@ class Prolongation:
     --------
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> subset = core.blue_noise_subset(points, 300)
     >>> laplacian = core.build_laplacian(points[subset])
     >>> every = core.Prolongation(points, subset, laplacian.normals)

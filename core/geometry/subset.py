@@ -52,9 +52,7 @@ def blue_noise_subset(points, count, *, progress=None):
     --------
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> print(180 <= len(core.blue_noise_subset(points, 200)) <= 200)
     True
     """

@@ -69,9 +69,7 @@ def mean_curvature(laplacian):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> curvature = core.mean_curvature(laplacian)
     >>> print(curvature.min().round(2), curvature.max().round(2))
@@ -139,9 +137,7 @@ def principal_curvatures(laplacian):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> curvatures = core.principal_curvatures(core.build_laplacian(points))
     >>> print(curvatures.first.mean().round(1), curvatures.second.mean().round(1))
     1.0 1.0
