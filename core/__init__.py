@@ -13,6 +13,8 @@ unit sphere, where answers are known:
 
 import importlib
 import threading
+from types import ModuleType
+from typing import Any
 
 from .errors import BrokenLibraryError
 
@@ -118,7 +120,7 @@ _lock = threading.RLock()  # scipy imports itself in circles, which two threads 
 __all__ = sorted(_HOMES)
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     """Import what holds a public name, or a package, the first time that one asks for it: scipy takes a second."""
     if name not in _HOMES and name not in _PACKAGES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -132,11 +134,11 @@ def __getattr__(name):
     return found
 
 
-def __dir__():
+def __dir__() -> list[str]:
     return sorted({*globals(), *__all__, *_PACKAGES})
 
 
-def _import(name):
+def _import(name: str) -> ModuleType:
     """Import a module or package of core; tell what it means where scipy, or what that asks of numpy, does not load."""
     try:
         return importlib.import_module(f".{name}", __name__)

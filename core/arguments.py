@@ -1,15 +1,18 @@
 """What callers give as numbers, switches and arrays, read so that nothing else than a check can fail on it."""
 
 from numbers import Integral, Real
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .errors import InvalidPointsError, PointCloudError
+from .types import Array, Floats
 
 _HUGE = 1e100  # of a coordinate, so that no product overflows
 
 
-def real(given):
+def real(given: Any) -> float:
     """Return a real number as a float; NaN, which no comparison lets pass, for what is none."""
     number = given[()] if isinstance(given, np.ndarray) and given.ndim == 0 else given
     if isinstance(number, bool) or not isinstance(number, Real):
@@ -17,10 +20,10 @@ def real(given):
     try:
         return float(number)
     except OverflowError:  # a whole number of more than 308 digits
-        return np.inf if number > 0 else -np.inf
+        return np.inf if float(number.__gt__(0)) else -np.inf
 
 
-def whole(given):
+def whole(given: Any) -> float:
     """Return a whole number as an int; NaN, which no comparison lets pass, for what is none."""
     if isinstance(given, Integral) and not isinstance(given, bool):
         return int(given)
@@ -28,7 +31,7 @@ def whole(given):
     return int(number) if np.isfinite(number) and number == np.floor(number) else np.nan
 
 
-def check_switches(**switches):
+def check_switches(**switches: Any) -> None:
     """Check that arguments are truth values.
 
     Raises
@@ -41,7 +44,7 @@ def check_switches(**switches):
             raise PointCloudError(f"Option {name} is {value!r}. Use True or False.")
 
 
-def as_array(given, name):
+def as_array(given: ArrayLike, name: str) -> Array:
     """Return an argument as an array of any shape and type.
 
     Raises
@@ -59,13 +62,13 @@ def as_array(given, name):
     return array
 
 
-def as_doubles(array, copy=True):
+def as_doubles(array: Array, copy: bool = True) -> Floats:
     """Return an array of real numbers in double precision; those beyond its range become infinite."""
     with np.errstate(over="ignore"):
         return array.astype(np.float64, copy=copy)
 
 
-def check_positions(positions, count, name, singular):
+def check_positions(positions: ArrayLike, count: int, name: str, singular: str) -> Floats:
     """Return positions, (count, 3), in double precision."""
     given = as_array(positions, name.capitalize())
     if given.shape != (count, 3) or given.dtype.kind not in "iuf":

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from .types import Floats
 
-def example_sphere(count=800):
+
+def example_sphere(count: int = 800) -> Floats:
     """Return points evenly on the unit sphere, where answers are known: the shape of the examples in all docstrings.
 
     Parameters

@@ -3,11 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arguments import real
 from ..errors import PointCloudError
 from ..geometry import check_points, unit_normals
-from ..operator import ImplicitSurface
+from ..operator import ImplicitSurface, LaplaceBeltrami
+from ..types import Bools, Floats, Progress
 
 _ROUNDS = 20  # of Newton's method along a normal; a few are needed
 _MET = 1e-3  # spacings off the surface at which it is met
@@ -25,11 +27,18 @@ class Deviation(NamedTuple):
         Which points have one: the surface is there, and near enough.
     """
 
-    distance: np.ndarray
-    known: np.ndarray
+    distance: Floats
+    known: Bools
 
 
-def surface_deviation(points, normals, laplacian, greatest=None, *, progress=None):
+def surface_deviation(
+    points: ArrayLike,
+    normals: ArrayLike,
+    laplacian: LaplaceBeltrami,
+    greatest: float | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Deviation:
     """Measure how far points are from the surface of another cloud, along their normals.
 
     Each normal is followed, both ways, to where it meets the surface that the other points lie on, between these: two

@@ -1,6 +1,10 @@
 """Functions on the surface that solve Poisson's or Laplace's equation, with or without fixed values."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import cKDTree
 
@@ -9,7 +13,8 @@ from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from ..kernel import SECOND_MOMENT
-from ..operator import narrow_laplacian
+from ..operator import LaplaceBeltrami, narrow_laplacian
+from ..types import Bools, Floats, Ints, Progress
 from .graph import coupled_components, mean_spacing
 
 _MEAN = 1e-2  # of the source's mean size: a larger mean is meant, a smaller one is left by the quadrature
@@ -21,7 +26,14 @@ _LEAST = 2e-3  # share of the wide operator everywhere: it connects what the nar
 _GRAZING = 0.1  # least distance from the edge of a set of fixed points, in spacings
 
 
-def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=None):
+def solve_poisson(
+    laplacian: LaplaceBeltrami,
+    source: ArrayLike,
+    fixed: ArrayLike | None = None,
+    fixed_values: ArrayLike | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Floats:
     """Solve -Delta u = source.
 
     Parameters
@@ -120,7 +132,9 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
     return result
 
 
-def harmonic_field(laplacian, fixed, fixed_values, *, progress=None):
+def harmonic_field(
+    laplacian: LaplaceBeltrami, fixed: ArrayLike, fixed_values: ArrayLike, *, progress: Progress | None = None
+) -> Floats:
     """Spread fixed values smoothly over the surface: Delta f = 0.
 
     Parameters
@@ -175,7 +189,7 @@ def harmonic_field(laplacian, fixed, fixed_values, *, progress=None):
     return np.clip(result, values.min(), values.max())  # only rounding lies outside
 
 
-def read_values(fixed, values, count):
+def read_values(fixed: Any, values: Any, count: int) -> tuple[Ints, Floats]:
     """Return fixed points as indices (k,) and their values (k,).
 
     Raises
@@ -207,7 +221,7 @@ def read_values(fixed, values, count):
     return index, given[first]
 
 
-def _read_source(source, count):
+def _read_source(source: Any, count: int) -> Floats:
     given = as_array(source, "Sources")
     if given.dtype.kind not in "biuf" or given.shape not in ((), (count,)):
         raise InvalidPointsError(
@@ -220,14 +234,14 @@ def _read_source(source, count):
     return np.broadcast_to(as_doubles(given), count)
 
 
-def _means(areas, values, component, rows):
+def _means(areas: Floats, values: Floats, component: Ints, rows: Ints) -> Floats:
     """Return the area-weighted mean of values (n,) over the component of each of some rows, (k,)."""
     component, areas = component[rows], areas[rows]
     total = np.bincount(component, areas)
     return (np.bincount(component, areas * values[rows]) / np.where(total > 0.0, total, 1.0))[component]
 
 
-def _without_mean(areas, source, component, rows):
+def _without_mean(areas: Floats, source: Floats, component: Ints, rows: Ints) -> Floats:
     """Take the mean out of the source on components that nothing holds, or raise if there is one."""
     mean, size = (_means(areas, values, component, rows) for values in (source, np.abs(source)))
     wrong = np.flatnonzero(np.abs(mean) > _MEAN * size)
@@ -242,7 +256,9 @@ def _without_mean(areas, source, component, rows):
     return result
 
 
-def _with_fixed_points(laplacian, fixed, values, free, report):
+def _with_fixed_points(
+    laplacian: LaplaceBeltrami, fixed: Bools, values: Floats, free: Ints, report: Callable[..., Any]
+) -> tuple[sparse.csr_array, Floats]:
     """Return the stiffness of the free points, (k, k), and the load, (k,), that the fixed ones are to them."""
     report("Equations", 0.1)
     spacing = mean_spacing(laplacian)
@@ -269,13 +285,13 @@ def _with_fixed_points(laplacian, fixed, values, free, report):
     return (sparse.diags_array(diagonal) - inner).tocsr(), load
 
 
-def _blend(weights, share):
+def _blend(weights: sparse.csr_array, share: Floats) -> sparse.csr_array:
     """Scale pair weights by the mean of a share at both ends."""
     half = sparse.diags_array(0.5 * share)
     return (half @ weights + weights @ half).tocsr()
 
 
-def _weights(laplacian, fixed, values):
+def _weights(laplacian: LaplaceBeltrami, fixed: Bools, values: Floats) -> tuple[sparse.csr_array, Floats, Floats]:
     """Return pair weights (n, n), and what boundaries with fixed points add to diagonal and load, (n,).
 
     Images in such a boundary carry ``2 c - f`` instead of f, with c the value at the nearest boundary point.
@@ -301,7 +317,7 @@ def _weights(laplacian, fixed, values):
     return (plain - (image - sparse.diags_array(image.diagonal()))).tocsr(), 2.0 * total, total * c + image @ c
 
 
-def _edge_distance(laplacian, fixed, spacing):
+def _edge_distance(laplacian: LaplaceBeltrami, fixed: Bools, spacing: Floats) -> Floats:
     """Return how far points are from the edge between fixed and free points, halfway between them, (n,).
 
     Zero for points that have no neighbours on the other side.
@@ -316,7 +332,7 @@ def _edge_distance(laplacian, fixed, spacing):
     return np.where(np.isfinite(result), np.maximum(result - 0.5 * spacing, 0.0), 0.0)
 
 
-def _thick(laplacian, fixed):
+def _thick(laplacian: LaplaceBeltrami, fixed: Bools) -> Bools:
     """Tell which fixed points belong to a set so thick that the kernel does not reach over it, (n,) bool."""
     rows = np.flatnonzero(fixed)
     weights = -laplacian.stiffness[rows][:, np.flatnonzero(~fixed)]

@@ -1,13 +1,15 @@
 """Lines on a mesh along which values are the same."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from ..arguments import as_array, as_doubles, check_positions, real
 from ..errors import InvalidPointsError, PointCloudError
+from ..types import Bools, Floats, Ints
 
 
 class IsoLine(NamedTuple):
@@ -24,11 +26,11 @@ class IsoLine(NamedTuple):
     """
 
     level: float
-    points: np.ndarray
+    points: Floats
     closed: bool
 
 
-def iso_lines(vertices, faces, values, levels):
+def iso_lines(vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: ArrayLike) -> list[IsoLine]:
     """Find the lines on a mesh along which values, linear on each triangle, are those of some levels.
 
     Parameters
@@ -75,7 +77,7 @@ def iso_lines(vertices, faces, values, levels):
     return [line for part in parts for line in part]
 
 
-def _checked(vertices, faces, values, levels):
+def _checked(vertices: Any, faces: Any, values: Any, levels: list[float]) -> tuple[Floats, Ints, Floats, list[Any]]:
     """Return what `iso_lines` takes as arrays, with triangles for faces."""
     count = len(np.atleast_1d(as_array(vertices, "Vertices")))
     vertices = check_positions(vertices, count, "vertices", "vertex")
@@ -100,7 +102,7 @@ def _checked(vertices, faces, values, levels):
     return vertices, triangles.astype(np.int64), as_doubles(values), levels
 
 
-def _segments(triangles, above):
+def _segments(triangles: Ints, above: Bools) -> Ints:
     """Return the pieces of a line within triangles, (s, 2, 2) int: two edges each, given by their lower and upper end.
 
     An edge is cut where one end is above the level and the other one is not.
@@ -112,7 +114,7 @@ def _segments(triangles, above):
     return edges[cut[crossed]].reshape(-1, 2, 2)
 
 
-def _joined(vertices, values, level, segments):
+def _joined(vertices: Floats, values: Floats, level: float, segments: Ints) -> list[IsoLine]:
     """Join pieces to lines."""
     if not len(segments):
         return []
@@ -134,7 +136,7 @@ def _joined(vertices, values, level, segments):
     ]
 
 
-def _walk(ends, count):
+def _walk(ends: Ints, count: int) -> tuple[Ints, Ints, Bools]:
     """Order cuts along the lines that pieces, (s, 2) pairs of cuts, make up.
 
     Returns

@@ -1,18 +1,23 @@
 """Sets of points: grown by distance along the cloud, and around its ends."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import dijkstra
 
 from ..arguments import as_array, as_doubles, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
+from ..operator import LaplaceBeltrami
+from ..types import Bools, Floats, Ints
 from .graph import near_graph
 
 _OBLIQUE = 3.0  # slope to the ray of a surface whose points are told from those behind it: 72 degrees
 _NEIGHBORS = 20  # so many directions make paths at most 2 % longer than the way along the surface
 
 
-def grow(laplacian, chosen, distance):
+def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bools:
     """Add all points within a distance along the surface to a set of points.
 
     Distances are lengths of paths from neighbour to neighbour on the same sheet, so that the set does not jump to
@@ -67,7 +72,7 @@ def grow(laplacian, chosen, distance):
     return mask | graph.scatter(np.isfinite(way), False)
 
 
-def front_point(points, eye, direction, reach):
+def front_point(points: ArrayLike, eye: ArrayLike, direction: ArrayLike, reach: float) -> int:
     """Find the point that one sees along a ray: the nearest to the eye among those around it.
 
     Of points of one surface it is the one that is nearest to the ray.
@@ -121,7 +126,7 @@ def front_point(points, eye, direction, reach):
     return int(near[(depth + _OBLIQUE * away)[near].argmin()]) if len(near) else -1
 
 
-def _vectors(given, name, dimensions):
+def _vectors(given: Any, name: str, dimensions: int) -> Floats:
     """Return one vector, (3,), or several, (n, 3), in double precision; their numbers may be infinite or none."""
     array = as_array(given, name.capitalize())
     if array.ndim != dimensions or array.shape[-1] != 3 or array.dtype.kind not in "iuf":
@@ -132,7 +137,7 @@ def _vectors(given, name, dimensions):
     return as_doubles(array)
 
 
-def opposite_ends(laplacian, share=0.03):
+def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints, Ints]:
     """Choose the points around both ends of the longest way along the surface, on its largest component.
 
     From anywhere the point that is farthest along the surface is such an end, and the one that is farthest from there
@@ -181,7 +186,7 @@ def opposite_ends(laplacian, share=0.03):
     largest = np.flatnonzero(component == np.bincount(component[known], weights=areas[known]).argmax())
     graph = near_graph(laplacian, _NEIGHBORS)
 
-    def ways(start):
+    def ways(start: int) -> Floats:
         return dijkstra(graph.lengths, directed=False, indices=graph.place[start])[graph.place[largest]]
 
     offset = laplacian.points[largest] - laplacian.points[largest].mean(axis=0)

@@ -3,7 +3,10 @@
 And how far they are from the smooth ones.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -11,6 +14,8 @@ from ..algebra import solve_symmetric
 from ..arguments import check_switches, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
+from ..operator import LaplaceBeltrami, Spectrum
+from ..types import Floats, Progress
 from .filters import chebyshev_filter, fairing, spectral_filter
 from .sizes import SurfaceSize, match_size
 
@@ -21,17 +26,17 @@ _AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 
 def smooth_points(
-    laplacian,
-    response,
-    spectrum=None,
+    laplacian: LaplaceBeltrami,
+    response: int,
+    spectrum: Spectrum | None = None,
     *,
-    strength=1.0,
-    mask=None,
-    keep=None,
-    dirichlet=False,
-    progress=None,
-    base=None,
-):
+    strength: float = 1.0,
+    mask: ArrayLike | None = None,
+    keep: str | None = None,
+    dirichlet: bool = False,
+    progress: Progress | None = None,
+    base: Floats | None = None,
+) -> Floats:
     """Filter the shape of the surface by frequency.
 
     The coordinates are three functions on the points. Each component keeps its centre, so that the result moves
@@ -129,17 +134,17 @@ def smooth_points(
 
 
 def fair_points(
-    laplacian,
-    time=None,
+    laplacian: LaplaceBeltrami,
+    time: float | None = None,
     *,
-    order=3,
-    strength=1.0,
-    mask=None,
-    keep=None,
-    dirichlet=False,
-    progress=None,
-    base=None,
-):
+    order: int = 3,
+    strength: float = 1.0,
+    mask: None = None,
+    keep: dict[str, int] | str | None = None,
+    dirichlet: bool = False,
+    progress: Progress | None = None,
+    base: None = None,
+) -> Floats:
     """Smooth the surface by an implicit step, without eigenvectors: for noise, also on large clouds.
 
     Solves ``(1 + (time L)^order) x = x0`` with the negated operator L, whose eigenvalues are the symbol-corrected ones.
@@ -211,7 +216,9 @@ def fair_points(
     )
 
 
-def roughness(laplacian, wavelength=None, *, progress=None):
+def roughness(
+    laplacian: LaplaceBeltrami, wavelength: float | None = None, *, progress: Progress | None = None
+) -> Floats:
     """Measure how far the points stick out of the smooth surface.
 
     Parameters
@@ -261,7 +268,9 @@ def roughness(laplacian, wavelength=None, *, progress=None):
     return np.einsum("ij,ij->i", laplacian.points - smooth, laplacian.normals)
 
 
-def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
+def displace_by_mode(
+    laplacian: LaplaceBeltrami, mode: ArrayLike, amplitude: float | None = None, *, phase: float = 0.0
+) -> Floats:
     """Move the points along their normals by a vibration mode (Figure 9 of the paper).
 
     Parameters
@@ -318,7 +327,7 @@ def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
     return points + (most * np.cos(angle)) * (mode / largest)[:, None] * laplacian.normals
 
 
-def smoothing_base(laplacian, *, dirichlet=False, progress=None):
+def smoothing_base(laplacian: LaplaceBeltrami, *, dirichlet: bool = False, progress: Progress | None = None) -> Floats:
     """Return the part of the points' places that filters leave alone.
 
     Parameters
@@ -357,7 +366,7 @@ def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     return base
 
 
-def _centers(laplacian, weights):
+def _centers(laplacian: LaplaceBeltrami, weights: Floats) -> Floats:
     """Return the weighted mean of the points of each component, (components, 3); that of weight zero is not used."""
     known = laplacian.component >= 0
     component, weights = laplacian.component[known], weights[known]
@@ -367,7 +376,7 @@ def _centers(laplacian, weights):
     return np.column_stack(sums) / total[:, None]
 
 
-def boundary_places(laplacian):
+def boundary_places(laplacian: LaplaceBeltrami) -> Floats:
     """Return the place on the boundary nearest to every point next to one, (n, 3) [L]; other rows are the points
     themselves.
 
@@ -425,7 +434,15 @@ class PointBlend:
         A mask, strength or choice that makes no sense.
     """
 
-    def __init__(self, laplacian, *, strength=1.0, mask=None, keep=None, dirichlet=False):
+    def __init__(
+        self,
+        laplacian: LaplaceBeltrami,
+        *,
+        strength: Any = 1.0,
+        mask: Floats | None = None,
+        keep: str | None = None,
+        dirichlet: bool | float = False,
+    ) -> None:
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         check_switches(dirichlet=dirichlet)
@@ -454,7 +471,7 @@ class PointBlend:
                 f"Components that have a boundary and enclose no volume: {components}. Keep the area instead."
             )
 
-    def __call__(self, filtered):
+    def __call__(self, filtered: Floats) -> Floats:
         """Return the result for filtered places.
 
         Parameters
@@ -479,7 +496,7 @@ class PointBlend:
         component = np.where(known, self.laplacian.component, 0)
         center = _centers(self.laplacian, self.laplacian.areas * self.mask)[component]
 
-        def result(scale):
+        def result(scale: Floats) -> Floats:
             return points + self.weights[:, None] * (center + scale[component][:, None] * (filtered - center) - points)
 
         measure = SurfaceSize(self.laplacian, self.keep)

@@ -1,12 +1,17 @@
 """Directions carried along the surface, and maps of it around a point."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..algebra import TwoGrid, blocks, on_all_cores
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
 from ..geometry import as_indices
-from ..operator import connection_laplacian, tangent_frames
+from ..operator import LaplaceBeltrami, connection_laplacian, tangent_frames
+from ..types import Array, Floats, Progress
 from .geodesics import Geodesics
 
 _TIME = 2.0  # smoothing lengths that heat spreads over: with fewer, the randomness of points is not averaged out
@@ -14,7 +19,9 @@ _FARTHEST = 200.0  # times as far the object may reach, or the heat there is bel
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 
 
-def transport(laplacian, sources, directions, *, progress=None):
+def transport(
+    laplacian: LaplaceBeltrami, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None
+) -> Floats:
     """Carry directions at some points along the surface to all others.
 
     Parameters
@@ -104,7 +111,7 @@ class Transport:
     0.0
     """
 
-    def __init__(self, laplacian, *, progress=None):
+    def __init__(self, laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> None:
         report = progress or _silent
         report("Equations", 0.0)
         self._laplacian, self._geodesics = laplacian, None
@@ -120,7 +127,7 @@ class Transport:
         )
         self._flow = TwoGrid(flow, mass, laplacian.points, report)
 
-    def extend(self, sources, directions, *, progress=None):
+    def extend(self, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None) -> Floats:
         """Carry directions to all points; see `transport`.
 
         Parameters
@@ -169,7 +176,14 @@ class Transport:
         size = np.abs(found)
         return np.einsum("i,ij->ij", found.conj() / np.where(size > 0.0, size, 1.0), self.frames).real
 
-    def logarithmic_map(self, source, direction=None, *, geodesics=None, progress=None):
+    def logarithmic_map(
+        self,
+        source: int,
+        direction: ArrayLike | None = None,
+        *,
+        geodesics: Geodesics | None = None,
+        progress: Progress | None = None,
+    ) -> Floats:
         """Lay the surface out flat around a point; see `logarithmic_map`.
 
         Parameters
@@ -216,7 +230,9 @@ class Transport:
         return np.column_stack([place.real, place.imag])
 
 
-def logarithmic_map(laplacian, source, direction=None, *, progress=None):
+def logarithmic_map(
+    laplacian: LaplaceBeltrami, source: int, direction: ArrayLike | None = None, *, progress: Progress | None = None
+) -> Floats:
     """Lay the surface out flat around a point: polar coordinates by distance and direction along the surface.
 
     Parameters
@@ -270,13 +286,13 @@ def logarithmic_map(laplacian, source, direction=None, *, progress=None):
     return Transport(laplacian, progress=progress).logarithmic_map(source, direction, progress=progress)
 
 
-def _gradient(laplacian, frames, values, report):
+def _gradient(laplacian: LaplaceBeltrami, frames: Array, values: Floats, report: Callable[..., Any]) -> Array:
     """Return the gradient of a function, (n,) complex in the frames, by least squares over all pairs."""
     stiffness = laplacian.stiffness
     places, axes = np.ascontiguousarray(laplacian.surface_points.T), np.ascontiguousarray(frames.T)
     result = np.empty(len(values), dtype=complex)
 
-    def fit(rows):
+    def fit(rows: Any) -> None:
         start = stiffness.indptr[rows.start : rows.stop + 1]
         second, weight = stiffness.indices[start[0] : start[-1]], -stiffness.data[start[0] : start[-1]]
         own = np.repeat(np.arange(len(start) - 1), np.diff(start))  # a pair of a point with itself has no length
@@ -284,7 +300,7 @@ def _gradient(laplacian, frames, values, report):
         u, v = (np.einsum("ak,ak->k", offset, axis[:, rows].take(own, axis=1)) for axis in (axes.real, axes.imag))
         rise = values[second] - values[rows][own]
 
-        def total(left, right):
+        def total(left: Floats, right: Floats) -> Floats:
             return np.bincount(own, weight * left * right, minlength=len(start) - 1)
 
         xx, xy, yy, x, y = total(u, u), total(u, v), total(v, v), total(rise, u), total(rise, v)
@@ -296,5 +312,5 @@ def _gradient(laplacian, frames, values, report):
     return result
 
 
-def _silent(stage, fraction):
+def _silent(stage: str, fraction: float) -> None:
     """Report nothing."""

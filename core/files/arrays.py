@@ -2,6 +2,8 @@
 
 import re
 import zipfile
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +20,7 @@ _RATIO = 100  # of an unpacked to a packed array; those of points have 1 to 20 .
 _HARMLESS = 64e6  # ... or fewer bytes than this
 
 
-def read_array(path) -> PointTable:
+def read_array(path: Path) -> PointTable:
     """Read an array (n, 3), or the one named points among several, whatever the file is called.
 
     Raises
@@ -53,7 +55,7 @@ def read_array(path) -> PointTable:
                 return _read_rows(member, path, unpacked)
 
 
-def _read_rows(file, path, size):
+def _read_rows(file: Any, path: Path, size: int) -> PointTable:
     """Read an array (n, 3) of a file, or a part of one, that has so many bytes, and take memory for no more.
 
     The header is not given to numpy, which reads it as Python.

@@ -2,14 +2,16 @@
 
 import re
 from itertools import pairwise
+from pathlib import Path
 
 from ..errors import PointCloudError
+from ..types import FilePath
 from .formats import READABLE, SPLATS
 
 _NUMBERED = re.compile(r"(.*?)(\d+)(\D*)", re.ASCII)
 
 
-def numbered_files(folder) -> list:
+def numbered_files(folder: Path) -> list[Path]:
     """Find the frames of a sequence: the files with points in a folder whose names differ by a number alone.
 
     Files without a number are no frames. See `order_frames`.
@@ -41,7 +43,7 @@ def numbered_files(folder) -> list:
     return order_frames(frames)
 
 
-def order_frames(paths) -> list:
+def order_frames(paths: list[Path]) -> list[Path]:
     """Put files in the order of the last number in their names, however many digits it has.
 
     Parameters
@@ -72,6 +74,6 @@ def order_frames(paths) -> list:
     return [path for path, _ in frames]
 
 
-def frame_number(path) -> int:
+def frame_number(path: FilePath) -> int:
     """Return the last number in the name of a file, by which `order_frames` goes."""
     return int(_NUMBERED.fullmatch(path.stem)[2])

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import PointCloudError
 
@@ -24,7 +25,7 @@ class LasChoices:
     withheld: bool = False
 
 
-def parse_classes(text) -> frozenset:
+def parse_classes(text: str) -> frozenset[Any] | frozenset[int]:
     """Return the classes of a text such as "2 5", "2, 5" or "2-5"; none of an empty one.
 
     Raises

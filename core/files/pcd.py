@@ -1,11 +1,13 @@
 """PCD, the point files of the Point Cloud Library: text, binary, or packed by LZF."""
 
 import struct
-from typing import NamedTuple
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array, Ints
 from .lines import brief
 from .rows import read_records, read_rows, too_short
 from .table import PointTable, from_columns
@@ -26,7 +28,7 @@ class _Field(NamedTuple):
     count: int  # numbers of each point
 
 
-def read_pcd(path) -> PointTable:
+def read_pcd(path: Path) -> PointTable:
     """Read the points of a PCD file with all their fields of one number; those that the sensor missed are left out.
 
     Raises
@@ -55,7 +57,7 @@ def read_pcd(path) -> PointTable:
     return table
 
 
-def _read_header(file, path):
+def _read_header(file: BinaryIO, path: Path) -> tuple[list[_Field], int, str]:
     """Return the fields, the number of points and the kind of data; leave the file where the data begin."""
     found = {}
     for number in range(1, _MOST_LINES):
@@ -80,11 +82,11 @@ def _read_header(file, path):
     raise InvalidPointsError(f"{path} has no header of a PCD file that ends with DATA. Export it again.")
 
 
-def _is_count(word):
+def _is_count(word: str) -> bool:
     return word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS
 
 
-def _read_fields(found, path):
+def _read_fields(found: dict[str, int | list[str]], path: Path) -> tuple[list[_Field], int]:
     """Return the fields and the number of points that the lines of a header tell."""
     names, sizes, types = (found.get(key, []) for key in ("FIELDS", "SIZE", "TYPE"))
     counts = found.get("COUNT", ["1"] * len(names))
@@ -102,14 +104,14 @@ def _read_fields(found, path):
     return [_Field(name, code, int(number)) for name, code, number in zip(names, codes, counts, strict=True)], count
 
 
-def _read_text(file, fields, count, path):
+def _read_text(file: BinaryIO, fields: list[_Field], count: int, path: Path) -> list[Array | None]:
     types = [field.code for field in fields for _ in range(field.count)]
     columns = read_rows(file, types, count, path)
     firsts = np.cumsum([0] + [field.count for field in fields])
     return [columns[first] if field.count == 1 else None for field, first in zip(fields, firsts, strict=False)]
 
 
-def _read_binary(file, fields, count, path):
+def _read_binary(file: BinaryIO, fields: list[_Field], count: int, path: Path) -> list[Array | None]:
     record = np.dtype([(f"f{index}", f"<{field.code}", (field.count,)) for index, field in enumerate(fields)])
     rows = read_records(file, file.tell(), record, count, path)
     return [
@@ -117,7 +119,7 @@ def _read_binary(file, fields, count, path):
     ]
 
 
-def _read_packed(file, fields, count, path):
+def _read_packed(file: BinaryIO, fields: list[_Field], count: int, path: Path) -> list[Array | None]:
     """Read data packed as a whole: all values of the first field, then all of the next one."""
     head = file.read(8)
     packed, length = struct.unpack("<II", head) if len(head) == 8 else (0, 0)
@@ -134,7 +136,7 @@ def _read_packed(file, fields, count, path):
     ]
 
 
-def _unpack(data, length):
+def _unpack(data: bytes, length: int) -> bytearray:
     """Undo LZF: runs of bytes as they are, and repetitions of bytes before; only one after another can be undone."""
     result = bytearray(length)
     place = done = 0
@@ -170,7 +172,7 @@ def _unpack(data, length):
     return result
 
 
-def _split_color(column, alpha):
+def _split_color(column: Array, alpha: bool) -> dict[str, Ints]:
     """Return the columns of a color whose bytes are alpha, red, green and blue of a whole number, or of a float."""
     bits = column.astype(np.float32).view(np.uint32) if column.dtype.kind == "f" else column.astype(np.uint32)
     parts = {name: (bits >> shift).astype(np.uint8) for name, shift in (("red", 16), ("green", 8), ("blue", 0))}

@@ -2,17 +2,20 @@
 
 import os
 import struct
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ..errors import InvalidPointsError
+from ..types import Array, Ints, Progress
 from .rows import too_short
 
 _BLOCK = 2**16  # records that are found before their numbers are read
 
 
-def read_fixed(file, begin, order, types, count, path) -> list:
+def read_fixed(file: BinaryIO, begin: int, order: str, types: list[str], count: int, path: Path) -> list[Array]:
     """Read the columns of records that are no lists.
 
     Parameters
@@ -49,7 +52,9 @@ def read_fixed(file, begin, order, types, count, path) -> list:
     return columns
 
 
-def end_of_records(file, begin, order, types, count, path) -> int:
+def end_of_records(
+    file: BinaryIO, begin: int, order: str, types: list[str | tuple[str, str]], count: int, path: Path
+) -> int:
     """Return where records end; the parameters are those of `read_fixed`."""
     if all(isinstance(code, str) for code in types):
         return begin + count * np.dtype([(f"f{index}", code) for index, code in enumerate(types)]).itemsize
@@ -62,7 +67,7 @@ def end_of_records(file, begin, order, types, count, path) -> int:
     return begin + place
 
 
-def _rest(file, begin, types, count, path):
+def _rest(file: BinaryIO, begin: int, types: list[str | tuple[str, str]], count: int, path: Path) -> bytes:
     """Return the bytes of a file from a place on; refuse one that is too short for so many empty lists."""
     least = sum(int((code if isinstance(code, str) else code[0])[1:]) for code in types)
     found = max(os.fstat(file.fileno()).st_size - begin, 0) // least
@@ -72,7 +77,7 @@ def _rest(file, begin, types, count, path):
     return file.read()
 
 
-def _equal_records(data, order, types, count):
+def _equal_records(data: bytes, order: str, types: list[str | tuple[str, str]], count: int) -> Array | None:
     """Return records whose lists are all as long as those of the first one; None if they are not."""
     fields, lengths, size = [], {}, 0
     for index, code in enumerate(types):
@@ -93,7 +98,7 @@ def _equal_records(data, order, types, count):
     return rows if all((rows[name] == length).all() for name, length in lengths.items()) else None
 
 
-def _divide(types):
+def _divide(types: list[str | tuple[str, str]]) -> list[tuple[Any, Any]]:
     """Divide properties behind each list: codes of those before it, and its own, which are None behind the last one."""
     parts = [([], None)]
     for code in types:
@@ -105,7 +110,7 @@ def _divide(types):
     return parts
 
 
-def _reader(data, order, code):
+def _reader(data: bytes, order: str, code: str) -> Any:
     """Return a function of a place in a file that gives the number there."""
     if code == "u1":
         return data.__getitem__
@@ -113,7 +118,9 @@ def _reader(data, order, code):
     return lambda place: read(data, place)[0]
 
 
-def _walk(data, place, order, parts, count, path, progress):
+def _walk(
+    data: bytes, place: int, order: str, parts: list[tuple[Any, Any]], count: int, path: Path, progress: Progress
+) -> tuple[Ints, int]:
     """Go through records one by one, since where one begins depends on all before: in .8 s for a million of two lists.
 
     Returns

@@ -1,6 +1,9 @@
 """Which side is outside: signs of normals, by propagation, by where they were seen from, or by winding numbers."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
@@ -8,8 +11,9 @@ from scipy.spatial import ConvexHull, cKDTree
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
 from ..options import LaplacianOptions
+from ..types import Bools, Floats, Ints
 from .cloud import read_surface
-from .nearest import find_nearest
+from .nearest import Nearest, find_nearest
 from .normals import NEIGHBORS, orient_outwards, outer_signs, propagate_signs, unit_normals
 from .points import check_points
 
@@ -25,7 +29,14 @@ _SPHERE = 30.0  # radius that points are mirrored in to see which are hidden, ov
 _COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
 
 
-def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=None):
+def orient_normals(
+    points: ArrayLike,
+    normals: ArrayLike,
+    *,
+    method: str = "winding",
+    viewpoint: ArrayLike | None = None,
+    areas: ArrayLike | None = None,
+) -> Floats:
     """Choose the signs of normals.
 
     Parameters
@@ -129,13 +140,13 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
     return toward(normals, scaled.scatter(oriented, 0.0))
 
 
-def toward(normals, directions):
+def toward(normals: Floats, directions: Floats) -> Floats:
     """Return unit normals, (n, 3), reversed where they point against directions, (n, 3); zero ones change nothing."""
     against = np.einsum("ij,ij->i", normals, directions) < 0.0
     return np.where(against[:, None], -normals, normals)
 
 
-def _directions(points, viewpoint):
+def _directions(points: Floats, viewpoint: ArrayLike | None) -> Floats:
     """Return the unit vectors from points to where they were seen from; zero where that is the point itself."""
     given = as_array(() if viewpoint is None else viewpoint, "Viewpoints")
     if given.dtype.kind not in "iuf" or given.shape not in ((3,), points.shape):
@@ -151,7 +162,7 @@ def _directions(points, viewpoint):
     return directions / np.maximum(np.linalg.norm(directions, axis=1)[:, None], np.finfo(float).tiny)
 
 
-def _checked_areas(areas, count):
+def _checked_areas(areas: ArrayLike, count: int) -> Floats:
     given = as_array(areas, "Areas")
     if given.shape != (count,) or given.dtype.kind not in "iuf":
         raise InvalidPointsError(f"Areas of shape {given.shape} do not fit {count} points. Give a number for each.")
@@ -162,7 +173,7 @@ def _checked_areas(areas, count):
     return given / given.max()
 
 
-def _seen(offset):
+def _seen(offset: Floats) -> Bools:
     """Tell which points are not hidden by others, (m,) bool, by their places as seen from the viewpoint, (m, 3).
 
     Points mirrored in a large sphere about the viewpoint lie on the convex hull where they are seen (Katz, Tal, Basri
@@ -178,7 +189,7 @@ def _seen(offset):
     return seen[:-1]
 
 
-def _elected(votes, patch, component):
+def _elected(votes: Floats, patch: Ints, component: Ints) -> Floats:
     """Return the sign of each patch for which its points vote, (m,); where none does, those of its component."""
     of_patch = np.empty(patch.max() + 1, dtype=int)
     of_patch[patch] = component
@@ -186,7 +197,7 @@ def _elected(votes, patch, component):
     return np.where(np.where(total == 0.0, np.bincount(component, votes)[of_patch], total) < 0.0, -1.0, 1.0)
 
 
-def _patches(points, normals, tree):
+def _patches(points: Floats, normals: Floats, tree: sparse.csr_array) -> Ints:
     """Number patches of points, (m,), joined by links of the tree over which the sign is beyond doubt.
 
     Small patches are joined to their surest neighbour, round by round, until none is left.
@@ -213,7 +224,7 @@ def _patches(points, normals, tree):
             joined[links[links >= 0]] = True
 
 
-def _certainty(points, normals, first, second):
+def _certainty(points: Floats, normals: Floats, first: Ints, second: Ints) -> Floats:
     """Return how surely two points lie on one smooth sheet: the cosine of normals, less the chord's slope over both."""
     chord = points[second] - points[first]
     chord /= np.linalg.norm(chord, axis=1)[:, None]
@@ -222,7 +233,7 @@ def _certainty(points, normals, first, second):
     return np.abs(np.einsum("ij,ij->i", left, right)) - 2.0 * slope**2
 
 
-def _winding_signs(points, normals, weight, patch, part):
+def _winding_signs(points: Floats, normals: Floats, weight: Floats, patch: Ints, part: Ints) -> Floats:
     """Return the sign of each patch by which the winding number changes least off the surface, outside 0.
 
     Parameters
@@ -247,7 +258,7 @@ def _winding_signs(points, normals, weight, patch, part):
     return sign * outside[group_of_patch]
 
 
-def _patch_energies(points, normals, weight, patch):
+def _patch_energies(points: Floats, normals: Floats, weight: Floats, patch: Ints) -> Floats:
     """Return the mutual energy of each two patches: of clumps of points, and of finer ones where those are near."""
     count = patch.max() + 1
     fine, _ = _clumps(points, weight[:, None] * normals, weight, patch, _FINE)
@@ -256,7 +267,9 @@ def _patch_energies(points, normals, weight, patch):
     return energy if len(coarse[0]) == len(fine[0]) else energy + _corrections(fine, coarse, clump, count)
 
 
-def _clumps(points, moments, weight, patch, most):
+def _clumps(
+    points: Floats, moments: Floats, weight: Floats, patch: Ints, most: int
+) -> tuple[tuple[Floats, Floats, Floats, Ints, float], Ints]:
     """Gather dipoles of one patch and place, until there are at most so many.
 
     Returns
@@ -288,12 +301,12 @@ def _clumps(points, moments, weight, patch, most):
     return (place, moment, total, owner, max(size, np.median(spacing_to_next(points)))), clump
 
 
-def spacing_to_next(points):
+def spacing_to_next(points: Floats) -> Floats:
     """Return the spacing around each point."""
     return find_nearest(points).spacing
 
 
-def _energies(place, moment, _, owner, width, count):
+def _energies(place: Floats, moment: Floats, _: Floats, owner: Ints, width: float, count: int) -> Floats:
     """Return the mutual energy of each two patches, (count, count), by dipoles smoothed over a width."""
     result = np.zeros((count, count))
     patches = sparse.csr_array((np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), count))
@@ -307,7 +320,7 @@ def _energies(place, moment, _, owner, width, count):
     return result
 
 
-def _corrections(fine, coarse, clump, count):
+def _corrections(fine: Any, coarse: Any, clump: Any, count: Any) -> Any:
     """Return by how much the energy of each two patches is more, (count, count), where near clumps are taken finely.
 
     Within a clump there is one patch, whose energy with itself does not matter.
@@ -331,7 +344,7 @@ def _corrections(fine, coarse, clump, count):
     return result + result.T
 
 
-def _pair_energies(dipoles, first, second):
+def _pair_energies(dipoles: Any, first: Any, second: Any) -> Any:
     """Return the energy of pairs of dipoles."""
     place, moment, _, _, width = dipoles
     offset = place[second] - place[first]
@@ -340,12 +353,12 @@ def _pair_energies(dipoles, first, second):
     return _coupling(np.einsum("ij,ij->i", left, right), along, np.einsum("ij,ij->i", offset, offset) + width**2)
 
 
-def _coupling(alike, along, square):
+def _coupling(alike: Floats, along: Floats, square: Floats) -> Floats:
     """Return the energy of dipoles by the product of their moments, of those along their distance, and its square."""
     return (alike - 3.0 * along / square) / (4.0 * np.pi * square**1.5)
 
 
-def _near_energies(place, nearest, normals, weight):
+def _near_energies(place: Floats, nearest: Nearest, normals: Floats, weight: Floats) -> sparse.csr_array:
     """Return the mutual energy of each two near points, (m, m) CSR, by dipoles smoothed over their spacing."""
     count, width = nearest.index.shape
     first, second = np.repeat(np.arange(count), width - 1), nearest.index[:, 1:].ravel()
@@ -359,7 +372,7 @@ def _near_energies(place, nearest, normals, weight):
     return (0.5 * (energy + energy.T)).tocsr()
 
 
-def _settled(energy):
+def _settled(energy: sparse.csr_array) -> Floats:
     """Return signs, (m,), from which no flip of one point improves the energy of pairs, (m, m) CSR without empty rows.
 
     In each round those points flip that gain most among their neighbours, no two of which are neighbours.
@@ -378,7 +391,7 @@ def _settled(energy):
         sign[rank > rival] *= -1.0
 
 
-def _least(energy):
+def _least(energy: Floats) -> Floats:
     """Return signs, (m,), that no flip of one patch improves, the best of two beginnings."""
     mutual = energy - np.diag(np.diag(energy))
     mutual = 0.5 * (mutual + mutual.T)
@@ -399,7 +412,7 @@ def _least(energy):
     return best
 
 
-def _grouped(energy, area):
+def _grouped(energy: Floats, area: Floats) -> Ints:
     """Number groups of parts of the surface that have one outside, (m,).
 
     Parts, and then groups of them, are joined one by one as long as the energy that two have in common, which is a

@@ -1,21 +1,24 @@
 """Checks and preparation of the input coordinates."""
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
+from ..types import Array, Bools, Floats, Ints
 
 FEWEST = 5  # points of a boundary that is given
 _SAME = 1e-9  # of the scale: no closer points are told apart, as areas between them would drown in rounding
 _LARGEST = 1e60  # coordinates [L], and its inverse the least extent: further powers of lengths must be numbers, too
 
 
-def check_points(points):
+def check_points(points: ArrayLike) -> Floats:
     """Check coordinates and return them in double precision.
 
     Parameters
@@ -89,24 +92,24 @@ class ScaledPoints:
         The caller's point that each row was first seen at.
     """
 
-    points: np.ndarray
+    points: Floats
     scale: float
-    inverse: np.ndarray
-    copies: np.ndarray
-    first: np.ndarray
+    inverse: Ints
+    copies: Ints
+    first: Ints
 
     @property
-    def shared(self):
+    def shared(self) -> bool:
         """Whether some of the caller's points are at one place."""
         return self.copies.max() > 1
 
-    def scatter(self, quantity, neutral):
+    def scatter(self, quantity: Array, neutral: bool | float | tuple[float, float, float]) -> Array:
         """Return a quantity of the distinct points for the caller's; those left out get the neutral value."""
         result = quantity[self.inverse]
         result[self.inverse < 0] = neutral
         return result
 
-    def leave_out(self, dropped):
+    def leave_out(self, dropped: Bools) -> Self:
         """Return the same without some of the distinct points, (m,) bool."""
         kept = ~dropped
         row = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)  # what was left out before stays so
@@ -114,14 +117,14 @@ class ScaledPoints:
             self, points=self.points[kept], inverse=row[self.inverse], copies=self.copies[kept], first=self.first[kept]
         )
 
-    def among(self, rows, count):
+    def among(self, rows: Ints, count: int) -> Self:
         """Return the same as some rows, (k,), of a caller's points, so many in all; the others were left out."""
         inverse = np.full(count, -1)
         inverse[rows] = self.inverse
         return replace(self, inverse=inverse, first=rows[self.first])
 
 
-def scale_points(points, needed):
+def scale_points(points: Floats, needed: int) -> ScaledPoints:
     """Centre, scale and merge duplicates, so that all that follows is free of units.
 
     Parameters
@@ -161,7 +164,7 @@ def scale_points(points, needed):
     return ScaledPoints(distinct[order], scale, rank[inverse], copies[order], first[order])
 
 
-def _merge(points):
+def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
     """Take points at one place, in scaled coordinates, as one.
 
     Returns
@@ -190,7 +193,7 @@ def _merge(points):
     return distinct, first, inverse
 
 
-def as_mask(chosen, count):
+def as_mask(chosen: ArrayLike, count: int) -> Bools:
     """Return a set of points, (k,) indices or an (n,) bool mask, as a mask.
 
     Raises
@@ -213,7 +216,7 @@ def as_mask(chosen, count):
     return mask
 
 
-def as_indices(chosen, count, name):
+def as_indices(chosen: ArrayLike, count: int, name: str) -> Ints:
     """Return a set of points, (k,) indices or an (n,) bool mask, as indices in the order given.
 
     Raises
@@ -234,7 +237,7 @@ def as_indices(chosen, count, name):
     return index
 
 
-def check_boundary(chosen, count, first):
+def check_boundary(chosen: ArrayLike, count: int, first: Ints) -> Bools:
     """Check a set of points at the boundary, (k,) indices or a (count,) mask, and return the mask of some, (m,).
 
     Raises
@@ -249,7 +252,7 @@ def check_boundary(chosen, count, first):
     return mask
 
 
-def check_distances(distances, count):
+def check_distances(distances: ArrayLike, count: int) -> Floats:
     """Check distances to a boundary, (count,), infinite where there is none near.
 
     Raises
@@ -266,7 +269,7 @@ def check_distances(distances, count):
     return as_doubles(given)
 
 
-def check_values(values, count, columns=True):
+def check_values(values: ArrayLike, count: int, columns: bool = True) -> Floats:
     """Check functions on the points and return them, (count,) or with columns (count, k), in double precision.
 
     Raises

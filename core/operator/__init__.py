@@ -3,6 +3,6 @@
 from .areas import SOLVERS, AreaSolution, estimate_areas
 from .connection import connection_laplacian, tangent_frames
 from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
-from .implicit import ImplicitSurface
+from .implicit import Heights, ImplicitSurface
 from .laplacian import LaplaceBeltrami, build_laplacian, narrow_laplacian
 from .spectrum import Spectrum, symmetric_form

@@ -1,14 +1,19 @@
 """The connection Laplacian: the operator on tangent vectors, each a complex number in the frame of its point."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..algebra import blocks, on_all_cores
+from ..types import Array, Floats
 
 _BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
 
 
-def tangent_frames(normals):
+def tangent_frames(normals: Floats) -> Array:
     """Give each tangent plane a frame, so that a complex number is a tangent vector.
 
     Parameters
@@ -29,7 +34,13 @@ def tangent_frames(normals):
     return first + 1j * np.cross(normals, first)
 
 
-def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: None):
+def connection_laplacian(
+    stiffness: sparse.csr_array,
+    normals: Floats,
+    frames: Array,
+    mass: ArrayLike = 0.0,
+    report: Callable[..., Any] = lambda: None,
+) -> sparse.csr_array:
     """Build the operator on tangent vectors from the one on functions.
 
     Parameters
@@ -64,7 +75,7 @@ def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: No
     entries = np.empty(len(first), dtype=complex)
     normal, real, imaginary = (np.ascontiguousarray(values.T) for values in (normals, frames.real, frames.imag))
 
-    def measure(block):
+    def measure(block: Any) -> None:
         i, j = first[block], second[block]
         left, right, axis = normal.take(i, axis=1), normal.take(j, axis=1), real.take(j, axis=1)
         cosine = _dot(left, right)
@@ -90,6 +101,6 @@ def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: No
     return half + other
 
 
-def _dot(left, right):
+def _dot(left: Floats, right: Floats) -> Floats:
     """Return the dot products of vectors, both (3, k)."""
     return np.einsum("ak,ak->k", left, right)

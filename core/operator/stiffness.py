@@ -1,12 +1,16 @@
 """Assemble the stiffness matrix, eq. (10) of the paper."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from ..algebra import on_all_cores
+from ..geometry import Cloud, Pairs, Patch, ScaledPoints
 from ..kernel import SECOND_MOMENT, pair_kernel
+from ..types import Array, Bools, Floats, Ints
 from .curvature import weight_factor
 from .images import mirror, own_images
 from .weights import balance_weights
@@ -31,8 +35,8 @@ class Stiffness:
 
     matrix: sparse.csr_array
     images: sparse.csr_array
-    residual: np.ndarray
-    widths: np.ndarray
+    residual: Floats
+    widths: Floats
 
 
 @dataclass(frozen=True)
@@ -50,13 +54,15 @@ class _Images:
         Those in one boundary; others are images of images.
     """
 
-    rows: np.ndarray
-    weights: np.ndarray
-    fourth: np.ndarray
-    once: np.ndarray
+    rows: Ints
+    weights: Floats
+    fourth: Floats
+    once: Bools
 
 
-def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: None):
+def assemble_stiffness(
+    cloud: Cloud, distance: Floats, areas: Floats, balanced: bool = False, report: Callable[..., Any] = lambda: None
+) -> Stiffness:
     """Assemble K = -D G D of eq. (10) for the caller's points.
 
     Points at the same place take equal parts of its area and couple as neighbours at distance zero. The image of a
@@ -102,7 +108,7 @@ def assemble_stiffness(cloud, distance, areas, balanced=False, report=lambda: No
     return Stiffness(stiffness, images, residual, widths)
 
 
-def _kernel_weights(cloud, distance, areas):
+def _kernel_weights(cloud: Cloud, distance: Floats, areas: Floats) -> tuple[Floats, Floats, _Images, _Images]:
     """Return what the kernel makes of pairs, and of points with themselves.
 
     Returns
@@ -118,14 +124,16 @@ def _kernel_weights(cloud, distance, areas):
     factor = weight_factor(lengths, cloud.gaussian_curvature)
     weights = np.empty(len(distance))
 
-    def weigh(patch):
+    def weigh(patch: Patch) -> None:
         first, second, h = patch.first(areas), patch.second(areas), patch.mean(lengths)
         weights[patch.pairs] = pair_kernel(distance[patch.pairs] / h) * (patch.mean(factor) / h**4) * first * second
 
     on_all_cores(weigh, pairs.patches)
     own = pair_kernel(0.0) * factor / lengths**4 * areas**2
 
-    def weigh_images(weights, found, distance, first, second):
+    def weigh_images(
+        weights: Floats, found: list[tuple[Ints, Floats, Floats]], distance: Floats, first: Ints, second: Ints
+    ) -> _Images:
         parts = []
         for number, (rows, image, _) in enumerate(found):
             i, j = first[rows], second[rows]
@@ -141,13 +149,13 @@ def _kernel_weights(cloud, distance, areas):
     return weights, own, images, alone
 
 
-def _widths(pairs, distance, areas, weights, images, alone):
+def _widths(pairs: Pairs, distance: Floats, areas: Floats, weights: Floats, images: _Images, alone: _Images) -> Floats:
     """Return the smoothing length of the kernel whose fourth moment, 8 mu2 h^2 of the area, the weights have, (m,).
 
     It is a mean over the neighbours, as the operator would make much of what differs from point to point by chance.
     """
 
-    def moments(patch):
+    def moments(patch: Patch) -> list[list[Floats]]:
         own = weights[patch.pairs]
         return [[own, own * distance[patch.pairs] ** 4]] * 2
 
@@ -164,7 +172,7 @@ def _widths(pairs, distance, areas, weights, images, alone):
     return np.where(unit > 0.0, np.sqrt(moment / np.where(unit > 0.0, unit, 1.0)), pairs.lengths)
 
 
-def _symmetric(scaled, first, second, values, own):
+def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, own: Array) -> sparse.csr_array:
     """Return the symmetric matrix, (n, n), of quantities of pairs and of points with themselves, columns sorted.
 
     Points at the same place share what theirs has.
