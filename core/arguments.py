@@ -20,7 +20,7 @@ def real(given: Any) -> float:
     try:
         return float(number)
     except OverflowError:  # a whole number of more than 308 digits
-        return np.inf if float(number.__gt__(0)) else -np.inf
+        return np.inf if given > 0 else -np.inf
 
 
 def whole(given: Any) -> float:

@@ -4,7 +4,6 @@ import ctypes
 import os
 import sys
 from pathlib import Path
-from typing import Any
 
 from .errors import NotEnoughMemoryError
 from .options import LaplacianOptions
@@ -71,11 +70,12 @@ def check_memory(count: int, options: LaplacianOptions, modes: int = 0) -> None:
     NotEnoughMemoryError
         It does not fit; the text says how many points do.
     """
+    free = available_memory()
     most = points_that_fit(options, modes)
-    if most is not None and count > most:
+    if free is not None and most is not None and count > most:
         raise NotEnoughMemoryError(
             f"{count:,} points would take about {needed_memory(count, options, modes) / 2**30:.1f} GB of memory, and"
-            f" {available_memory() / 2**30:.1f} GB are free: enough for {_rounded(most):,} points. Use fewer points,"
+            f" {free / 2**30:.1f} GB are free: enough for {_rounded(most):,} points. Use fewer points,"
             " fewer neighbors, or free memory.",
             fitting=most,
         )
@@ -158,8 +158,8 @@ class _WindowsStatus(ctypes.Structure):
     )
 
 
-def _windows_memory() -> Any:
+def _windows_memory() -> int | None:
     status = _WindowsStatus(length=ctypes.sizeof(_WindowsStatus))
-    if not ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
+    if not ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):  # type: ignore[attr-defined,unused-ignore]
         return None
-    return status.available
+    return int(status.available)

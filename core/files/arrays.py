@@ -63,8 +63,14 @@ def _read_rows(file: Any, path: Path, size: int) -> PointTable:
     start = file.read(8)
     length = int.from_bytes(file.read(2 if start[6:7] == b"\x01" else 4), "little")
     header = file.read(length).decode("latin-1") if length <= _LONGEST else ""
-    found = [re.search(rf"'{name}'\s*:\s*({value})", header.replace('"', "'")) for name, value in _FIELDS.items()]
-    if not start.startswith(_MAGIC) or None in found:
+    found = [
+        match
+        for match in (
+            re.search(rf"'{name}'\s*:\s*({value})", header.replace('"', "'")) for name, value in _FIELDS.items()
+        )
+        if match
+    ]
+    if not start.startswith(_MAGIC) or len(found) < len(_FIELDS):
         raise InvalidPointsError(f"{path} holds no array of points. Save it again with numpy.")
     kind, columnwise, shape = (match[1] for match in found)
     rows = re.fullmatch(_ROWS, shape)

@@ -77,7 +77,8 @@ def find_rows(blocks: Callable[..., Any], path: Path) -> Rows:
     InvalidPointsError
         There is none, or too much stands before it.
     """
-    before, texts = [], 0
+    before: list[str] = []
+    texts = 0
     lines = chain.from_iterable(blocks())
     for number, line in enumerate(lines):
         if not line.strip():
@@ -135,9 +136,11 @@ def _unquoted(text: str, delimiter: str | None) -> str:
     return re.sub(r'"([^"\n]*)"', lambda match: match[1].replace(delimiter or " ", inside), text)
 
 
-def kinds(rows: Rows) -> tuple[list[int], list[Any], list[Any]]:
+def kinds(rows: Rows) -> tuple[list[int], list[int], list[int]]:
     """Return the indices of the columns that hold numbers, text, or nothing, in most rows of the sample."""
-    numeric, textual, empty = [], [], []
+    numeric: list[int] = []
+    textual: list[int] = []
+    empty: list[int] = []
     for index in range(rows.width):
         words = [row[index] for row in rows.sample if index < len(row)]
         there = [word for word in words if not _IS_MISSING.fullmatch(word)]
@@ -281,13 +284,13 @@ def _find_faults(rows: Rows, places: list[int], others: list[int]) -> dict[int, 
             continue
         faults = {}
         for index in places + others:
-            word = words[index] if index < len(words) else None
-            if word is None and (index in places or rows.delimiter is None):
+            word = words[index] if index < len(words) else ""
+            if index >= len(words) and (index in places or rows.delimiter is None):
                 faults[index] = f"line {number} has {len(words)} columns only"
-            elif not _IS_MISSING.fullmatch(word or ""):
+            elif not _IS_MISSING.fullmatch(word):
                 if not is_number(word):
                     faults[index] = f"line {number} has {brief(word)!r} where a number should be"
-            elif not rows.filled and not (word and is_number(word)):
+            elif not rows.filled and not is_number(word):
                 faults[index] = ""
         if faults:
             return faults

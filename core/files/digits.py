@@ -1,7 +1,7 @@
 """Whole numbers and times whose digits single precision would lose: less an offset, or in two parts."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class Digits(NamedTuple):
         By what whole numbers less the offset were divided: times in nanoseconds may all be multiples of a microsecond.
     """
 
-    offset: int | float | list
+    offset: Any  # a number, or a list of them for vectors
     decimals: int | None = None
     part: str = ""
     unsigned: bool = False

@@ -41,7 +41,7 @@ class _Field(NamedTuple):
 class _Scan(NamedTuple):
     element: Element  # that describes it
     fields: list[Any]
-    count: int  # of its points
+    count: int  # type: ignore[assignment]  # of its points
     offset: int  # in the file
 
 

@@ -9,7 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from ..errors import InvalidPointsError
-from ..types import Ints
+from ..types import Array, Ints
 from .rows import too_short
 
 PAGE = 1024  # bytes ...
@@ -75,7 +75,7 @@ def _crc_table() -> Ints:
     return table
 
 
-def read_streams(file: BinaryIO, place: int, end: int, widths: list[int], count: int, path: Path) -> list[Ints]:
+def read_streams(file: BinaryIO, place: int, end: int, widths: list[int], count: int, path: Path) -> list[Array]:
     """Read the values of points, field by field, from the packets that they are divided among.
 
     Parameters

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from .cells import Rows, is_comment
 from .lines import is_number
@@ -27,10 +27,10 @@ def find_names(rows: Rows, numeric: list[int]) -> list[str]:
         None for those without a name; fewer than there are columns if a list of any length follows; empty if no line
         names them.
     """
-    usual = []
+    usual: list[str | None] = []
     for line in reversed(rows.before):
-        for names in _split(line, rows.delimiter):
-            names = _fit(names, is_comment(line), rows, numeric)
+        for words in _split(line, rows.delimiter):
+            names = _fit(words, is_comment(line), rows, numeric)
             found = find_places(names, numeric) if names else None
             if found and found.sure:
                 return names
@@ -81,12 +81,13 @@ def _fit(names: list[str], marked: bool, rows: Rows, numeric: list[int]) -> list
     if marked and lists is None and len(known) < len(names):
         return []
     nameless = len(names) == width - 1 and not is_other(names[0])
+    fitted: list[str | None] = [*names]
     if nameless and (0 not in numeric or counts(rows)):  # R gives no name to those of rows
-        names = [None, *names]
+        fitted = [None, *names]
     if lists is None:
-        names = [*names[:width], *[None] * (width - len(names))]
-    found = find_places(names, numeric)
-    return _distinct(names) if found and found.sure else []
+        fitted = [*fitted[:width], *[None] * (width - len(fitted))]
+    found = find_places(fitted, numeric)
+    return _distinct(fitted) if found and found.sure else []
 
 
 def counts(rows: Rows, index: int = 0) -> bool:
@@ -103,9 +104,10 @@ def unnamed(index: int) -> str:
     return f"column_{index + 1}"
 
 
-def _distinct(names: list[str]) -> list[str]:
+def _distinct(names: Sequence[str | None]) -> list[str | None]:
     """Number names that come again."""
-    seen, result = Counter(), []
+    seen: Counter[str | None] = Counter()
+    result: list[str | None] = []
     for index, name in enumerate(names):
         name = unnamed(index) if name == "" else name
         seen[name] += 1

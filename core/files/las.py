@@ -201,7 +201,7 @@ class _Tally:
         withheld, classes = np.asarray(block["withheld"]).astype(bool), np.asarray(block["classification"])
         kept = ~withheld | self._choices.withheld
         self.total += len(kept)
-        self._withheld += np.count_nonzero(withheld)
+        self._withheld += int(np.count_nonzero(withheld))
         self._found += np.bincount(classes[kept], minlength=_CLASSES)
         if self._choices.classes:
             kept &= np.isin(classes, [*self._choices.classes])

@@ -3,7 +3,7 @@
 import codecs
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, TextIO
+from typing import IO, AnyStr
 
 from ..errors import InvalidPointsError
 
@@ -31,7 +31,7 @@ def _encoding(path: Path) -> str:
     return "utf-8-sig"
 
 
-def read_blocks(file: BinaryIO | TextIO, path: Path, skipped: tuple[str, ...] = ()) -> Iterator[list[bytes | str]]:
+def read_blocks(file: IO[AnyStr], path: Path, skipped: tuple[AnyStr, ...] = ()) -> Iterator[list[AnyStr]]:
     """Yield lists of lines, without their ends, of an open file of characters or bytes.
 
     Parameters

@@ -2,7 +2,7 @@
 
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from ..types import Array
@@ -12,9 +12,9 @@ from .ascii_words import LETTERS
 class _System(NamedTuple):
     """Words for coordinates that go together."""
 
-    x: set
-    y: set
-    z: tuple[Any, ...]  # sets of words, the surest first
+    x: set[str]
+    y: set[str]
+    z: tuple[set[str], ...]  # sets of words, the surest first
 
 
 _HEIGHTS = (
@@ -142,7 +142,7 @@ def is_known(name: str) -> bool:
     return bool(_place(name)) or (bool(_words(name)) and is_other(name))
 
 
-def find_places(names: list[str | None], numeric: list[int]) -> Places | None:
+def find_places(names: Sequence[str | None], numeric: list[int]) -> Places | None:
     """Find the columns of x y z by their names.
 
     Parameters
@@ -156,16 +156,16 @@ def find_places(names: list[str | None], numeric: list[int]) -> Places | None:
     Places or None
         None if there are no three that could be.
     """
-    names = [name or "" for name in names]
-    words = {index: _place(names[index]) for index in numeric if index < len(names)}
+    given = [name or "" for name in names]
+    words = {index: _place(given[index]) for index in numeric if index < len(given)}
     found = _find_system(words)
     if found:
         return found
-    hints = {index: word or _hint(names[index]) for index, word in words.items()}
+    hints = {index: word or _hint(given[index]) for index, word in words.items()}
     found = _find_system(hints)
     if found:
         return found._replace(sure=False)
-    unknown = [index for index in words if not is_other(names[index])]
+    unknown = [index for index in words if not is_other(given[index])]
     system, *pair = next((found for found in _pairs(hints) if found[0].z is _HEIGHTS), [None])
     if pair:
         unknown = [*pair, *(index for index in unknown if not hints[index])]
@@ -192,11 +192,11 @@ def _pairs(words: dict[int, str]) -> Iterator[tuple[_System, int, int]]:
 
 def standard_names(names: dict[str, Array]) -> dict[str, str]:
     """Return new names for columns of colors and normals that are called otherwise, such as colorRed or NormalX."""
-    found = {}
+    found: dict[str, str] = {}
     for name in names:
         words = [word for word in _words(name) if word not in _ABOUT_COLORS]
         found.setdefault(" ".join(words), name)
-    result = {}
+    result: dict[str, str] = {}
     for triple, standard in _TRIPLES.items():
         if all(word in found for word in triple.split(",")):
             result |= {found[word]: name for word, name in zip(triple.split(","), standard, strict=True)}

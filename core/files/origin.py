@@ -86,7 +86,7 @@ def choose_origin(points: Floats, known: ArrayLike | None = None, *, degrees: bo
     longest, extents = _extents(points)
     allowed = _allowed(points, degrees or look_like_degrees(points))
     own = allowed < min(_FINE * longest, _FINEST)
-    if known is not None and _share(points - known, allowed, own, longest):
+    if known is not None and _share(points - np.asarray(known), allowed, own, longest):
         return np.array(known, dtype=np.float64)
     coarse = _steps(points) > allowed
     shifted = coarse & own if not (coarse & ~own).any() else np.full(3, True)

@@ -7,7 +7,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from ..errors import InvalidPointsError
-from ..types import Array, Ints
+from ..types import Array
 from .lines import brief
 from .rows import read_records, read_rows, too_short
 from .table import PointTable, from_columns
@@ -25,7 +25,7 @@ _MOST_REPEATED = 88  # times that LZF may make data longer: three bytes repeat 2
 class _Field(NamedTuple):
     name: str
     code: str  # numpy's, without the byte order
-    count: int  # numbers of each point
+    count: int  # type: ignore[assignment]  # numbers of each point
 
 
 def read_pcd(path: Path) -> PointTable:
@@ -38,14 +38,14 @@ def read_pcd(path: Path) -> PointTable:
     """
     with open(path, "rb") as file:
         fields, count, kind = _read_header(file, path)
-        columns = {"ascii": _read_text, "binary": _read_binary, "binary_compressed": _read_packed}[kind](
+        values = {"ascii": _read_text, "binary": _read_binary, "binary_compressed": _read_packed}[kind](
             file, fields, count, path
         )
     left_out = [field.name for field in fields if field.count != 1 and field.name != "_"]
     columns = {
         field.name: column
-        for field, column in zip(fields, columns, strict=True)
-        if field.count == 1 and field.name != "_"  # which only fills records
+        for field, column in zip(fields, values, strict=True)
+        if column is not None and field.name != "_"  # which only fills records
     }
     for name in _COLORS:
         if name in columns:
@@ -59,7 +59,7 @@ def read_pcd(path: Path) -> PointTable:
 
 def _read_header(file: BinaryIO, path: Path) -> tuple[list[_Field], int, str]:
     """Return the fields, the number of points and the kind of data; leave the file where the data begin."""
-    found = {}
+    found: dict[str, list[str]] = {}
     for number in range(1, _MOST_LINES):
         line = file.readline(_LONGEST).decode(errors="replace").strip()
         key, *words = line.split() or ["#"]
@@ -69,7 +69,7 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[list[_Field], int, str]:
             case "FIELDS" | "SIZE" | "TYPE" | "COUNT":
                 found[key] = words
             case "WIDTH" | "HEIGHT" | "POINTS" if len(words) == 1 and _is_count(words[0]):
-                found[key] = int(words[0])
+                found[key] = words
             case "VERSION" | "VIEWPOINT":
                 pass
             case "DATA" if words in (["ascii"], ["binary"], ["binary_compressed"]):
@@ -86,15 +86,16 @@ def _is_count(word: str) -> bool:
     return word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS
 
 
-def _read_fields(found: dict[str, int | list[str]], path: Path) -> tuple[list[_Field], int]:
+def _read_fields(found: dict[str, list[str]], path: Path) -> tuple[list[_Field], int]:
     """Return the fields and the number of points that the lines of a header tell."""
     names, sizes, types = (found.get(key, []) for key in ("FIELDS", "SIZE", "TYPE"))
     counts = found.get("COUNT", ["1"] * len(names))
-    count = found.get("POINTS", found.get("WIDTH", 0) * found.get("HEIGHT", 1))
-    codes = [_TYPES.get(f"{kind} {size}") for kind, size in zip(types, sizes, strict=False)]
+    width, height = (int(found.get(key, [usual])[0]) for key, usual in (("WIDTH", "0"), ("HEIGHT", "1")))
+    count = int(found["POINTS"][0]) if "POINTS" in found else width * height
+    codes = [_TYPES.get(f"{kind} {size}", "") for kind, size in zip(types, sizes, strict=False)]
     if (
         not len(names) == len(sizes) == len(types) == len(counts)
-        or None in codes
+        or "" in codes
         or not all(map(_is_count, counts))
         or sum(map(int, counts)) > _WIDEST
     ):
@@ -138,6 +139,7 @@ def _read_packed(file: BinaryIO, fields: list[_Field], count: int, path: Path) -
 
 def _unpack(data: bytes, length: int) -> bytearray:
     """Undo LZF: runs of bytes as they are, and repetitions of bytes before; only one after another can be undone."""
+    part: bytes | bytearray
     result = bytearray(length)
     place = done = 0
     try:
@@ -172,7 +174,7 @@ def _unpack(data: bytes, length: int) -> bytearray:
     return result
 
 
-def _split_color(column: Array, alpha: bool) -> dict[str, Ints]:
+def _split_color(column: Array, alpha: bool) -> dict[str, Array]:
     """Return the columns of a color whose bytes are alpha, red, green and blue of a whole number, or of a float."""
     bits = column.astype(np.float32).view(np.uint32) if column.dtype.kind == "f" else column.astype(np.uint32)
     parts = {name: (bits >> shift).astype(np.uint8) for name, shift in (("red", 16), ("green", 8), ("blue", 0))}

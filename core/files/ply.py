@@ -1,5 +1,6 @@
 """PLY, the Stanford polygon format: the vertices and their properties, in text or binary."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -26,7 +27,7 @@ _MOST_DIGITS = 15  # of a count
 
 class _Element(NamedTuple):
     name: str
-    count: int
+    count: int  # type: ignore[assignment]  # in place of the method of tuples
     names: list[Any]  # of the properties
     types: list[Any]  # numpy's codes; a pair for a list: of its length and of its items
 
@@ -203,8 +204,8 @@ def write_vertex_columns(
     path: Path,
     columns: dict[str, Array],
     order: str = "<",
-    comments: tuple[str, ...] = (),
-    faces: list[Ints] | tuple[Any, ...] = (),
+    comments: Sequence[str] = (),
+    faces: Sequence[Ints] = (),
 ) -> list[str]:
     """Write a binary PLY file.
 

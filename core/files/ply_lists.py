@@ -2,20 +2,24 @@
 
 import os
 import struct
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO, TypeAlias
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ..errors import InvalidPointsError
-from ..types import Array, Ints, Progress
+from ..types import Array, Ints
 from .rows import too_short
+
+Code: TypeAlias = str | tuple[str, str]  # of a number, or of the length and the items of a list
+Part: TypeAlias = tuple[list[str], tuple[str, str] | None]
 
 _BLOCK = 2**16  # records that are found before their numbers are read
 
 
-def read_fixed(file: BinaryIO, begin: int, order: str, types: list[str], count: int, path: Path) -> list[Array]:
+def read_fixed(file: BinaryIO, begin: int, order: str, types: Sequence[Code], count: int, path: Path) -> list[Array]:
     """Read the columns of records that are no lists.
 
     Parameters
@@ -52,9 +56,7 @@ def read_fixed(file: BinaryIO, begin: int, order: str, types: list[str], count: 
     return columns
 
 
-def end_of_records(
-    file: BinaryIO, begin: int, order: str, types: list[str | tuple[str, str]], count: int, path: Path
-) -> int:
+def end_of_records(file: BinaryIO, begin: int, order: str, types: Sequence[Code], count: int, path: Path) -> int:
     """Return where records end; the parameters are those of `read_fixed`."""
     if all(isinstance(code, str) for code in types):
         return begin + count * np.dtype([(f"f{index}", code) for index, code in enumerate(types)]).itemsize
@@ -67,7 +69,7 @@ def end_of_records(
     return begin + place
 
 
-def _rest(file: BinaryIO, begin: int, types: list[str | tuple[str, str]], count: int, path: Path) -> bytes:
+def _rest(file: BinaryIO, begin: int, types: Sequence[Code], count: int, path: Path) -> bytes:
     """Return the bytes of a file from a place on; refuse one that is too short for so many empty lists."""
     least = sum(int((code if isinstance(code, str) else code[0])[1:]) for code in types)
     found = max(os.fstat(file.fileno()).st_size - begin, 0) // least
@@ -77,7 +79,7 @@ def _rest(file: BinaryIO, begin: int, types: list[str | tuple[str, str]], count:
     return file.read()
 
 
-def _equal_records(data: bytes, order: str, types: list[str | tuple[str, str]], count: int) -> Array | None:
+def _equal_records(data: bytes, order: str, types: Sequence[Code], count: int) -> Array | None:
     """Return records whose lists are all as long as those of the first one; None if they are not."""
     fields, lengths, size = [], {}, 0
     for index, code in enumerate(types):
@@ -98,9 +100,9 @@ def _equal_records(data: bytes, order: str, types: list[str | tuple[str, str]], 
     return rows if all((rows[name] == length).all() for name, length in lengths.items()) else None
 
 
-def _divide(types: list[str | tuple[str, str]]) -> list[tuple[Any, Any]]:
+def _divide(types: Sequence[Code]) -> list[Part]:
     """Divide properties behind each list: codes of those before it, and its own, which are None behind the last one."""
-    parts = [([], None)]
+    parts: list[Part] = [([], None)]
     for code in types:
         if isinstance(code, tuple):
             parts[-1] = (parts[-1][0], code)
@@ -110,7 +112,7 @@ def _divide(types: list[str | tuple[str, str]]) -> list[tuple[Any, Any]]:
     return parts
 
 
-def _reader(data: bytes, order: str, code: str) -> Any:
+def _reader(data: bytes, order: str, code: str) -> Callable[[int], int]:
     """Return a function of a place in a file that gives the number there."""
     if code == "u1":
         return data.__getitem__
@@ -119,7 +121,7 @@ def _reader(data: bytes, order: str, code: str) -> Any:
 
 
 def _walk(
-    data: bytes, place: int, order: str, parts: list[tuple[Any, Any]], count: int, path: Path, progress: Progress
+    data: bytes, place: int, order: str, parts: list[Part], count: int, path: Path, progress: tuple[int, int]
 ) -> tuple[Ints, int]:
     """Go through records one by one, since where one begins depends on all before: in .8 s for a million of two lists.
 
@@ -132,7 +134,8 @@ def _walk(
     """
     steps = [
         (sum(int(code[1:]) for code in codes), _reader(data, order, pair[0]), int(pair[0][1:]), int(pair[1][1:]))
-        for codes, pair in parts[:-1]
+        for codes, pair in parts
+        if pair is not None
     ]
     tail, marks = sum(int(code[1:]) for code in parts[-1][0]), []
     try:

@@ -40,9 +40,10 @@ def read_ptx(path: Path) -> PointTable:
     InvalidPointsError
         It is no PTX file, or announces another number of points than it has; the text says where.
     """
-    scans, missed = [], 0
-    lines = enumerate(chain.from_iterable(read_text(path)), start=1)
-    lines = ((number, line) for number, line in lines if _is_filled(line))
+    scans: list[tuple[Floats, Floats]] = []
+    missed = 0
+    numbered = enumerate(chain.from_iterable(read_text(path)), start=1)
+    lines = ((number, line) for number, line in numbered if _is_filled(line))
     while head := [*islice(lines, _HEAD)]:
         values, center, misses = _read_scan(lines, head, len(scans), path)
         scans.append((values, center))
@@ -99,7 +100,7 @@ def _read_scan(
     missed = _missed(values)
     values = values[~missed]
     values[:, :3] = values[:, :3] @ matrix[:3, :3] + matrix[3, :3]
-    return values, _center(values[:, :3], place, matrix), np.count_nonzero(missed)
+    return values, _center(values[:, :3], place, matrix), int(np.count_nonzero(missed))
 
 
 def _missed(values: Floats) -> Bools:
@@ -153,7 +154,8 @@ def _join(scans: list[tuple[Floats, Floats]], missed: int, path: Path) -> PointT
     """Return one table of all scans; what a scan lacks is zero, its colors white."""
     counts = [len(values) for values, _ in scans]
     total = sum(counts)
-    columns, colored = {}, np.zeros(total, bool)
+    columns: dict[str, Floats] = {}
+    colored = np.zeros(total, bool)
     for start, (values, _) in zip(np.cumsum([0, *counts]), scans, strict=False):
         names = _NAMES if values.shape[1] != 6 else [name for name in _NAMES if name != "intensity"]
         for name, column in zip(names, values.T, strict=False):

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import chain, count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -43,8 +42,8 @@ class PointTable:
     """
 
     points: Floats
-    attributes: dict[str, Any] = field(default_factory=dict)
-    colors: np.ndarray | None = None
+    attributes: dict[str, Array] = field(default_factory=dict)
+    colors: Floats | None = None
     single: bool = False
     degrees: bool = False
     notices: list[str] = field(default_factory=list)
@@ -75,13 +74,13 @@ def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
             return None
         return [left.pop(named[name]) for name in names]
 
-    places = take(_AXES)
+    places = [left.pop(named[axis]) for axis in _AXES]
     table = PointTable(np.stack(places, axis=1, dtype=np.float64))
     table.single = any(place.dtype == np.float32 for place in places)
-    colors = next(filter(None, map(take, _COLORS)), None)
-    if colors is not None:
+    channels = next(filter(None, map(take, _COLORS)), None)
+    if channels is not None:
         alpha = next(filter(None, map(take, _ALPHAS)), None)
-        colors = np.stack(colors, axis=1)
+        colors = np.stack(channels, axis=1)
         table.colors = unit_colors(colors, alpha and alpha[0])
         table.notices += told_depth(colors, path)
     normals = take(_NORMALS)
@@ -90,7 +89,7 @@ def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
     for name in columns:
         match = re.fullmatch(r"(.+)_x", name)
         vector = [f"{match[1]}_{axis}" for axis in _AXES] if match else []
-        if vector and all(part in left for part in vector):
+        if match and all(part in left for part in vector):
             table.attributes[match[1]] = np.stack([left.pop(part) for part in vector], axis=1)
         elif name in left:
             table.attributes[name] = left.pop(name)
@@ -144,7 +143,7 @@ def to_columns(table: PointTable) -> dict[str, Array]:
     """Return the columns of a table by the names of files, numbers as they are; the reverse of `from_columns`."""
     columns = dict(zip(_AXES, table.points.T, strict=True))
     attributes = dict(table.attributes)
-    if np.ndim(attributes.get(NORMAL)) == 2:
+    if NORMAL in attributes and attributes[NORMAL].ndim == 2:
         columns.update(zip(_NORMALS, attributes.pop(NORMAL).T, strict=True))
     if table.colors is not None:
         values = np.round(255.0 * table.colors).astype(np.uint8)
@@ -179,7 +178,7 @@ def without_missed(table: PointTable, path: Path) -> PointTable:
     path : pathlib.Path
         The file, for the texts.
     """
-    kept = (np.abs(table.points) <= FARTHEST).all(axis=1)
+    kept = np.all(np.abs(table.points) <= FARTHEST, axis=1)
     missed = len(kept) - np.count_nonzero(kept)
     far = np.isfinite(table.points).all(axis=1) & ~kept
     if not missed or far.all():

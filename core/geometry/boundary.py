@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, inverses, on_all_cores
 from ..kernel import SUPPORT
-from ..types import Bools, Floats, Ints
+from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
 from .nearest import ON, SMOOTH, Nearest, fading_weights
@@ -226,12 +226,12 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
 class _Course:
     """Parabolas that the boundary follows around each boundary point: e = a + b t + c t^2 along two tangents."""
 
-    rows: Floats
+    rows: Ints
     along: Floats
-    across: Floats
-    outward: Floats
+    across: Array
+    outward: Array
     coefficients: Floats
-    kinked: Floats
+    kinked: Bools
 
     def ahead(self, points: Floats, chosen: Ints, seen: Ints) -> tuple[Floats, Floats]:
         """Return how far other boundary points lie outside a parabola's tangent, and its direction across there."""

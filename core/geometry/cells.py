@@ -162,7 +162,7 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
     ahead = np.stack([-here[:, 1], here[:, 0]], axis=1)
     areas, reach = np.zeros(count), np.zeros(count)
     closed = np.zeros(count, dtype=bool)
-    start = corner = None
+    start = corner = np.zeros((0, 2))
     rows = np.arange(count)
     for _ in range(cuts.shape[1] + 1):
         way = cuts[rows] - here[:, None]
@@ -174,10 +174,11 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
         there, ahead = cuts[rows, chosen], way[every, chosen] / length[every, chosen, None]
         across = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
         out = across <= _SAME * np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
-        before, corner = corner, np.stack([there[:, 1] - here[:, 1], here[:, 0] - there[:, 0]], axis=1)
+        before = corner
+        corner = np.stack([there[:, 1] - here[:, 1], here[:, 0] - there[:, 0]], axis=1)
         corner /= np.where(out, 1.0, across)[:, None]
         reach[rows] = np.maximum(reach[rows], np.where(out, 0.0, np.linalg.norm(corner, axis=1)))
-        if before is None:
+        if not len(before):
             start = corner
         else:
             areas[rows] += _triangles(before, corner, gaussian_curvature[rows])

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, cKDTree
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
 from ..options import LaplacianOptions
-from ..types import Bools, Floats, Ints
+from ..types import Array, Bools, Floats, Ints
 from .cloud import read_surface
 from .nearest import Nearest, find_nearest
 from .normals import NEIGHBORS, orient_outwards, outer_signs, propagate_signs, unit_normals
@@ -111,13 +111,14 @@ def orient_normals(
     0.0
     """
     points = check_points(points)
-    normals = unit_normals(normals, len(points))
+    given_normals = unit_normals(normals, len(points))
     if not isinstance(method, str) or method not in METHODS:
         raise InvalidPointsError(f"Orientation {method!r} is unknown. Choose one of {', '.join(METHODS)}.")
-    towards = _directions(points, viewpoint) if method == "viewpoint" else None
+    seen_from = as_array(() if viewpoint is None else viewpoint, "Viewpoints")
+    towards = _directions(points, seen_from) if method == "viewpoint" else None
     sample = read_surface(points, LaplacianOptions(), lambda stage, fraction: None)[1].sample
     scaled, nearest = sample.scaled, sample.nearest
-    chosen = normals[scaled.first]
+    chosen = given_normals[scaled.first]
     if method == "outside":
         oriented = orient_outwards(nearest, chosen)
     else:
@@ -128,16 +129,16 @@ def orient_normals(
         if areas is not None:
             given = _checked_areas(areas, len(points))[scaled.first]
             weight = given * (weight.sum() / max(given.sum(), np.finfo(float).tiny))
-        if method == "viewpoint":
+        if towards is not None:
             votes = np.einsum("ij,ij->i", oriented, towards[scaled.first])
-            if np.ndim(viewpoint) == 1:
-                votes = np.where(_seen(points[scaled.first] - viewpoint), votes, 0.0)
+            if seen_from.ndim == 1:
+                votes = np.where(_seen(points[scaled.first] - seen_from), votes, 0.0)
             sign = _elected(votes, patch, sample.component)
         else:
             sign = _winding_signs(place, oriented, weight, patch, sample.component)
         oriented = oriented * sign[patch][:, None]
         oriented *= _settled(_near_energies(place, nearest, oriented, weight))[:, None]
-    return toward(normals, scaled.scatter(oriented, 0.0))
+    return toward(given_normals, scaled.scatter(oriented, 0.0))
 
 
 def toward(normals: Floats, directions: Floats) -> Floats:
@@ -146,9 +147,8 @@ def toward(normals: Floats, directions: Floats) -> Floats:
     return np.where(against[:, None], -normals, normals)
 
 
-def _directions(points: Floats, viewpoint: ArrayLike | None) -> Floats:
+def _directions(points: Floats, given: Array) -> Floats:
     """Return the unit vectors from points to where they were seen from; zero where that is the point itself."""
-    given = as_array(() if viewpoint is None else viewpoint, "Viewpoints")
     if given.dtype.kind not in "iuf" or given.shape not in ((3,), points.shape):
         raise InvalidPointsError(
             f"Viewpoints of shape {given.shape} do not fit {len(points)} points. Give one place of three numbers, or"
@@ -269,7 +269,7 @@ def _patch_energies(points: Floats, normals: Floats, weight: Floats, patch: Ints
 
 def _clumps(
     points: Floats, moments: Floats, weight: Floats, patch: Ints, most: int
-) -> tuple[tuple[Floats, Floats, Floats, Ints, float], Ints]:
+) -> tuple[tuple[Array, Array, Array, Ints, float], Ints]:
     """Gather dipoles of one patch and place, until there are at most so many.
 
     Returns
@@ -298,7 +298,7 @@ def _clumps(
     moment = np.column_stack([np.bincount(clump, moments[:, axis], count) for axis in range(3)])
     owner = np.empty(count, dtype=int)
     owner[clump] = patch
-    return (place, moment, total, owner, max(size, np.median(spacing_to_next(points)))), clump
+    return (place, moment, total, owner, max(size, float(np.median(spacing_to_next(points))))), clump
 
 
 def spacing_to_next(points: Floats) -> Floats:
@@ -397,7 +397,7 @@ def _least(energy: Floats) -> Floats:
     mutual = 0.5 * (mutual + mutual.T)
     scale = np.sqrt(np.maximum(np.abs(np.diag(energy)), np.finfo(float).tiny))
     leading = np.linalg.eigh(mutual / scale / scale[:, None])[1][:, -1]
-    best, most = None, -np.inf
+    best, most = np.ones(len(mutual)), -np.inf
     for sign in np.ones(len(mutual)), np.where(leading < 0.0, -1.0, 1.0):
         field = mutual @ sign
         for _ in range(20 * len(sign)):
@@ -406,7 +406,7 @@ def _least(energy: Floats) -> Floats:
                 break
             sign[worst] = -sign[worst]
             field += 2.0 * sign[worst] * mutual[worst]
-        total = sign @ field
+        total = float(sign @ field)
         if total > most * (1.0 + 1e-9):  # the propagated signs, where both are alike
             best, most = sign, total
     return best

@@ -84,7 +84,7 @@ def _off_surface(nearest: Nearest, surface: Quadrics, alone: _Alone, known: Bool
     height[sparse[suspects, None] & (scatter > FILLING * spacing[witnesses])] = np.inf
     found = -1
     while np.count_nonzero(result) > found:
-        found = np.count_nonzero(result)
+        found = int(np.count_nonzero(result))
         result[suspects] = _third(np.where(result[witnesses], np.inf, height)) > 1.0
     return result
 

@@ -83,7 +83,7 @@ class Pairs:
     @functools.cached_property
     def start(self) -> Ints:
         """Where the pairs of each first point start, (m + 1,)."""
-        start = np.zeros(len(self.points) + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
+        start: Ints = np.zeros(len(self.points) + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
         np.cumsum(np.bincount(self.first, minlength=len(self.points)), out=start[1:])
         return start
 
@@ -113,7 +113,7 @@ def find_pairs(tree: cKDTree, lengths: Floats, report: Callable[..., Any] = lamb
     spacing = tree.query(tree.data[sample], k=[min(31, n)], workers=-1)[0][:, 0]
     count = int(min(max(40.0 * np.median(radii[sample] / spacing) ** 2, 16), n))
     pending = np.arange(n)
-    found = [], [], []
+    found: tuple[list[Array], ...] = [], [], []
     while len(pending):
         unfinished = []
         for rows in np.array_split(pending, len(pending) * count // _BLOCK + 1):

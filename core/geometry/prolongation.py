@@ -1,5 +1,8 @@
 """From some points to all: what was computed on a subset is carried to the points between."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
@@ -8,7 +11,7 @@ from scipy.spatial import cKDTree
 from ..algebra import blocks, on_all_cores
 from ..arguments import as_array
 from ..errors import InvalidPointsError
-from ..types import Array, Floats, Ints, Progress
+from ..types import Array, Floats, Ints
 from .nearest import SMOOTH
 from .points import as_mask, check_points, check_values
 from .quadrics import frames
@@ -78,7 +81,7 @@ class Prolongation:
         subset: ArrayLike,
         normals: ArrayLike,
         component: ArrayLike | None = None,
-        progress: Progress | None = None,
+        progress: Callable[[], Any] | None = None,
     ) -> None:
         points = check_points(points)
         count = len(points)
@@ -147,7 +150,7 @@ class Prolongation:
         ndarray, (n,)
         """
         takes = ~as_mask(left_out, len(self.nearest))
-        owned = np.bincount(self.nearest[takes], minlength=len(areas))
+        owned = np.bincount(self.nearest[takes], minlength=np.size(areas))
         return np.where(takes, (np.asarray(areas) / np.maximum(owned, 1))[self.nearest], 0.0)
 
     def labels(self, values: ArrayLike) -> Floats:

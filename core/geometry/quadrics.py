@@ -81,7 +81,11 @@ def fit_quadrics(
     rows = np.arange(len(points)) if rows is None else rows
     count = len(rows)
     fitted = Quadrics(
-        *(np.empty(shape) for shape in ((count, 3), count, (count, 3), (count, 3, 3), count)),
+        normals=np.empty((count, 3)),
+        gaussian_curvature=np.empty(count),
+        height=np.empty((count, 3)),
+        shape_operator=np.empty((count, 3, 3)),
+        misfit=np.empty(count),
         curved=np.zeros(count, dtype=bool),
     )
 

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
-from ..types import Bools, Floats, Ints
+from ..types import Array, Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import pair_heights
 from .nearest import ON, SMOOTH, Nearest, changed_rows
@@ -117,7 +117,8 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
     """
     points, index, whole = nearest.points, nearest.index, nearest.weight
     if before is None:
-        rows, mixed = np.arange(len(points)), nearest.quadrics
+        rows: Ints = np.arange(len(points))
+        mixed = nearest.quadrics
     else:
         rows = changed_rows(nearest, before.nearest)
         mixed = before.mixed.put(rows, fit_quadrics(points, index[rows], whole[rows], rows))
@@ -154,7 +155,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
     return Sheets(quadrics, nearest, mixed, planes)
 
 
-def _own_plane(offset: Floats, weight: Floats, spacing: Floats) -> Floats:
+def _own_plane(offset: Floats, weight: Floats, spacing: Floats) -> Array:
     first, second = np.triu_indices(min(_SEEDS, offset.shape[1] - 1), 1)
     nearby = offset[:, 1:21]
     a, b = offset[:, 1 + first], offset[:, 1 + second]

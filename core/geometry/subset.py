@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..arguments import whole
 from ..errors import InvalidPointsError
-from ..types import Bools, Floats, Ints, Progress
+from ..types import Bools, Floats, Ints
 from .points import check_points
 
 _CANDIDATES = 3.0  # voxels for each point wanted: enough to choose from, few enough for their pairs
@@ -21,7 +21,7 @@ _SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that tell
 _TRIALS = 8  # of voxels, or of radii
 
 
-def blue_noise_subset(points: ArrayLike, count: int, *, progress: Progress | None = None) -> Ints:
+def blue_noise_subset(points: ArrayLike, count: int, *, progress: Callable[[], Any] | None = None) -> Ints:
     """Choose points that are evenly spread over the surface, none close to another: a Poisson-disc subset.
 
     Of each voxel of a fine grid the point next to its centre is a candidate. Of candidates closer than a radius one

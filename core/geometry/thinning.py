@@ -58,9 +58,9 @@ def thin(
     if count >= n:
         return np.arange(n)
     reach = spacing * np.sqrt(_FILL * np.sum(areas / spacing**2) / count)
-    priority = np.empty(n)
-    priority[np.lexsort(points.T)] = np.random.default_rng(_SEED).permutation(n)
-    priority = np.argsort(np.argsort(priority + n * rank))
+    drawn = np.empty(n)
+    drawn[np.lexsort(points.T)] = np.random.default_rng(_SEED).permutation(n)
+    priority = np.argsort(np.argsort(drawn + n * rank))
     passes = max(1, int(np.ceil(np.log(n / count) / np.log(_STEP**2))))
     chosen = np.arange(n)
     for step in range(passes):

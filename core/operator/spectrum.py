@@ -46,14 +46,14 @@ class Spectrum:
 
     eigenvalues: Floats
     eigenvectors: Floats
-    residuals: np.ndarray | None = None
+    residuals: Floats | None = None
 
 
 def solve_spectrum(
     laplacian: LaplaceBeltrami,
     stiffness: sparse.csr_array,
-    count: bytes | int | str | None,
-    tolerance: Floats | float = TOLERANCE,
+    count: int,
+    tolerance: float = TOLERANCE,
     progress: Progress | None = None,
 ) -> Spectrum:
     """Compute raw eigenpairs; see `LaplaceBeltrami.eigenpairs`."""

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..types import Array, Floats
 
@@ -55,7 +56,7 @@ def decode_opacities(logits: Floats) -> Floats:
         return np.nan_to_num(1.0 / (1.0 + np.exp(-logits)), nan=0.0)
 
 
-def encode_opacities(opacities: Floats) -> Floats:
+def encode_opacities(opacities: ArrayLike) -> Array:
     """Return the logits of opacities, finite ones of 0 and 1, too."""
     inside = np.clip(opacities, _SMALLEST, 1.0 - _NEAR)
     return np.log(inside) - np.log1p(-inside)

@@ -109,7 +109,7 @@ def read_file(path: FilePath, read: Callable[..., Any] = read_points) -> PointTa
     table = read(path)
     missing = near_miss((*PLACES, *table.attributes))
     if missing:
-        table.notices.append(f"{path.name} looks like Gaussian splats, but has {missing}: read as plain points.")
+        table.notices.append(f"{Path(path).name} looks like Gaussian splats, but has {missing}: read as plain points.")
     return table
 
 

@@ -64,7 +64,7 @@ def floaters(splats: Splats) -> Bools:
     rows = np.flatnonzero(kept)
     if len(rows) > _NEIGHBORS:
         apart = _gaps(positions[rows], splats.covariances[rows])
-        kept[rows] = apart <= _APART * max(1.0, np.median(apart))
+        kept[rows] = apart <= _APART * max(1.0, float(np.median(apart)))
     return ~kept
 
 

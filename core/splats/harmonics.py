@@ -112,7 +112,7 @@ _DEGREES = (
 )
 
 
-def _fit(degree: int) -> tuple[Floats, Floats]:
+def _fit(degree: int) -> tuple[Floats, Array]:
     """Return 2 degree + 1 directions, and the matrix from values there to coefficients."""
     # Of one half of the sphere, for on the other one the values are the same, or the opposite.
     z = 1.0 - (np.arange(2 * degree + 1) + 0.5) / (2 * degree + 1)

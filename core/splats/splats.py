@@ -124,7 +124,7 @@ class Splats:
         if len(rows) == len(self):
             shapes = _mapped(*shapes, maps)
         elif len(rows):  # the others keep every bit
-            moved = _mapped(*[part[rows] for part in shapes], maps[rows])
+            moved = _mapped(self.scales[rows], self.rotations[rows], self.harmonics[rows], maps[rows])
             shapes = (shapes[0].copy(), shapes[1].copy(), shapes[2].copy())
             for part, new in zip(shapes, moved, strict=True):
                 part[rows] = new

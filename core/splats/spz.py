@@ -30,7 +30,7 @@ _BLOCK = 1 << 16  # bytes that are unpacked at one time
 class _Header(NamedTuple):
     magic: bytes
     version: int
-    count: int
+    count: int  # type: ignore[assignment]  # in place of the method of tuples
     degree: int
     fraction: int  # bits of a coordinate behind the point
     flags: int
