@@ -17,7 +17,7 @@ from ..errors import InvalidPointsError, PointCloudError, SolverError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
 from ..operator import LaplaceBeltrami, Spectrum, symmetric_form
-from ..types import Floats, Ints, Progress
+from ..types import Floats, Ints, Progress, Response
 
 _NODES = 4096  # at which a response is read
 _DEGREE = 800  # of a polynomial, at most
@@ -145,7 +145,7 @@ def boost(gain: float, low: float, high: float = np.inf, *, softness: float = 0.
 
 
 def spectral_filter(
-    values: ArrayLike, spectrum: Spectrum, areas: ArrayLike, response: int, *, rest: float = 0.0
+    values: ArrayLike, spectrum: Spectrum, areas: ArrayLike, response: int | Response, *, rest: float = 0.0
 ) -> Floats:
     """Filter a function by its modes.
 

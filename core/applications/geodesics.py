@@ -220,7 +220,7 @@ class Geodesics:
         """Join points by shortest ways, and return all points of these in their order, (m,), the first one twice."""
         ends = np.append(curve, curve[0]) if closed else curve
         points = self._laplacian.surface_points
-        pieces = [ends[:1]]
+        pieces: list[Any] = [ends[:1]]
         for number, (first, last) in enumerate(pairwise(ends)):
             report(number / len(ends))
             row = self._graph.indices[self._graph.indptr[first] : self._graph.indptr[first + 1]]
@@ -228,7 +228,7 @@ class Geodesics:
                 pieces.append([last])
                 continue
             # Points farther away than the end do not matter; how far that is along the surface is not known yet.
-            apart = max(np.linalg.norm(points[last] - points[first]), 1e-300)
+            apart = max(float(np.linalg.norm(points[last] - points[first])), 1e-300)
             for times in _WITHIN:
                 before = dijkstra(self._graph, indices=first, return_predecessors=True, limit=times * apart)[1]
                 if before[last] >= 0:
@@ -410,8 +410,8 @@ def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[..., Any]) ->
 
     def measure(block: Any) -> None:
         i, j = first[block], second[block]
-        ends = (partial(np.take, indices=end, axis=1) for end in (i, j))
-        chord, left, right, cosine = pair_heights(*ends, places, normals)
+        one, other = (partial(np.take, indices=end, axis=1) for end in (i, j))
+        chord, left, right, cosine = pair_heights(one, other, places, normals)
         length = np.linalg.norm(chord, axis=0)
         turn = np.abs(np.where(cosine < 0.0, -right, right) - left)
         # Which way normals face each other across a right angle is chance: it bends, either way.

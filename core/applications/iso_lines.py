@@ -77,7 +77,7 @@ def iso_lines(vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: 
     return [line for part in parts for line in part]
 
 
-def _checked(vertices: Any, faces: Any, values: Any, levels: list[float]) -> tuple[Floats, Ints, Floats, list[Any]]:
+def _checked(vertices: Any, faces: Any, values: Any, levels: ArrayLike) -> tuple[Floats, Ints, Floats, list[Any]]:
     """Return what `iso_lines` takes as arrays, with triangles for faces."""
     count = len(np.atleast_1d(as_array(vertices, "Vertices")))
     vertices = check_positions(vertices, count, "vertices", "vertex")
@@ -95,11 +95,11 @@ def _checked(vertices: Any, faces: Any, values: Any, levels: list[float]) -> tup
             f"Values have the shape {values.shape} and type {values.dtype}, and there are {len(vertices)} vertices."
             " Give one real number per vertex."
         )
-    levels = [real(level) for level in np.atleast_1d(as_array(levels, "Levels")).ravel().tolist()]
-    if not np.isfinite(levels).all():
-        raise PointCloudError(f"The levels are {levels}. Use finite numbers.")
+    numbers = [real(level) for level in np.atleast_1d(as_array(levels, "Levels")).ravel().tolist()]
+    if not np.isfinite(numbers).all():
+        raise PointCloudError(f"The levels are {numbers}. Use finite numbers.")
     triangles = faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
-    return vertices, triangles.astype(np.int64), as_doubles(values), levels
+    return vertices, triangles.astype(np.int64), as_doubles(values), numbers
 
 
 def _segments(triangles: Ints, above: Bools) -> Ints:

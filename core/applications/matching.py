@@ -151,7 +151,8 @@ def _equal(values: Floats, tolerance: float) -> list[Ints]:
     """
     order = np.argsort(values, kind="stable")
     spacing = values[order[-1]] / len(values)
-    groups, rest = [], [order]
+    groups: list[Ints] = []
+    rest: list[Ints] = [order]
     while rest:
         group = rest.pop()
         sizes = values[group]

@@ -122,7 +122,7 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
 
 
 def values_on_mesh(
-    laplacian: LaplaceBeltrami, vertices: ArrayLike, *, progress: Progress | None = None
+    laplacian: LaplaceBeltrami, vertices: ArrayLike, *, progress: Callable[[], Any] | None = None
 ) -> Prolongation:
     """Prepare to carry functions on the points to the vertices of their mesh, along the surface.
 

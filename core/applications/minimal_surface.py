@@ -168,14 +168,14 @@ def minimal_surface(
             f"A tolerance of {epsilon!r} and {max_steps!r} steps were asked for. Give a tolerance of at least 0"
             " and a whole number of steps."
         )
-    epsilon, max_steps = real(epsilon), whole(max_steps)
+    epsilon, max_steps = real(epsilon), int(whole(max_steps))
     check_options(options)
     options = replace(options, projection="off")
     first = build_laplacian(points, options=options, progress=progress)
     film = _Film(first, fixed, options, progress)
     state = film.state(points, first)
     initial_area, bent = state.area, max(_NECK, state.bent)
-    area_history = []
+    area_history: list[float] = []
     reason = "step limit"
     try:
         while len(area_history) < max_steps:
@@ -267,7 +267,7 @@ class _Film:
     def state(self, points: Floats, before: LaplaceBeltrami) -> _State:
         """Build the operator of moved points, the boundary's distances by the normals before, and the next step."""
         distance, foot = None, points
-        if len(self.boundary):
+        if self.curve is not None:
             foot, index = self.curve.nearest(points)
             if not self.curve.rough:  # otherwise the operator fits a boundary's course to them
                 normals = before.normals[self.boundary[self.curve.first]]

@@ -12,7 +12,7 @@ from ..errors import ComponentError, InvalidPointsError, PointCloudError, TooFew
 from ..geometry import check_values
 from ..kernel import RESOLVED
 from ..operator import LaplaceBeltrami, Spectrum
-from ..types import Floats, Ints, Progress
+from ..types import Array, Floats, Ints, Progress
 from .graph import NearGraph, near_graph
 
 _NEIGHBORS = 8  # nearest points on the same sheet that a domain may continue to
@@ -229,7 +229,7 @@ def modes_needed(laplacian: LaplaceBeltrami, parts: int) -> int:
 def _check_parts(parts: Any) -> int:
     if not whole(parts) >= 1:
         raise TooFewPointsError(f"{parts!r} parts were asked for. Ask for a whole number of at least 1.")
-    return whole(parts)
+    return int(whole(parts))
 
 
 def _constant_modes(laplacian: LaplaceBeltrami) -> int:
@@ -260,7 +260,7 @@ def _signature(laplacian: LaplaceBeltrami, parts: int, spectrum: Spectrum | None
     return spectrum.eigenvectors[:, constant : count - 1] * ((1.0 - values / last) / np.sqrt(values))
 
 
-def _deal(parts: int, areas: Floats) -> Ints:
+def _deal(parts: int, areas: Array) -> Ints:
     """Deal parts out to components: one to each, each other one where the area per part is largest then."""
     share = np.ones(len(areas), dtype=int)
     for _ in range(parts - len(areas)):
@@ -268,7 +268,7 @@ def _deal(parts: int, areas: Floats) -> Ints:
     return share
 
 
-def _areas_of_places(laplacian: LaplaceBeltrami, graph: NearGraph) -> Floats:
+def _areas_of_places(laplacian: LaplaceBeltrami, graph: NearGraph) -> Array:
     return np.bincount(graph.place[graph.place >= 0], laplacian.areas[graph.place >= 0], minlength=len(graph.first))
 
 
@@ -334,7 +334,7 @@ def _main_axis(points: Floats, weight: Floats) -> tuple[float, Floats, Floats]:
 
 def _lloyd(points: Floats, weight: Floats, centers: Floats, rtol: float) -> tuple[Floats, float]:
     """Move centers to the means of their clusters until these stay, or their squares fall by less than rtol."""
-    centers, total, label = centers.copy(), np.inf, None
+    centers, total, label = centers.copy(), np.inf, np.zeros(0, dtype=int)
     for _ in range(_STEPS):
         last, label = label, _nearest(points, centers)
         share = sparse.csr_array((weight, (label, np.arange(len(label)))), shape=(len(centers), len(label)))

@@ -193,7 +193,7 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
     one = ways(largest[np.einsum("ij,ij->i", offset, offset).argmax()]).argmax()
     from_one = ways(largest[one])
     from_other = ways(largest[from_one.argmax()])
-    ends = []
+    ends: list[Ints] = []
     for near, far in ((from_one, from_other), (from_other, from_one)):
         order = np.argsort(near, kind="stable")
         order = order[near[order] < far[order]]
@@ -203,4 +203,5 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
                 f"{len(largest)} points of the largest component are too few for two ends. Choose handles yourself."
             )
         ends.append(np.sort(largest[order[: max(count, 3)]]))
-    return tuple(ends)
+    first, second = ends
+    return first, second

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import PointCloudError, SolverError
 from ..operator import LaplaceBeltrami
-from ..types import Bools, Floats
+from ..types import Array, Bools, Floats
 
 _SCALE = 4.0  # a shape is not scaled by more than this, or its inverse
 _ROUNDS = 30  # of the secant steps that find the scale
@@ -32,7 +32,7 @@ class SurfaceSize:
         """
         self.laplacian, self.kind = laplacian, kind
         self.known = laplacian.component >= 0
-        self.factor, self.before = np.ones(self.known.sum()), None
+        self.factor: Floats = np.ones(self.known.sum())
         growth, _ = self._metric(laplacian.surface_points)
         self.factor = 1.0 / np.where(growth > 0.0, growth, 1.0)
         areas, normals = laplacian.areas[self.known], laplacian.normals[self.known]
@@ -64,7 +64,7 @@ class SurfaceSize:
         side = np.where(np.einsum("ic,ic->i", normals, laplacian.normals[known]) < 0.0, -1.0, 1.0)
         return np.sqrt(np.maximum(values[:, 1] * values[:, 2], 0.0)) * self.factor, side[:, None] * normals
 
-    def _sizes(self, places: Floats, areas: Floats, normals: Floats) -> Floats:
+    def _sizes(self, places: Floats, areas: Floats, normals: Floats) -> Array:
         if self.kind == "area":
             return np.bincount(self.laplacian.component[self.known], areas)
         return self._along_axes(places, areas, normals).mean(axis=1)

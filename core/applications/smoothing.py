@@ -15,7 +15,7 @@ from ..arguments import check_switches, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
 from ..operator import LaplaceBeltrami, Spectrum
-from ..types import Floats, Progress
+from ..types import Floats, Progress, Response
 from .filters import chebyshev_filter, fairing, spectral_filter
 from .sizes import SurfaceSize, match_size
 
@@ -27,7 +27,7 @@ _AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 def smooth_points(
     laplacian: LaplaceBeltrami,
-    response: int,
+    response: int | Response,
     spectrum: Spectrum | None = None,
     *,
     strength: float = 1.0,
@@ -113,11 +113,11 @@ def smooth_points(
     blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
     base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
     rest = laplacian.points - base
-    if spectrum is None and callable(response):
+    if callable(response) and spectrum is None:
         filtered = chebyshev_filter(
             laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
         )
-    elif callable(response):
+    elif callable(response) and spectrum is not None:
         end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
         filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
     else:
@@ -140,7 +140,7 @@ def fair_points(
     order: int = 3,
     strength: float = 1.0,
     mask: None = None,
-    keep: dict[str, int] | str | None = None,
+    keep: str | None = None,
     dirichlet: bool = False,
     progress: Progress | None = None,
     base: None = None,
@@ -439,7 +439,7 @@ class PointBlend:
         laplacian: LaplaceBeltrami,
         *,
         strength: Any = 1.0,
-        mask: Floats | None = None,
+        mask: ArrayLike | None = None,
         keep: str | None = None,
         dirichlet: bool | float = False,
     ) -> None:

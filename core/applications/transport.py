@@ -114,7 +114,8 @@ class Transport:
     def __init__(self, laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> None:
         report = progress or _silent
         report("Equations", 0.0)
-        self._laplacian, self._geodesics = laplacian, None
+        self._laplacian = laplacian
+        self._geodesics: Geodesics | None = None
         self.frames = tangent_frames(laplacian.normals)
         areas = laplacian.areas
         reach = max(
@@ -300,7 +301,7 @@ def _gradient(laplacian: LaplaceBeltrami, frames: Array, values: Floats, report:
         u, v = (np.einsum("ak,ak->k", offset, axis[:, rows].take(own, axis=1)) for axis in (axes.real, axes.imag))
         rise = values[second] - values[rows][own]
 
-        def total(left: Floats, right: Floats) -> Floats:
+        def total(left: Floats, right: Floats) -> Array:
             return np.bincount(own, weight * left * right, minlength=len(start) - 1)
 
         xx, xy, yy, x, y = total(u, u), total(u, v), total(v, v), total(rise, u), total(rise, v)

@@ -257,7 +257,7 @@ def _plain(lines: list[str], delimiter: str | None) -> list[str]:
     return (text.replace(",", ".") if commas else text).split("\n")
 
 
-def _filled(lines: list[str], delimiter: str, columns: list[int]) -> list[str]:
+def _filled(lines: list[str], delimiter: str | None, columns: list[int]) -> list[str]:
     """Return lines as numpy reads them, with NaN for cells without a number."""
     text = "\n".join(_plain([line.replace("#N/A", "") for line in lines], delimiter))
     text = re.sub("#.*", "", text)

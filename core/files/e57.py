@@ -221,7 +221,7 @@ def _put(table: PointTable, scan: Any) -> None:
         table.single = table.single and not place.any()
 
 
-def _number(scan: Any, path: Path, default: float = 0.0) -> float:
+def _number(scan: Any, path: str, default: float = 0.0) -> float:
     """Return a number that describes a scan; where its element is empty it is zero."""
     element = scan.find(path)
     return default if element is None else float(element.text or 0.0)

@@ -75,7 +75,7 @@ def _crc_table() -> Ints:
     return table
 
 
-def read_streams(file: BinaryIO, place: int, end: int, widths: list[int], count: int, path: Path) -> list[Array]:
+def read_streams(file: BinaryIO, place: int, end: float, widths: list[int], count: int, path: Path) -> list[Array]:
     """Read the values of points, field by field, from the packets that they are divided among.
 
     Parameters
@@ -111,19 +111,19 @@ def read_streams(file: BinaryIO, place: int, end: int, widths: list[int], count:
             found = min(8 * size // width for size, width in zip(filled, widths, strict=True) if width)
             raise too_short(path, found, count)
         kind, length, number = struct.unpack_from(_PACKET, data, place)
-        end, at = place + length + 1, place + head + 2 * number
-        if kind not in (_INDEX, _VALUES, _EMPTY) or end % 4 or end > len(data):
+        behind, at = place + length + 1, place + head + 2 * number
+        if kind not in (_INDEX, _VALUES, _EMPTY) or behind % 4 or behind > len(data):
             raise ValueError("its points are not divided as they should be")
         if kind == _VALUES:
-            sizes = data[place + head : at].view("<u2").tolist() if at <= end else []
-            if len(sizes) != len(widths) or at + sum(sizes) > end:
+            sizes = data[place + head : at].view("<u2").tolist() if at <= behind else []
+            if len(sizes) != len(widths) or at + sum(sizes) > behind:
                 raise ValueError("a packet of its points does not hold what it says")
             for index, size in enumerate(sizes):
                 part = data[at : at + min(size, needed[index] - filled[index])]
                 streams[index][filled[index] : filled[index] + len(part)] = part
                 filled[index] += len(part)
                 at += size
-        place = end
+        place = behind
     return streams
 
 

@@ -59,10 +59,7 @@ def order_frames(paths: list[Path]) -> list[Path]:
     PointCloudError
         A name without a number, names that differ by more than that, or the same number twice.
     """
-    found = [(path, _NUMBERED.fullmatch(path.stem)) for path in paths]
-    plain = next((path for path, match in found if match is None), None)
-    if plain is not None:
-        raise PointCloudError(f"{plain.name} has no number, so that its place is unknown. Name frames by numbers.")
+    found = [(path, _parts(path)) for path in paths]
     patterns = sorted({f"{match[1]}#{match[3]}{path.suffix}" for path, match in found})
     if len(patterns) > 1:
         shown = ", ".join(patterns[:3]) + (", ..." if len(patterns) > 3 else "")
@@ -76,4 +73,12 @@ def order_frames(paths: list[Path]) -> list[Path]:
 
 def frame_number(path: FilePath) -> int:
     """Return the last number in the name of a file, by which `order_frames` goes."""
-    return int(_NUMBERED.fullmatch(path.stem)[2])
+    return int(_parts(Path(path))[2])
+
+
+def _parts(path: Path) -> re.Match[str]:
+    """Divide the name of a file at its last number."""
+    match = _NUMBERED.fullmatch(path.stem)
+    if match is None:
+        raise PointCloudError(f"{path.name} has no number, so that its place is unknown. Name frames by numbers.")
+    return match

@@ -12,7 +12,7 @@ _MARKS = "#/%! "
 _MOST_DIGITS = 15  # of a number of a point
 
 
-def find_names(rows: Rows, numeric: list[int]) -> list[str]:
+def find_names(rows: Rows, numeric: list[int]) -> list[str | None]:
     """Find the names of the columns in the lines before the first row.
 
     Parameters

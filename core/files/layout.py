@@ -1,5 +1,6 @@
 """Which columns of a text are x y z, and which others are read by which names."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,7 +33,7 @@ class Layout(NamedTuple):
         Whether x and y are angles.
     """
 
-    names: list[str] | None
+    names: Sequence[str | None]
     places: list[int]
     others: list[int]
     notices: list[str]
@@ -59,9 +60,9 @@ def given_layout(columns: str, rows: Rows) -> Layout:
     InvalidPointsError
         x, y or z is missing, a name comes twice, or the file has another number of columns.
     """
-    names = columns.replace(",", " ").split()
-    all_told = names[-1] != _REST
-    names = [None if name == _SKIPPED else name for name in names[: len(names) - (not all_told)]]
+    words = columns.replace(",", " ").split()
+    all_told = words[-1] != _REST
+    names = [None if word == _SKIPPED else word for word in words[: len(words) - (not all_told)]]
     lower = [name and name.lower() for name in names]
     missing = [axis for axis in "xyz" if axis not in lower]
     twice = [name for name in lower if name and lower.count(name) > 1]
@@ -77,7 +78,7 @@ def given_layout(columns: str, rows: Rows) -> Layout:
     numeric, textual, empty = kinds(rows)
     places = [lower.index(axis) for axis in "xyz"]
     others = [index for index in (*numeric, *empty) if index < len(names) and names[index] and index not in places]
-    texts = [names[index] for index in textual if index < len(names) and names[index] and index not in places]
+    texts = [name for index, name in enumerate(names) if name and index in textual and index not in places]
     return Layout(names, places, others, _tell_texts(texts, rows.path))
 
 
@@ -151,7 +152,7 @@ def _tell_places(found: Places, names: list[str | None], path: Path) -> list[str
     return notices
 
 
-def _refuse_others(names: list[str], path: Path) -> None:
+def _refuse_others(names: Sequence[str | None], path: Path) -> None:
     """Refuse a file with names of columns that are no places, if there are too few others; a title has none of them."""
     told = [name for name in names if name]
     if any(map(is_other, told)):
@@ -167,7 +168,7 @@ def _first_places(rows: Rows, numeric: list[int]) -> list[int]:
     return numeric[1:4] if counted else numeric[:3]
 
 
-def _tell_texts(texts: list[str], path: Path) -> list[str]:
+def _tell_texts(texts: Sequence[str], path: Path) -> list[str]:
     return [f"{path.name}: left out {brief(', '.join(texts))}, which holds text."] if texts else []
 
 

@@ -1,5 +1,6 @@
 """Meshes to files: vertices with what they hold, and faces."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
@@ -78,5 +79,5 @@ def _write_stl(path: Path, table: PointTable, double: bool, faces: list[Ints]) -
         rows.tofile(file)
 
 
-_WRITERS = {".ply": write_ply, ".obj": _write_obj, ".stl": _write_stl}
+_WRITERS: dict[str, Callable[..., list[str] | None]] = {".ply": write_ply, ".obj": _write_obj, ".stl": _write_stl}
 MESHES = tuple(_WRITERS)

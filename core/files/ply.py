@@ -106,7 +106,7 @@ def read_vertex_names(path: Path) -> list[str]:
     return next((element.names for element in elements if element.name == "vertex"), [])
 
 
-def read_elements(path: Path) -> tuple[str, list[Any], dict[str, Any]]:
+def read_elements(path: Path) -> tuple[str | None, list[str], dict[str, dict[str, Array]]]:
     """Read all elements of a PLY file that has no lists, as they stand there; errors as of `read_ply`.
 
     Returns
@@ -118,7 +118,8 @@ def read_elements(path: Path) -> tuple[str, list[Any], dict[str, Any]]:
     dict of str to dict of str to ndarray
         By the names of the elements, their columns by the names of the properties.
     """
-    found, before = {}, []
+    found: dict[str, dict[str, Array]] = {}
+    before: list[_Element] = []
     with open(path, "rb") as file:
         order, elements, comments = _read_header(file, path)
         begin = file.tell()
@@ -137,11 +138,13 @@ def read_elements(path: Path) -> tuple[str, list[Any], dict[str, Any]]:
     return order, comments, found
 
 
-def _read_header(file: BinaryIO, path: Path) -> tuple[str | None, list[Any], list[Any]]:
+def _read_header(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element], list[str]]:
     """Return the byte order, None for text, the elements and comments; leave the file where the data begin."""
     if file.readline(_LONGEST).strip() != b"ply":
         raise InvalidPointsError(f"{path} is no PLY file: its first line is not 'ply'. Export it again.")
-    order, elements, comments = "", [], []
+    order: str | None = ""
+    elements: list[_Element] = []
+    comments: list[str] = []
     for number in range(2, _LONGEST):
         line = file.readline(_LONGEST).decode(errors="replace").strip()
         match line.split():

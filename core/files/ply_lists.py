@@ -48,10 +48,11 @@ def read_fixed(file: BinaryIO, begin: int, order: str, types: Sequence[Code], co
         index = 0
         for starts, (codes, _) in zip(marks.T, parts, strict=True):
             record = np.dtype([(f"f{number}", order + code) for number, code in enumerate(codes)])
-            if codes:
-                rows = sliding_window_view(octets, record.itemsize)[starts].view(record)[:, 0]
+            if not codes:
+                continue
+            records = sliding_window_view(octets, record.itemsize)[starts].view(record)[:, 0]
             for number in range(len(codes)):
-                columns[index][done : done + len(marks)] = rows[f"f{number}"]
+                columns[index][done : done + len(marks)] = records[f"f{number}"]
                 index += 1
     return columns
 

@@ -1,7 +1,7 @@
 """Points one after another, as many as a header names: rows of text, or records of bytes."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, groupby, islice
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -36,7 +36,7 @@ def read_records(file: BinaryIO, begin: int, record: np.dtype[Any], count: int, 
     return np.fromfile(file, record, count)
 
 
-def read_rows(file: BinaryIO, types: list[str] | None, count: int, path: Path, skipped: int = 0) -> list[Array]:
+def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Path, skipped: int = 0) -> list[Array]:
     """Read the columns of the rows of text from here on.
 
     Parameters
@@ -86,7 +86,7 @@ def read_rows(file: BinaryIO, types: list[str] | None, count: int, path: Path, s
     ]
 
 
-def _without_lists(lines: Any, types: list[str | None], path: Path) -> Iterator[bytes]:
+def _without_lists(lines: Any, types: Sequence[str | None], path: Path) -> Iterator[bytes]:
     """Yield lines without their lists: each is a number of numbers, and these."""
     steps = [(len([*run]), is_list) for is_list, run in groupby(code is None for code in types)]
     for number, line in enumerate(lines, start=1):

@@ -81,7 +81,7 @@ def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
     if channels is not None:
         alpha = next(filter(None, map(take, _ALPHAS)), None)
         colors = np.stack(channels, axis=1)
-        table.colors = unit_colors(colors, alpha and alpha[0])
+        table.colors = unit_colors(colors, alpha[0] if alpha else None)
         table.notices += told_depth(colors, path)
     normals = take(_NORMALS)
     if normals is not None:

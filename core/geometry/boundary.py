@@ -227,7 +227,7 @@ class _Course:
     """Parabolas that the boundary follows around each boundary point: e = a + b t + c t^2 along two tangents."""
 
     rows: Ints
-    along: Floats
+    along: Array
     across: Array
     outward: Array
     coefficients: Floats

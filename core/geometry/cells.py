@@ -79,7 +79,7 @@ def measure_cells(
     count = len(normals)
     component = np.zeros(count, dtype=int) if component is None else component
     cells = Cells(np.empty(count), np.empty(count))
-    whole = ~nearest.apart.any(axis=1)  # no neighbour was left out: more of them can close a cell
+    whole = ~np.any(nearest.apart, axis=1)  # no neighbour was left out: more of them can close a cell
     spacing, rows = nearest.spacing, np.arange(count)
     for wider in _WIDER:
         still_open = np.zeros(count, dtype=bool)

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..algebra import blocks, on_all_cores
@@ -38,7 +37,7 @@ def connection_laplacian(
     stiffness: sparse.csr_array,
     normals: Floats,
     frames: Array,
-    mass: ArrayLike = 0.0,
+    mass: Floats | float = 0.0,
     report: Callable[..., Any] = lambda: None,
 ) -> sparse.csr_array:
     """Build the operator on tangent vectors from the one on functions.
