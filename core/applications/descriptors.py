@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import as_array, as_doubles, check_switches, whole
+from ..arguments import as_doubles, check_array, check_finite, check_switches, whole
 from ..errors import PointCloudError
 from ..operator import Spectrum
 from ..types import Floats
@@ -206,11 +206,11 @@ def _window(spectrum: Spectrum) -> tuple[float, float, float]:
 
 
 def _numbers(given: Any, name: str) -> Floats:
-    values = as_array(given, name)
-    if values.ndim != 1 or values.size == 0 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
-        raise PointCloudError(
-            f"{name} have the shape {values.shape} and type {values.dtype}. Give a row of finite numbers, at least one."
-        )
+    advice = "Give a row of finite numbers, at least one."
+    values = check_array(given, name, [(None,)], advice)
+    if not len(values):
+        raise PointCloudError(f"There are no {name.lower()}. {advice}")
+    check_finite(values, name.lower(), advice)
     return as_doubles(values)
 
 

@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..algebra import solve_symmetric
-from ..arguments import as_array, as_doubles
+from ..arguments import as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from ..kernel import SECOND_MOMENT
@@ -204,16 +204,10 @@ def read_values(fixed: Any, values: Any, count: int) -> tuple[Ints, Floats]:
     if index.dtype == bool and index.shape == (count,):
         index = np.flatnonzero(mask)
     index = index.astype(np.intp).ravel() % count
-    given = np.zeros(0) if values is None else as_array(values, "Fixed values")
-    if given.dtype.kind not in "biuf" or (given.shape not in ((), (len(index),))):
-        raise InvalidPointsError(
-            f"Values have the shape {given.shape} and type {given.dtype} for {len(index)} fixed points. Give one"
-            " number for each of them."
-        )
+    advice = f"Give one number for each of {len(index)} fixed points."
+    given = check_array(() if values is None else values, "Fixed values", [(), (len(index),)], advice, "biuf")
     given = np.broadcast_to(as_doubles(given).ravel(), len(index))
-    bad = np.count_nonzero(~np.isfinite(given))
-    if bad:
-        raise InvalidPointsError(f"{bad} of {len(given)} fixed values are not finite (NaN or infinity). Replace them.")
+    check_finite(given, "fixed values", "Replace them.")
     index, first, row = np.unique(index, return_index=True, return_inverse=True)
     torn = np.count_nonzero(given != given[first][row])
     if torn:
@@ -222,16 +216,10 @@ def read_values(fixed: Any, values: Any, count: int) -> tuple[Ints, Floats]:
 
 
 def _read_source(source: Any, count: int) -> Floats:
-    given = as_array(source, "Sources")
-    if given.dtype.kind not in "biuf" or given.shape not in ((), (count,)):
-        raise InvalidPointsError(
-            f"The source has the shape {given.shape} and type {given.dtype}. Give one number for each of the"
-            f" {count} points."
-        )
-    bad = np.count_nonzero(~np.isfinite(given))
-    if bad:
-        raise InvalidPointsError(f"{bad} of {count} values of the source are not finite. Replace them.")
-    return np.broadcast_to(as_doubles(given), count)
+    given = check_array(source, "Sources", [(), (count,)], f"Give one number for each of {count} points.", "biuf")
+    given = np.broadcast_to(as_doubles(given), count)
+    check_finite(given, "values of the source", "Replace them.")
+    return given
 
 
 def _means(areas: Floats, values: Floats, component: Ints, rows: Ints) -> Floats:

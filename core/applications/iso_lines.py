@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
-from ..arguments import as_array, as_doubles, check_positions, real
+from ..arguments import as_array, as_doubles, check_array, check_positions, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..types import Bools, Floats, Ints
 
@@ -81,20 +81,12 @@ def _checked(vertices: Any, faces: Any, values: Any, levels: ArrayLike) -> tuple
     """Return what `iso_lines` takes as arrays, with triangles for faces."""
     count = len(np.atleast_1d(as_array(vertices, "Vertices")))
     vertices = check_positions(vertices, count, "vertices", "vertex")
-    faces, values = as_array(faces, "Faces"), as_array(values, "Values")
-    if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu":
-        raise InvalidPointsError(
-            f"Faces have the shape {faces.shape} and type {faces.dtype}. Give three or four whole numbers for each."
-        )
+    faces = check_array(faces, "Faces", [(None, 3), (None, 4)], "Give three or four whole numbers for each.", "iu")
     if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
         raise InvalidPointsError(
             f"Faces have vertices from {faces.min()} to {faces.max()}, and there are {len(vertices)}. Count from zero."
         )
-    if values.shape != (len(vertices),) or values.dtype.kind not in "iufb":
-        raise InvalidPointsError(
-            f"Values have the shape {values.shape} and type {values.dtype}, and there are {len(vertices)} vertices."
-            " Give one real number per vertex."
-        )
+    values = check_array(values, "Values", [(count,)], f"Give one real number for each of {count} vertices.", "iufb")
     numbers = [real(level) for level in np.atleast_1d(as_array(levels, "Levels")).ravel().tolist()]
     if not np.isfinite(numbers).all():
         raise PointCloudError(f"The levels are {numbers}. Use finite numbers.")

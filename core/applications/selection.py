@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import dijkstra
 
-from ..arguments import as_array, as_doubles, real
-from ..errors import InvalidPointsError, PointCloudError
+from ..arguments import as_doubles, check_array, real
+from ..errors import PointCloudError
 from ..geometry import as_mask
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints
@@ -128,13 +128,8 @@ def front_point(points: ArrayLike, eye: ArrayLike, direction: ArrayLike, reach: 
 
 def _vectors(given: Any, name: str, dimensions: int) -> Floats:
     """Return one vector, (3,), or several, (n, 3), in double precision; their numbers may be infinite or none."""
-    array = as_array(given, name.capitalize())
-    if array.ndim != dimensions or array.shape[-1] != 3 or array.dtype.kind not in "iuf":
-        wanted = "(n, 3)" if dimensions == 2 else "(3,)"
-        raise InvalidPointsError(
-            f"The {name} have the shape {array.shape} and type {array.dtype}. Give numbers {wanted}."
-        )
-    return as_doubles(array)
+    shape, text = ((None, 3), "(n, 3)") if dimensions == 2 else ((3,), "(3,)")
+    return as_doubles(check_array(given, name.capitalize(), [shape], f"Give numbers {text}."))
 
 
 def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints, Ints]:

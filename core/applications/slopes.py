@@ -7,8 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
-from ..arguments import as_array, as_doubles, check_positions
-from ..errors import InvalidPointsError
+from ..arguments import as_array, as_doubles, check_array, check_positions
 from ..geometry import Discs, frames
 from ..types import Floats
 from .gradients import lifted_inverse
@@ -74,12 +73,8 @@ class Slopes:
 
         Values that are not finite count as unknown, and have none.
         """
-        given = as_array(values, "Values")
-        if given.shape != (len(self._points),) or given.dtype.kind not in "iufb":
-            raise InvalidPointsError(
-                f"Values have the shape {given.shape} and type {given.dtype}, and there are {len(self._points)} points."
-                " Give one real number per point."
-            )
+        count = len(self._points)
+        given = check_array(values, "Values", [(count,)], f"Give one real number for each of {count} points.", "iufb")
         values, slopes = as_doubles(given), np.zeros(self._points.shape)
 
         def find(rows: Any) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import TwoGrid, blocks, on_all_cores
-from ..arguments import as_array, as_doubles
+from ..arguments import as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError
 from ..geometry import as_indices
 from ..operator import LaplaceBeltrami, connection_laplacian, tangent_frames
@@ -155,14 +155,9 @@ class Transport:
         index = as_indices(sources, len(self.frames), "sources")
         if not len(index):
             raise InvalidPointsError("There are no points with directions. Choose at least one point.")
-        directions = as_array(directions, "Directions")
-        numbers = directions.dtype.kind in "iuf"
-        directions = as_doubles(directions) if numbers else directions
-        if not numbers or directions.shape not in ((3,), (len(index), 3)) or not np.isfinite(directions).all():
-            raise InvalidPointsError(
-                f"The directions have the shape {directions.shape}, or are not finite numbers. Give three of these for"
-                f" each of {len(index)} points."
-            )
+        advice = f"Give three numbers for each of {len(index)} points."
+        directions = as_doubles(check_array(directions, "Directions", [(3,), (len(index), 3)], advice))
+        check_finite(directions.reshape(-1, 3), "directions", advice)
         given = np.einsum("ij,ij->i", np.broadcast_to(directions, (len(index), 3)), self.frames[index])
         size = np.abs(given)
         wrong = np.count_nonzero(size <= 1e-9 * np.linalg.norm(directions, axis=-1))

@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
-from ..arguments import as_array, as_doubles
+from ..arguments import as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError
 from ..options import LaplacianOptions
 from ..types import Array, Bools, Floats, Ints
@@ -149,24 +149,15 @@ def toward(normals: Floats, directions: Floats) -> Floats:
 
 def _directions(points: Floats, given: Array) -> Floats:
     """Return the unit vectors from points to where they were seen from; zero where that is the point itself."""
-    if given.dtype.kind not in "iuf" or given.shape not in ((3,), points.shape):
-        raise InvalidPointsError(
-            f"Viewpoints of shape {given.shape} do not fit {len(points)} points. Give one place of three numbers, or"
-            " one for each point."
-        )
-    if not np.isfinite(given).all():
-        bad = np.count_nonzero(~np.isfinite(given).reshape(-1, 3).all(axis=1))
-        raise InvalidPointsError(f"{bad} viewpoints are not finite (NaN or infinity). Give three finite numbers each.")
+    advice = f"Give one place of three numbers, or one for each of {len(points)} points."
+    check_finite(check_array(given, "Viewpoints", [(3,), points.shape], advice).reshape(-1, 3), "viewpoints", advice)
     directions = as_doubles(given) - points
     directions /= np.maximum(np.abs(directions).max(axis=1, keepdims=True), np.finfo(float).tiny)
     return directions / np.maximum(np.linalg.norm(directions, axis=1)[:, None], np.finfo(float).tiny)
 
 
 def _checked_areas(areas: ArrayLike, count: int) -> Floats:
-    given = as_array(areas, "Areas")
-    if given.shape != (count,) or given.dtype.kind not in "iuf":
-        raise InvalidPointsError(f"Areas of shape {given.shape} do not fit {count} points. Give a number for each.")
-    given = as_doubles(given)
+    given = as_doubles(check_array(areas, "Areas", [(count,)], f"Give a number for each of {count} points."))
     if not (np.isfinite(given).all() and given.min() >= 0.0 and given.max() > 0.0):
         bad = np.count_nonzero(~(np.isfinite(given) & (given > 0.0)))
         raise InvalidPointsError(f"{bad} of {count} areas are not above zero. Leave the areas out to have them found.")

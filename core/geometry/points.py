@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..arguments import as_array, as_doubles
+from ..arguments import Shape, as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
 from ..types import Array, Bools, Floats, Ints
 
@@ -46,13 +46,7 @@ def check_points(points: ArrayLike) -> Floats:
     if len(given) == 0:
         raise TooFewPointsError("There are no points. Add points, or choose another object.")
     result = as_doubles(given, copy=False)
-    finite = np.isfinite(result)
-    if not finite.all():
-        bad = np.count_nonzero(~finite.all(axis=1))
-        raise InvalidPointsError(
-            f"{bad} of {len(result)} points have coordinates that are not finite (NaN or infinity). Delete these"
-            " points."
-        )
+    check_finite(result, "points", "Delete these points.")
     largest = np.abs(result).max()
     if largest > _LARGEST:
         raise InvalidPointsError(
@@ -260,12 +254,11 @@ def check_distances(distances: ArrayLike, count: int) -> Floats:
     InvalidPointsError
         Another shape, negative, or NaN.
     """
-    given = as_array(distances, "Distances to the boundary")
-    if given.shape != (count,) or given.dtype.kind not in "iuf" or not np.all(given >= 0.0):
-        raise InvalidPointsError(
-            f"Distances to the boundary have the shape {given.shape} and type {given.dtype}. Give {count} numbers"
-            " that are not negative, infinity where there is no boundary near."
-        )
+    advice = f"Give {count} numbers that are not negative, infinity where there is no boundary near."
+    given = check_array(distances, "Distances to the boundary", [(count,)], advice)
+    bad = int(np.count_nonzero(~(given >= 0.0)))
+    if bad:
+        raise InvalidPointsError(f"{bad} of {count} distances to the boundary are negative or NaN. {advice}")
     return as_doubles(given)
 
 
@@ -277,18 +270,8 @@ def check_values(values: ArrayLike, count: int, columns: bool = True) -> Floats:
     InvalidPointsError
         Another shape, no real numbers, or not finite.
     """
-    given = as_array(values, "Values")
-    shapes = (1, 2) if columns else (1,)
-    if given.ndim not in shapes or len(given) != count or given.dtype.kind not in "iufb":
-        row = "row of real numbers" if columns else "real number"
-        raise InvalidPointsError(
-            f"Values have the shape {given.shape} and type {given.dtype}, and there are {count} points. Give one {row}"
-            " per point."
-        )
-    given = as_doubles(given)
-    bad = int(np.count_nonzero(~np.isfinite(given.reshape(count, -1)).all(axis=1)))
-    if bad:
-        raise InvalidPointsError(
-            f"{bad} of {count} points have values that are not finite (NaN or infinity). Replace them."
-        )
+    shapes: list[Shape] = [(count,), (count, None)] if columns else [(count,)]
+    row = "row of real numbers" if columns else "real number"
+    given = as_doubles(check_array(values, "Values", shapes, f"Give one {row} for each of {count} points.", "iufb"))
+    check_finite(given, "values", "Replace them.")
     return given

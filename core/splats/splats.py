@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import nearest_rotations
-from ..arguments import as_array
+from ..arguments import as_array, check_array
 from ..errors import InvalidPointsError
 from ..types import Array, Floats
 from .ellipsoids import mapped, matrices_of
@@ -149,10 +149,6 @@ def orthogonal_parts(gradients: Floats) -> Floats:
 
 def _numbers(given: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """Return an argument as an array of floating-point numbers of a shape."""
-    array = as_array(given, name.capitalize())
-    if array.shape != shape or array.dtype.kind not in "iuf":
-        raise InvalidPointsError(
-            f"The {name} have the shape {array.shape} and type {array.dtype}, not {shape} real numbers. Give one row"
-            " per splat, and 0, 3, 8, 15 or 24 harmonics."
-        )
+    wanted = f"Give {shape} real numbers: one row per splat, and 0, 3, 8, 15 or 24 harmonics."
+    array = check_array(given, name.capitalize(), [shape], wanted)
     return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
