@@ -34,9 +34,10 @@ validate: ## Build, and run Blender's validator on every zip
 audit: ## Ask the public database of vulnerabilities about the wheels that the zips bring (needs the internet)
 	@$(run)environments.py audit -m pip_audit --vulnerability-service osv --disable-pip --requirement wheels.txt
 
-lint: ## Check style and format
+lint: ## Check style, format and the types of core
 	@$(run)environments.py lint -m ruff check .
 	@$(run)environments.py lint -m ruff format --check .
+	@$(run)environments.py lint -m mypy
 
 benchmark: ## Compute the tables and figures of the paper and the peers
 	@$(run)environments.py benchmark -m benchmarks.run $(ARGUMENTS)
@@ -45,5 +46,5 @@ pictures: ## Render the pictures of the manual, or some: ARGUMENTS="smooth rim";
 	@$(run)in_blender.py pictures.py $(ARGUMENTS)
 
 clean: ## Remove everything that was made, the environments too
-	rm -rf .venv build dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

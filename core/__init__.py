@@ -3,28 +3,29 @@
 `build_laplacian` makes the operator of a cloud, and nearly all else takes that operator. Lengths are in the unit of the
 points, [L].
 
-Examples in the docstrings can be copied as they are. All but one begin with the same five lines, which make 800 points
-of the unit sphere, where answers are known:
+Examples in the docstrings can be copied as they are. All but one begin with the same three lines, for 800 points of the
+unit sphere, where answers are known:
 
 >>> import numpy as np
 >>> import core
->>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
->>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
->>> points = np.column_stack([ring.real, ring.imag, z])
+>>> points = core.example_sphere()
 """
 
 import ast
 import importlib
 import threading
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from .errors import BrokenLibraryError
 
 
-def _read_homes():
+def _read_homes() -> dict[str, str]:
     """Return the module of each public name, from the stub, which type checkers read, too."""
     stub = ast.parse(Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8"))
-    return {alias.name: node.module for node in stub.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: node.module or "" for node in imports for alias in node.names}
 
 
 _HOMES = _read_homes()
@@ -34,7 +35,7 @@ _lock = threading.RLock()  # scipy imports itself in circles, which two threads 
 __all__ = sorted(_HOMES)
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     """Import what holds a public name, or a package, the first time that one asks for it: scipy takes a second."""
     if name not in _HOMES and name not in _PACKAGES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -46,11 +47,11 @@ def __getattr__(name):
     return found
 
 
-def __dir__():
+def __dir__() -> list[str]:
     return sorted({*globals(), *__all__, *_PACKAGES})
 
 
-def _import(name):
+def _import(name: str) -> ModuleType:
     """Import a module or package of core; tell what it means where scipy, or what that asks of numpy, does not load."""
     try:
         return importlib.import_module(f".{name}", __name__)

@@ -59,6 +59,7 @@ from .errors import PointCloudError as PointCloudError
 from .errors import SolverError as SolverError
 from .errors import TooFewPointsError as TooFewPointsError
 from .errors import UnresolvedModesError as UnresolvedModesError
+from .example import example_sphere as example_sphere
 from .geometry import Discs as Discs
 from .geometry import Prolongation as Prolongation
 from .geometry import blue_noise_subset as blue_noise_subset

@@ -1,15 +1,21 @@
 """What callers give as numbers, switches and arrays, read so that nothing else than a check can fail on it."""
 
+from collections.abc import Sequence
 from numbers import Integral, Real
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .errors import InvalidPointsError, PointCloudError
+from .types import Array, Floats
+
+Shape: TypeAlias = tuple[int | None, ...]
 
 _HUGE = 1e100  # of a coordinate, so that no product overflows
 
 
-def real(given):
+def real(given: Any) -> float:
     """Return a real number as a float; NaN, which no comparison lets pass, for what is none."""
     number = given[()] if isinstance(given, np.ndarray) and given.ndim == 0 else given
     if isinstance(number, bool) or not isinstance(number, Real):
@@ -17,10 +23,10 @@ def real(given):
     try:
         return float(number)
     except OverflowError:  # a whole number of more than 308 digits
-        return np.inf if number > 0 else -np.inf
+        return np.inf if given > 0 else -np.inf
 
 
-def whole(given):
+def whole(given: Any) -> float:
     """Return a whole number as an int; NaN, which no comparison lets pass, for what is none."""
     if isinstance(given, Integral) and not isinstance(given, bool):
         return int(given)
@@ -28,7 +34,7 @@ def whole(given):
     return int(number) if np.isfinite(number) and number == np.floor(number) else np.nan
 
 
-def check_switches(**switches):
+def check_switches(**switches: Any) -> None:
     """Check that arguments are truth values.
 
     Raises
@@ -41,7 +47,7 @@ def check_switches(**switches):
             raise PointCloudError(f"Option {name} is {value!r}. Use True or False.")
 
 
-def as_array(given, name):
+def as_array(given: ArrayLike, name: str) -> Array:
     """Return an argument as an array of any shape and type.
 
     Raises
@@ -59,25 +65,60 @@ def as_array(given, name):
     return array
 
 
-def as_doubles(array, copy=True):
+def as_doubles(array: Array, copy: bool = True) -> Floats:
     """Return an array of real numbers in double precision; those beyond its range become infinite."""
     with np.errstate(over="ignore"):
         return array.astype(np.float64, copy=copy)
 
 
-def check_positions(positions, count, name, singular):
-    """Return positions, (count, 3), in double precision."""
-    given = as_array(positions, name.capitalize())
-    if given.shape != (count, 3) or given.dtype.kind not in "iuf":
-        raise InvalidPointsError(
-            f"The {name} have the shape {given.shape} and type {given.dtype}, not ({count}, 3) real numbers."
-            f" Give x, y, z for each {singular}."
-        )
-    given = as_doubles(given)  # in single precision the limit would be infinite
-    bad = int(np.count_nonzero(~(np.abs(given) < _HUGE).all(axis=1)))
+def check_array(given: ArrayLike, name: str, shapes: Sequence[Shape], advice: str, kinds: str = "iuf") -> Array:
+    """Return an argument as an array of numbers of one of some shapes.
+
+    Parameters
+    ----------
+    given : array_like
+    name : str
+        What it is, as a plural that begins a sentence.
+    shapes : sequence of tuple of int or None
+        None for any length.
+    advice : str
+        A sentence that says what to give.
+    kinds : str
+        numpy's kinds of types: integers, unsigned ones, floating-point numbers, truth values (b).
+
+    Raises
+    ------
+    InvalidPointsError
+        Another shape or type.
+    """
+    array = as_array(given, name)
+    if array.dtype.kind not in kinds or not any(_fits(array.shape, shape) for shape in shapes):
+        raise InvalidPointsError(f"{name} have the shape {array.shape} and type {array.dtype}. {advice}")
+    return array
+
+
+def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
+    return len(shape) == len(wanted) and all(size in (None, length) for length, size in zip(shape, wanted, strict=True))
+
+
+def check_finite(array: Array, name: str, advice: str, limit: float = np.inf) -> None:
+    """Refuse rows with numbers that are not finite, or not below a limit, and say how many.
+
+    Raises
+    ------
+    InvalidPointsError
+        There are some.
+    """
+    rows = np.reshape(array, (-1, np.prod(array.shape[1:], dtype=int)))
+    bad = int(np.count_nonzero(~(np.abs(rows) < limit).all(axis=1)))
     if bad:
-        raise InvalidPointsError(
-            f"{bad} of {count} {name} are not finite (NaN or infinity), or beyond {_HUGE:g}. Give a place for"
-            f" each {singular}."
-        )
+        beyond = "" if limit == np.inf else f", or beyond {limit:g}"
+        raise InvalidPointsError(f"{bad} of {len(rows)} {name} are not finite (NaN or infinity){beyond}. {advice}")
+
+
+def check_positions(positions: ArrayLike, count: int, name: str, singular: str) -> Floats:
+    """Return positions, (count, 3), in double precision."""
+    wanted = f"Give x, y, z for each {singular}: {count} rows of 3 real numbers."
+    given = as_doubles(check_array(positions, name.capitalize(), [(count, 3)], wanted))
+    check_finite(given, name, f"Give a place for each {singular}.", _HUGE)
     return given

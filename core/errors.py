@@ -34,7 +34,7 @@ class UnresolvedModesError(PointCloudError):
         How many are resolved, from the lowest on.
     """
 
-    def __init__(self, text, resolved=0):
+    def __init__(self, text: str, resolved: int = 0) -> None:
         super().__init__(text)
         self.resolved = resolved
 
@@ -48,7 +48,7 @@ class NotEnoughMemoryError(PointCloudError):
         How many points, or modes, it is enough for.
     """
 
-    def __init__(self, text, fitting=0):
+    def __init__(self, text: str, fitting: int = 0) -> None:
         super().__init__(text)
         self.fitting = fitting
 

@@ -5,10 +5,14 @@ and the pair weight of the operator, ``-2 W_h'(r) / r``, is ``pair_kernel(r / h)
 """
 
 import functools
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 from scipy.special import j0
+
+from .types import Floats
 
 SUPPORT = 3.0
 """Radius of the kernel's support in units of h."""
@@ -23,7 +27,7 @@ RESOLVED = 2.2
 """Largest ``t = k h`` whose frequency k is recovered from the symbol without multiplying noise by more than 3."""
 
 
-def kernel(q):
+def kernel(q: ArrayLike) -> Floats:
     """Evaluate the kernel W_1.
 
     Parameters
@@ -40,13 +44,13 @@ def kernel(q):
     return NORMALIZATION * (_power(3.0 - q, 5) - 6.0 * _power(2.0 - q, 5) + 15.0 * _power(1.0 - q, 5))
 
 
-def kernel_derivative(q):
+def kernel_derivative(q: ArrayLike) -> Floats:
     """Evaluate the derivative W_1'(q), never positive."""
     q = np.asarray(q, dtype=np.float64)
     return -5.0 * NORMALIZATION * (_power(3.0 - q, 4) - 6.0 * _power(2.0 - q, 4) + 15.0 * _power(1.0 - q, 4))
 
 
-def pair_kernel(q):
+def pair_kernel(q: ArrayLike) -> Floats:
     """Evaluate ``-2 W_1'(q) / q``, the pair weight of eqs. (3) and (10), finite (240 x normalisation) at q = 0."""
     q = np.asarray(q, dtype=np.float64)
     near = np.minimum(q, 1.0)
@@ -56,7 +60,7 @@ def pair_kernel(q):
     return 2.0 * NORMALIZATION * np.where(q < 1.0, inner, outer)
 
 
-def symbol(t):
+def symbol(t: ArrayLike) -> Floats:
     """Evaluate s(t): on a flat patch a wave of frequency k has the eigenvalue ``s(k h) / h**2``.
 
     Parameters
@@ -76,7 +80,7 @@ def symbol(t):
     return -4.0 * np.pi * ((1.0 - j0(t[..., None] * radii)) @ weights)
 
 
-def inverse_ratio(s):
+def inverse_ratio(s: ArrayLike) -> Floats:
     """Invert the symbol on its increasing branch.
 
     Parameters
@@ -96,14 +100,14 @@ def inverse_ratio(s):
 
 
 @functools.cache
-def _inverse_table():
+def _inverse_table() -> tuple[Any, float]:
     t = np.linspace(0.0, RESOLVED, 513)
     s = symbol(t)
     ratio = np.concatenate([[1.0], t[1:] ** 2 / s[1:]])
     return PchipInterpolator(s, ratio), s[-1]
 
 
-def _power(base, exponent):
+def _power(base: Floats, exponent: int) -> Floats:
     base = np.maximum(base, 0.0)
     squared = base * base
     return squared * squared * base if exponent == 5 else squared * squared

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from .errors import NotEnoughMemoryError
+from .options import LaplacianOptions
 
 # Bytes for each neighbour of a point, at the peak of a build: resident memory of builds of 50,000 points of a sphere,
 # beyond that before, with 40, 116 and 230 neighbours a point (3.6, 6.4 and 11.4 kB a point; 5.2 kB of a million).
@@ -17,7 +18,7 @@ _SHARE = 0.8  # of the free memory, for what else goes on meanwhile
 _CGROUP = Path("/sys/fs/cgroup")
 
 
-def needed_memory(count, options, modes=0):
+def needed_memory(count: int, options: LaplacianOptions, modes: int = 0) -> int:
     """Estimate the most memory that an operator takes while it is built and its modes are computed.
 
     Parameters
@@ -39,7 +40,7 @@ def needed_memory(count, options, modes=0):
     return int(count * (_PER_NEIGHBOR * (neighbors + _ALONE) + _PER_MODE * modes))
 
 
-def points_that_fit(options, modes=0):
+def points_that_fit(options: LaplacianOptions, modes: int = 0) -> int | None:
     """Estimate how many points the free memory is enough for.
 
     Parameters
@@ -56,7 +57,7 @@ def points_that_fit(options, modes=0):
     return None if free is None else int(_SHARE * free / needed_memory(1, options, modes))
 
 
-def check_memory(count, options, modes=0):
+def check_memory(count: int, options: LaplacianOptions, modes: int = 0) -> None:
     """Refuse to build an operator that does not fit the free memory.
 
     Parameters
@@ -69,17 +70,18 @@ def check_memory(count, options, modes=0):
     NotEnoughMemoryError
         It does not fit; the text says how many points do.
     """
+    free = available_memory()
     most = points_that_fit(options, modes)
-    if most is not None and count > most:
+    if free is not None and most is not None and count > most:
         raise NotEnoughMemoryError(
             f"{count:,} points would take about {needed_memory(count, options, modes) / 2**30:.1f} GB of memory, and"
-            f" {available_memory() / 2**30:.1f} GB are free: enough for {_rounded(most):,} points. Use fewer points,"
+            f" {free / 2**30:.1f} GB are free: enough for {_rounded(most):,} points. Use fewer points,"
             " fewer neighbors, or free memory.",
             fitting=most,
         )
 
 
-def check_mode_memory(count, modes):
+def check_mode_memory(count: int, modes: int) -> None:
     """Refuse to compute modes that do not fit the free memory.
 
     Parameters
@@ -107,13 +109,13 @@ def check_mode_memory(count, modes):
         )
 
 
-def _rounded(count):
+def _rounded(count: int) -> int:
     """Return a number down to two digits, for people."""
     unit = 10 ** max(len(str(count)) - 2, 0)
     return count // unit * unit
 
 
-def available_memory():
+def available_memory() -> int | None:
     """Return the bytes of memory that can be had without the system ending programs; None where it does not tell."""
     if sys.platform == "win32":
         return _windows_memory()
@@ -123,13 +125,13 @@ def available_memory():
     return min(known, default=None)
 
 
-def _linux_memory(path=Path("/proc/meminfo")):
+def _linux_memory(path: Path = Path("/proc/meminfo")) -> int | None:
     if not path.exists():
         return None
     return 1024 * _numbers(path.read_text()).get("MemAvailable:", 0) or None
 
 
-def _container_memory(root=_CGROUP):
+def _container_memory(root: Path = _CGROUP) -> int | None:
     """Return what the limit of a container leaves, None where there is none; files that were read are given back."""
     limit, used, kinds = (root / name for name in ("memory.max", "memory.current", "memory.stat"))
     if not (limit.exists() and used.exists() and kinds.exists()) or limit.read_text().strip() == "max":
@@ -138,7 +140,7 @@ def _container_memory(root=_CGROUP):
     return max(int(limit.read_text()) - int(used.read_text()) + given_back, 0)
 
 
-def _numbers(text):
+def _numbers(text: str) -> dict[str, int]:
     """Return the numbers of lines that begin with a name and a number."""
     fields = (line.split() for line in text.splitlines())
     return {name: int(number) for name, number, *_ in fields}
@@ -156,8 +158,8 @@ class _WindowsStatus(ctypes.Structure):
     )
 
 
-def _windows_memory():
+def _windows_memory() -> int | None:
     status = _WindowsStatus(length=ctypes.sizeof(_WindowsStatus))
-    if not ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
+    if not ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):  # type: ignore[attr-defined,unused-ignore]
         return None
-    return status.available
+    return int(status.available)

@@ -57,9 +57,7 @@ class LaplacianOptions:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> options = core.LaplacianOptions(bandwidth="local", bandwidth_factor=0.5)
     >>> lengths = core.build_laplacian(points, options=options).smoothing_lengths
     >>> print(lengths.mean().round(2))
@@ -107,14 +105,14 @@ class PaperOptions:
     neighbors: int = 100
     denoise: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_choices(self, _PAPER_CHOICES)
         check_switches(denoise=self.denoise)
         _check_neighbors(self)
         _make_positive(self, "regularization")
 
     @property
-    def cloud(self):
+    def cloud(self) -> LaplacianOptions:
         """How the paper takes points: one h, the mean distance to that neighbour, and none of the default's care."""
         return LaplacianOptions(
             bandwidth="global", neighbors=self.neighbors, boundary="off", sheets=False, projection="off"

@@ -18,9 +18,10 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 import gui_blender
 import package
 import pythons
-from environments import ROOT, ensure, ensure_blender, isolated
+from environments import ROOT, ensure, ensure_blender, isolated, run
 
 RESULTS = ROOT / "build" / "tests"
+MEASURED = "core-3.13"  # runs whose coverage is told: by a Python that measures it almost for nothing
 LIMIT = 2700  # seconds for one run of pytest
 _SHOWN = 40  # lines of a run that ended without a word of pytest about what failed
 
@@ -60,7 +61,9 @@ class Suites:
     def _run(self, name, python, tests, variables):
         report, log = RESULTS / f"{name}.xml", RESULTS / f"{name}.txt"
         report.unlink(missing_ok=True)
-        command = [str(python), "-m", "pytest", *map(str, tests), "-p", "no:cacheprovider", f"--junitxml={report}"]
+        measuring = ["coverage", "run", "-m"] if name.startswith(MEASURED) else []
+        command = [str(python), "-m", *measuring, "pytest", *map(str, tests)]
+        command += ["-p", "no:cacheprovider", f"--junitxml={report}"]
         print(f"{name:13} runs, see {log.relative_to(ROOT)}", flush=True)
         began = time.monotonic()
         with log.open("wb") as output:
@@ -124,6 +127,14 @@ def _words(counts, seconds):
     return f"{', '.join(words)} in {seconds:.2f}s"
 
 
+def tell_coverage(python):
+    """Print how much of core the tests have run."""
+    command = [python, "-m", "coverage"]
+    run([*command, "combine", "--quiet"])
+    share = run([*command, "report", "--format=total"], capture_output=True, text=True).stdout.strip()
+    print(f"{share} % of the lines of core are run by its tests")
+
+
 def start_gui(suites, required):
     """Start the tests in a window; where this machine cannot have it, say so, and stop if it is required."""
     try:
@@ -145,6 +156,8 @@ def main():
     choice.add_argument("--gui", action="store_true", help="only those in a window")
     options = parser.parse_args()
     RESULTS.mkdir(parents=True, exist_ok=True)
+    for left in RESULTS.glob("coverage*"):  # by runs that were stopped
+        left.unlink()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # what stops a run from outside ends its suites too
     began = time.monotonic()
     found = [] if options.gui else list(pythons.find().items())[: None if options.all else 1]
@@ -165,6 +178,8 @@ def main():
         for name, python in cores.items():
             suites.start_half(2, name, python, "tests/core")
         results = suites.results()
+    if any(name.startswith(MEASURED) for name in results):
+        tell_coverage(ensure(MEASURED, "test", pythons.find()[MEASURED.removeprefix("core-")]))
     for version in () if options.gui else pythons.BLENDERS.keys() - pythons.find().keys():
         print(f"Left out: Blender {' and '.join(pythons.BLENDERS[version])}, no Python {version} is found")
     total = {

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..geometry import arc_squared
+from ..types import Floats, Ints
 
 _AROUND = 9  # nearest points of the boundary among which those before and after a point are sought
 _OPPOSITE = -0.3  # cosine between the ways to both, at most
@@ -29,7 +30,7 @@ class BoundaryCurve:
         The points are scattered about a curve, as those found at the boundary of a random cloud, instead of along it.
     """
 
-    def __init__(self, points):
+    def __init__(self, points: Floats) -> None:
         self.points, self.first = np.unique(points, axis=0, return_index=True)
         self._tree = cKDTree(self.points)
         _, other = self._tree.query(self.points, k=min(_AROUND, len(self.points)))
@@ -50,7 +51,7 @@ class BoundaryCurve:
         self._slope = np.where(ends[:, None], -back, forth - q * bend)
         self._range = -p[:, 0], np.where(ends, 0.0, q[:, 0])
 
-    def nearest(self, points):
+    def nearest(self, points: Floats) -> tuple[Floats, Ints]:
         """Find the nearest places on the curve.
 
         Parameters
@@ -77,7 +78,7 @@ class BoundaryCurve:
             t = np.clip(t, self._range[0][index], self._range[1][index])
         return self.points[index] + t[:, None] * slope + t[:, None] ** 2 * bend, index
 
-    def distance(self, points, normals, foot, index, boundary_normals):
+    def distance(self, points: Floats, normals: Floats, foot: Floats, index: Ints, boundary_normals: Floats) -> Floats:
         """Return the distances of points from their feet along a surface, to fourth order.
 
         Parameters

@@ -69,9 +69,8 @@ class CoarseDeformer:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> deformer = core.CoarseDeformer(laplacian, z > 0.8, z < -0.8, count=400)
     >>> moved = deformer.solve(points[deformer.handles] + [0, 0, 1])

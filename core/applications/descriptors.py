@@ -1,9 +1,14 @@
 """Signatures of points that depend on the inner shape alone: bending the surface does not change them."""
 
-import numpy as np
+from typing import Any
 
-from ..arguments import as_array, as_doubles, check_switches, whole
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import as_doubles, check_array, check_finite, check_switches, whole
 from ..errors import PointCloudError
+from ..operator import Spectrum
+from ..types import Floats
 
 _MANY = 1_000_000  # times or energies at most
 _ZERO = 1e-8  # eigenvalues below this share of 4 pi / area belong to constants
@@ -11,7 +16,7 @@ _RANGE = 4.0 * np.log(10.0)  # of eigenvalue times time: what is left at its end
 _WIDTH = 0.07  # of a wave signature's window, as a share of the range of log eigenvalues
 
 
-def signature_times(spectrum, count=100):
+def signature_times(spectrum: Spectrum, count: int = 100) -> Floats:
     """Return the times of a heat kernel signature that suit a spectrum.
 
     Parameters
@@ -37,7 +42,7 @@ def signature_times(spectrum, count=100):
     return np.geomspace(_RANGE / values[-1], _RANGE / values[0], _at_least_one(count))
 
 
-def signature_energies(spectrum, count=100):
+def signature_energies(spectrum: Spectrum, count: int = 100) -> Floats:
     """Return the energies of a wave kernel signature that suit a spectrum.
 
     Parameters
@@ -61,7 +66,9 @@ def signature_energies(spectrum, count=100):
     return np.linspace(low + 2.0 * width, high - 2.0 * width, _at_least_one(count))
 
 
-def heat_kernel_signature(spectrum, times=None, *, count=100, normalized=False):
+def heat_kernel_signature(
+    spectrum: Spectrum, times: ArrayLike | None = None, *, count: int = 100, normalized: bool = False
+) -> Floats:
     """Compute the heat kernel signature: how much heat is left at a point some time after it was put there.
 
     Parameters
@@ -101,9 +108,7 @@ def heat_kernel_signature(spectrum, times=None, *, count=100, normalized=False):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> spectrum = core.build_laplacian(points).eigenpairs(16)
     >>> heat = core.heat_kernel_signature(spectrum, [1.0])
     >>> print(heat.shape, heat.min().round(3), heat.max().round(3))
@@ -121,7 +126,7 @@ def heat_kernel_signature(spectrum, times=None, *, count=100, normalized=False):
     return spectrum.eigenvectors**2 @ decay
 
 
-def wave_kernel_signature(spectrum, energies=None, *, count=100):
+def wave_kernel_signature(spectrum: Spectrum, energies: ArrayLike | None = None, *, count: int = 100) -> Floats:
     """Compute the wave kernel signature: the mean chance to meet a particle of some energy at a point.
 
     It tells details apart better than the heat kernel signature, as each energy looks at a narrow band of modes.
@@ -163,9 +168,7 @@ def wave_kernel_signature(spectrum, energies=None, *, count=100):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> spectrum = core.build_laplacian(points).eigenpairs(16)
     >>> waves = core.wave_kernel_signature(spectrum, count=8)
     >>> print(waves.shape, waves.min().round(2), waves.max().round(2))
@@ -179,7 +182,7 @@ def wave_kernel_signature(spectrum, energies=None, *, count=100):
     return spectrum.eigenvectors[:, constant:] ** 2 @ (weight / weight.sum(axis=0))
 
 
-def _nonzero(spectrum):
+def _nonzero(spectrum: Spectrum) -> tuple[int, Floats]:
     """Return the number of constant modes and the eigenvalues of all others."""
     values = spectrum.eigenvalues
     inverse_area = np.max(spectrum.eigenvectors[:, 0] ** 2)  # that of the component on which a constant mode lives
@@ -191,7 +194,7 @@ def _nonzero(spectrum):
     return constant, values[constant:]
 
 
-def _window(spectrum):
+def _window(spectrum: Spectrum) -> tuple[float, float, float]:
     """Return the lowest and highest logarithm of the eigenvalues above zero, and the width of the windows."""
     logarithms = np.log(_nonzero(spectrum)[1])
     low, high = logarithms[0], logarithms[-1]
@@ -202,16 +205,16 @@ def _window(spectrum):
     return low, high, _WIDTH * (high - low)
 
 
-def _numbers(given, name):
-    values = as_array(given, name)
-    if values.ndim != 1 or values.size == 0 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
-        raise PointCloudError(
-            f"{name} have the shape {values.shape} and type {values.dtype}. Give a row of finite numbers, at least one."
-        )
+def _numbers(given: Any, name: str) -> Floats:
+    advice = "Give a row of finite numbers, at least one."
+    values = check_array(given, name, [(None,)], advice)
+    if not len(values):
+        raise PointCloudError(f"There are no {name.lower()}. {advice}")
+    check_finite(values, name.lower(), advice)
     return as_doubles(values)
 
 
-def _at_least_one(count):
+def _at_least_one(count: Any) -> int:
     if not 1 <= whole(count) <= _MANY:
         raise PointCloudError(
             f"{count!r} values per point were asked for. Use a whole number of at least 1, and at most {_MANY:,}."

@@ -3,11 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arguments import real
 from ..errors import PointCloudError
 from ..geometry import check_points, unit_normals
-from ..operator import ImplicitSurface
+from ..operator import ImplicitSurface, LaplaceBeltrami
+from ..types import Bools, Floats, Progress
 
 _ROUNDS = 20  # of Newton's method along a normal; a few are needed
 _MET = 1e-3  # spacings off the surface at which it is met
@@ -25,11 +27,18 @@ class Deviation(NamedTuple):
         Which points have one: the surface is there, and near enough.
     """
 
-    distance: np.ndarray
-    known: np.ndarray
+    distance: Floats
+    known: Bools
 
 
-def surface_deviation(points, normals, laplacian, greatest=None, *, progress=None):
+def surface_deviation(
+    points: ArrayLike,
+    normals: ArrayLike,
+    laplacian: LaplaceBeltrami,
+    greatest: float | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Deviation:
     """Measure how far points are from the surface of another cloud, along their normals.
 
     Each normal is followed, both ways, to where it meets the surface that the other points lie on, between these: two
@@ -73,9 +82,7 @@ def surface_deviation(points, normals, laplacian, greatest=None, *, progress=Non
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> deviation = core.surface_deviation(1.1 * points[::2], points[::2], core.build_laplacian(points))
     >>> print(np.allclose(deviation.distance, 0.1, atol=1e-3), deviation.known.all())
     True True

@@ -1,15 +1,20 @@
 """Functions on the surface that solve Poisson's or Laplace's equation, with or without fixed values."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..algebra import solve_symmetric
-from ..arguments import as_array, as_doubles
+from ..arguments import as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from ..kernel import SECOND_MOMENT
-from ..operator import narrow_laplacian
+from ..operator import LaplaceBeltrami, narrow_laplacian
+from ..types import Bools, Floats, Ints, Progress
 from .graph import coupled_components, mean_spacing
 
 _MEAN = 1e-2  # of the source's mean size: a larger mean is meant, a smaller one is left by the quadrature
@@ -21,7 +26,14 @@ _LEAST = 2e-3  # share of the wide operator everywhere: it connects what the nar
 _GRAZING = 0.1  # least distance from the edge of a set of fixed points, in spacings
 
 
-def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=None):
+def solve_poisson(
+    laplacian: LaplaceBeltrami,
+    source: ArrayLike,
+    fixed: ArrayLike | None = None,
+    fixed_values: ArrayLike | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Floats:
     """Solve -Delta u = source.
 
     Parameters
@@ -77,9 +89,8 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> solution = core.solve_poisson(laplacian, 2 * z)
     >>> print(np.abs(solution - z).max().round(2))
@@ -120,7 +131,9 @@ def solve_poisson(laplacian, source, fixed=None, fixed_values=None, *, progress=
     return result
 
 
-def harmonic_field(laplacian, fixed, fixed_values, *, progress=None):
+def harmonic_field(
+    laplacian: LaplaceBeltrami, fixed: ArrayLike, fixed_values: ArrayLike, *, progress: Progress | None = None
+) -> Floats:
     """Spread fixed values smoothly over the surface: Delta f = 0.
 
     Parameters
@@ -162,9 +175,7 @@ def harmonic_field(laplacian, fixed, fixed_values, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> field = core.harmonic_field(laplacian, [0, 799], [1, -1])
     >>> print(field[[0, 400, 799]].round(1))
@@ -177,7 +188,7 @@ def harmonic_field(laplacian, fixed, fixed_values, *, progress=None):
     return np.clip(result, values.min(), values.max())  # only rounding lies outside
 
 
-def read_values(fixed, values, count):
+def read_values(fixed: Any, values: Any, count: int) -> tuple[Ints, Floats]:
     """Return fixed points as indices (k,) and their values (k,).
 
     Raises
@@ -192,16 +203,10 @@ def read_values(fixed, values, count):
     if index.dtype == bool and index.shape == (count,):
         index = np.flatnonzero(mask)
     index = index.astype(np.intp).ravel() % count
-    given = np.zeros(0) if values is None else as_array(values, "Fixed values")
-    if given.dtype.kind not in "biuf" or (given.shape not in ((), (len(index),))):
-        raise InvalidPointsError(
-            f"Values have the shape {given.shape} and type {given.dtype} for {len(index)} fixed points. Give one"
-            " number for each of them."
-        )
+    advice = f"Give one number for each of {len(index)} fixed points."
+    given = check_array(() if values is None else values, "Fixed values", [(), (len(index),)], advice, "biuf")
     given = np.broadcast_to(as_doubles(given).ravel(), len(index))
-    bad = np.count_nonzero(~np.isfinite(given))
-    if bad:
-        raise InvalidPointsError(f"{bad} of {len(given)} fixed values are not finite (NaN or infinity). Replace them.")
+    check_finite(given, "fixed values", "Replace them.")
     index, first, row = np.unique(index, return_index=True, return_inverse=True)
     torn = np.count_nonzero(given != given[first][row])
     if torn:
@@ -209,27 +214,21 @@ def read_values(fixed, values, count):
     return index, given[first]
 
 
-def _read_source(source, count):
-    given = as_array(source, "Sources")
-    if given.dtype.kind not in "biuf" or given.shape not in ((), (count,)):
-        raise InvalidPointsError(
-            f"The source has the shape {given.shape} and type {given.dtype}. Give one number for each of the"
-            f" {count} points."
-        )
-    bad = np.count_nonzero(~np.isfinite(given))
-    if bad:
-        raise InvalidPointsError(f"{bad} of {count} values of the source are not finite. Replace them.")
-    return np.broadcast_to(as_doubles(given), count)
+def _read_source(source: Any, count: int) -> Floats:
+    given = check_array(source, "Sources", [(), (count,)], f"Give one number for each of {count} points.", "biuf")
+    given = np.broadcast_to(as_doubles(given), count)
+    check_finite(given, "values of the source", "Replace them.")
+    return given
 
 
-def _means(areas, values, component, rows):
+def _means(areas: Floats, values: Floats, component: Ints, rows: Ints) -> Floats:
     """Return the area-weighted mean of values (n,) over the component of each of some rows, (k,)."""
     component, areas = component[rows], areas[rows]
     total = np.bincount(component, areas)
     return (np.bincount(component, areas * values[rows]) / np.where(total > 0.0, total, 1.0))[component]
 
 
-def _without_mean(areas, source, component, rows):
+def _without_mean(areas: Floats, source: Floats, component: Ints, rows: Ints) -> Floats:
     """Take the mean out of the source on components that nothing holds, or raise if there is one."""
     mean, size = (_means(areas, values, component, rows) for values in (source, np.abs(source)))
     wrong = np.flatnonzero(np.abs(mean) > _MEAN * size)
@@ -244,7 +243,9 @@ def _without_mean(areas, source, component, rows):
     return result
 
 
-def _with_fixed_points(laplacian, fixed, values, free, report):
+def _with_fixed_points(
+    laplacian: LaplaceBeltrami, fixed: Bools, values: Floats, free: Ints, report: Callable[..., Any]
+) -> tuple[sparse.csr_array, Floats]:
     """Return the stiffness of the free points, (k, k), and the load, (k,), that the fixed ones are to them."""
     report("Equations", 0.1)
     spacing = mean_spacing(laplacian)
@@ -271,13 +272,13 @@ def _with_fixed_points(laplacian, fixed, values, free, report):
     return (sparse.diags_array(diagonal) - inner).tocsr(), load
 
 
-def _blend(weights, share):
+def _blend(weights: sparse.csr_array, share: Floats) -> sparse.csr_array:
     """Scale pair weights by the mean of a share at both ends."""
     half = sparse.diags_array(0.5 * share)
     return (half @ weights + weights @ half).tocsr()
 
 
-def _weights(laplacian, fixed, values):
+def _weights(laplacian: LaplaceBeltrami, fixed: Bools, values: Floats) -> tuple[sparse.csr_array, Floats, Floats]:
     """Return pair weights (n, n), and what boundaries with fixed points add to diagonal and load, (n,).
 
     Images in such a boundary carry ``2 c - f`` instead of f, with c the value at the nearest boundary point.
@@ -303,7 +304,7 @@ def _weights(laplacian, fixed, values):
     return (plain - (image - sparse.diags_array(image.diagonal()))).tocsr(), 2.0 * total, total * c + image @ c
 
 
-def _edge_distance(laplacian, fixed, spacing):
+def _edge_distance(laplacian: LaplaceBeltrami, fixed: Bools, spacing: Floats) -> Floats:
     """Return how far points are from the edge between fixed and free points, halfway between them, (n,).
 
     Zero for points that have no neighbours on the other side.
@@ -318,7 +319,7 @@ def _edge_distance(laplacian, fixed, spacing):
     return np.where(np.isfinite(result), np.maximum(result - 0.5 * spacing, 0.0), 0.0)
 
 
-def _thick(laplacian, fixed):
+def _thick(laplacian: LaplaceBeltrami, fixed: Bools) -> Bools:
     """Tell which fixed points belong to a set so thick that the kernel does not reach over it, (n,) bool."""
     rows = np.flatnonzero(fixed)
     weights = -laplacian.stiffness[rows][:, np.flatnonzero(~fixed)]

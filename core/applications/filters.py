@@ -1,9 +1,12 @@
 """Filters of functions on the points by the frequencies they are made of (section 4 of the paper, Figure 12)."""
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.fft import dct
 from scipy.special import expit
 
@@ -12,7 +15,8 @@ from ..arguments import as_array, check_switches, real, whole
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
-from ..operator import symmetric_form
+from ..operator import LaplaceBeltrami, Spectrum, symmetric_form
+from ..types import Floats, Ints, Progress, Response
 
 _NODES = 4096  # at which a response is read
 _DEGREE = 800  # of a polynomial, at most
@@ -20,7 +24,7 @@ _ROUGH = 0.02  # largest error of a response, as a share of its largest value, t
 _ZERO = 1e-8  # eigenvalues below this share of 4 pi / area belong to constants
 
 
-def exponential(time):
+def exponential(time: float) -> Callable[..., Any]:
     """Return the response ``exp(-time * eigenvalue)``: the flow of heat for that time.
 
     Parameters
@@ -44,7 +48,7 @@ def exponential(time):
     return lambda eigenvalues: np.exp(-number * np.asarray(eigenvalues))
 
 
-def fairing(time, order=3):
+def fairing(time: float, order: int = 3) -> Callable[..., Any]:
     """Return the response ``1 / (1 + (time * eigenvalue)^order)`` of an implicit step of fairing.
 
     Parameters
@@ -72,7 +76,7 @@ def fairing(time, order=3):
     return lambda eigenvalues: 1.0 / (1.0 + (number * np.asarray(eigenvalues)) ** power)
 
 
-def band(low, high=np.inf, *, softness=0.1):
+def band(low: float, high: float = np.inf, *, softness: float = 0.1) -> Callable[..., Any]:
     """Return the response that keeps the eigenvalues from low to high and fades out on both sides.
 
     Parameters
@@ -101,7 +105,7 @@ def band(low, high=np.inf, *, softness=0.1):
             " softness above zero."
         )
 
-    def respond(eigenvalues):
+    def respond(eigenvalues: Floats) -> Floats:
         frequency = np.sqrt(np.maximum(eigenvalues, 0.0))
         result = np.ones_like(frequency)
         for edge, side in ((lowest, 1.0), (highest, -1.0)):
@@ -112,7 +116,7 @@ def band(low, high=np.inf, *, softness=0.1):
     return respond
 
 
-def boost(gain, low, high=np.inf, *, softness=0.25):
+def boost(gain: float, low: float, high: float = np.inf, *, softness: float = 0.25) -> Callable[..., Any]:
     """Return the response that multiplies the details of a `band` by a gain and keeps all else.
 
     Parameters
@@ -139,7 +143,9 @@ def boost(gain, low, high=np.inf, *, softness=0.25):
     return lambda eigenvalues: 1.0 + (factor - 1.0) * part(eigenvalues)
 
 
-def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
+def spectral_filter(
+    values: ArrayLike, spectrum: Spectrum, areas: ArrayLike, response: int | Response, *, rest: float = 0.0
+) -> Floats:
     """Filter a function by its modes.
 
     Parameters
@@ -186,9 +192,8 @@ def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> values = z + points[:, 0] * points[:, 1]
     >>> smooth = core.spectral_filter(values, laplacian.eigenpairs(9), laplacian.areas, 4)
@@ -217,7 +222,16 @@ def spectral_filter(values, spectrum, areas, response, *, rest=0.0):
     return result.reshape(values.shape)
 
 
-def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False, tolerance=1e-4, progress=None):
+def chebyshev_filter(
+    laplacian: LaplaceBeltrami,
+    values: ArrayLike,
+    response: Callable[..., Any],
+    *,
+    dirichlet: bool = False,
+    raw: bool = False,
+    tolerance: float = 1e-4,
+    progress: Progress | None = None,
+) -> Floats:
     """Filter a function by a polynomial of the operator, without any eigenvectors.
 
     The result is that of `spectral_filter` with all modes: the polynomial is that of the operator with the symbol
@@ -262,7 +276,7 @@ def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False,
         raise PointCloudError(f"The tolerance of a filter is {tolerance!r}. Use a number that is not negative.")
     done = 0.0
 
-    def tell():
+    def tell() -> None:
         report("Filter", done)
 
     tell()
@@ -282,7 +296,9 @@ def chebyshev_filter(laplacian, values, response, *, dirichlet=False, raw=False,
     return filtered.reshape(values.shape)
 
 
-def corrected_operator(laplacian, dirichlet, raw, pool, report):
+def corrected_operator(
+    laplacian: LaplaceBeltrami, dirichlet: bool, raw: bool, pool: Any, report: Callable[..., Any]
+) -> tuple[Ints, Floats, Callable[..., Any]]:
     """Return the negated operator with the symbol correction as a product with a symmetric matrix, on all cores.
 
     Returns
@@ -299,14 +315,14 @@ def corrected_operator(laplacian, dirichlet, raw, pool, report):
         return order, root, lambda y: rows @ y
     squared = (SECOND_MOMENT / 8.0) * laplacian.kernel_widths[order, None] ** 2
 
-    def multiply(y):
+    def multiply(y: Floats) -> Floats:
         product = rows @ y
         return product + rows @ (squared * product)
 
     return order, root, multiply
 
 
-def _polynomial(response, top, tolerance):
+def _polynomial(response: Callable[..., Any], top: float, tolerance: float) -> Floats:
     """Return the Chebyshev coefficients of a response over [0, top], as many as the tolerance needs."""
     angle = np.pi * (np.arange(_NODES) + 0.5) / _NODES
     factors = respond(response, 0.5 * top * (1.0 + np.cos(angle)))
@@ -327,7 +343,7 @@ def _polynomial(response, top, tolerance):
     return coefficients
 
 
-def respond(response, eigenvalues):
+def respond(response: Callable[..., Any], eigenvalues: Floats) -> Floats:
     """Return a response's factors for eigenvalues, (m,), after a check."""
     factors = as_array(response(eigenvalues), "Responses")
     if factors.shape not in ((), eigenvalues.shape) or factors.dtype.kind not in "iufb":
@@ -345,7 +361,7 @@ def respond(response, eigenvalues):
     return factors
 
 
-def check_modes(count, spectrum, areas):
+def check_modes(count: Any, spectrum: Spectrum, areas: Floats) -> int:
     """Check a number of modes to keep and return it as an integer."""
     held = len(spectrum.eigenvalues)
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= held:

@@ -1,9 +1,12 @@
 """Distances along the surface."""
 
+from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
@@ -12,6 +15,8 @@ from ..algebra import blocks, on_all_cores
 from ..arguments import check_switches
 from ..errors import InvalidPointsError
 from ..geometry import as_indices, as_mask, circle_arc, pair_heights
+from ..operator import LaplaceBeltrami
+from ..types import Bools, Floats, Ints, Progress
 from .graph import mean_spacing
 
 _BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
@@ -21,7 +26,7 @@ _WITHIN = (1.5, 6.0, np.inf)  # times the straight distance: how far a way betwe
 _GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point: the surface is there
 
 
-def geodesic_distance(laplacian, sources, *, progress=None):
+def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Floats:
     """Measure the distance along the surface from the nearest of some points.
 
     Parameters
@@ -62,9 +67,7 @@ def geodesic_distance(laplacian, sources, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> distance = core.geodesic_distance(laplacian, [0])
     >>> print(distance.max().round(2), np.arccos((points @ points[0]).min()).round(2))
@@ -94,20 +97,18 @@ class Geodesics:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> geodesics = core.Geodesics(core.build_laplacian(points))
     >>> print(*(geodesics.distance([pole])[400].round(1) for pole in (0, 799)))
     1.6 1.6
     """
 
-    def __init__(self, laplacian, *, progress=None):
+    def __init__(self, laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> None:
         report = progress or (lambda stage, fraction: None)
         self._laplacian = laplacian
         self._graph = _lengths_of_pairs(laplacian, lambda: report("Lengths", 0.0))
 
-    def distance(self, sources, *, limit=np.inf, progress=None):
+    def distance(self, sources: ArrayLike, *, limit: float = np.inf, progress: Progress | None = None) -> Floats:
         """Measure the distance from the nearest of some points; see `geodesic_distance`.
 
         Parameters
@@ -136,7 +137,7 @@ class Geodesics:
         result[chosen] = 0.0
         return result
 
-    def nearest_source(self, sources, *, progress=None):
+    def nearest_source(self, sources: ArrayLike, *, progress: Progress | None = None) -> Ints:
         """Tell which of some points is nearest; see `nearest_source`.
 
         Parameters
@@ -165,7 +166,7 @@ class Geodesics:
         nearest = dijkstra(self._graph, indices=known, min_only=True, return_predecessors=True)[2]
         return label[np.where(nearest < 0, -1, nearest)]
 
-    def signed_distance(self, curve, closed=False, *, progress=None):
+    def signed_distance(self, curve: ArrayLike, closed: bool = False, *, progress: Progress | None = None) -> Floats:
         """Measure the distance from a curve, with a sign; see `signed_distance`.
 
         Parameters
@@ -217,11 +218,11 @@ class Geodesics:
         result[way] = 0.0
         return result
 
-    def _way(self, curve, closed, report):
+    def _way(self, curve: Ints, closed: bool, report: Callable[..., Any]) -> Ints:
         """Join points by shortest ways, and return all points of these in their order, (m,), the first one twice."""
         ends = np.append(curve, curve[0]) if closed else curve
         points = self._laplacian.surface_points
-        pieces = [ends[:1]]
+        pieces: list[Any] = [ends[:1]]
         for number, (first, last) in enumerate(pairwise(ends)):
             report(number / len(ends))
             row = self._graph.indices[self._graph.indptr[first] : self._graph.indptr[first + 1]]
@@ -229,7 +230,7 @@ class Geodesics:
                 pieces.append([last])
                 continue
             # Points farther away than the end do not matter; how far that is along the surface is not known yet.
-            apart = max(np.linalg.norm(points[last] - points[first]), 1e-300)
+            apart = max(float(np.linalg.norm(points[last] - points[first])), 1e-300)
             for times in _WITHIN:
                 before = dijkstra(self._graph, indices=first, return_predecessors=True, limit=times * apart)[1]
                 if before[last] >= 0:
@@ -244,7 +245,7 @@ class Geodesics:
             pieces.append(piece[::-1])
         return np.concatenate(pieces)
 
-    def _beside(self, way):
+    def _beside(self, way: Ints) -> tuple[Ints, Floats, Floats]:
         """Return the points near a polygon, (b,), how far away they are, and on which side, 1 or -1."""
         points, normals = self._laplacian.surface_points, self._laplacian.normals
         # Each point of the way ends a segment before it and one after it; at the ends of an open way one of them.
@@ -277,7 +278,7 @@ class Geodesics:
         return band, away[order][first], side[order][first]
 
 
-def nearest_source(laplacian, sources, *, progress=None):
+def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Ints:
     """Tell which of some points is nearest along the surface: Voronoi cells.
 
     Parameters
@@ -309,9 +310,8 @@ def nearest_source(laplacian, sources, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> label = core.nearest_source(core.build_laplacian(points), [0, 799])
     >>> print(label[z > 0.1].max(), label[z < -0.1].min())
     0 1
@@ -320,7 +320,9 @@ def nearest_source(laplacian, sources, *, progress=None):
     return Geodesics(laplacian, progress=progress).nearest_source(sources, progress=progress)
 
 
-def signed_distance(laplacian, curve, closed=False, *, progress=None):
+def signed_distance(
+    laplacian: LaplaceBeltrami, curve: ArrayLike, closed: bool = False, *, progress: Progress | None = None
+) -> Floats:
     """Measure the distance along the surface from a curve, positive on its left and negative on its right.
 
     Parameters
@@ -362,9 +364,7 @@ def signed_distance(laplacian, curve, closed=False, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> distance = core.signed_distance(core.build_laplacian(points), [100, 101, 102], closed=True)
     >>> print(np.sign(distance[0] * distance[799]))
     -1.0
@@ -373,7 +373,7 @@ def signed_distance(laplacian, curve, closed=False, *, progress=None):
     return Geodesics(laplacian, progress=progress).signed_distance(curve, closed, progress=progress)
 
 
-def _check_curve(laplacian, curve):
+def _check_curve(laplacian: LaplaceBeltrami, curve: Ints) -> None:
     """Refuse a curve that does not lie on one component."""
     part = laplacian.component[curve]
     if len(curve) < 2 or part.min() < 0 or part.min() != part.max():
@@ -383,7 +383,7 @@ def _check_curve(laplacian, curve):
         )
 
 
-def _known_sources(laplacian, sources):
+def _known_sources(laplacian: LaplaceBeltrami, sources: Any) -> tuple[Bools, Ints]:
     """Return the mask of the sources, (n,) bool, and those of them that the operator has."""
     chosen = as_mask(sources, len(laplacian.points))
     if not chosen.any():
@@ -397,7 +397,7 @@ def _known_sources(laplacian, sources):
     return chosen, known
 
 
-def _lengths_of_pairs(laplacian, report):
+def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[..., Any]) -> sparse.csr_array:
     """Return the symmetric (n, n) CSR matrix of the lengths of all pairs of the operator."""
     stiffness, points = laplacian.stiffness, laplacian.surface_points
     count = len(points)
@@ -410,10 +410,10 @@ def _lengths_of_pairs(laplacian, report):
     tree = cKDTree(points[laplacian.component >= 0])
     places, normals = points.T.copy(), laplacian.normals.T.copy()
 
-    def measure(block):
+    def measure(block: Any) -> None:
         i, j = first[block], second[block]
-        ends = (partial(np.take, indices=end, axis=1) for end in (i, j))
-        chord, left, right, cosine = pair_heights(*ends, places, normals)
+        one, other = (partial(np.take, indices=end, axis=1) for end in (i, j))
+        chord, left, right, cosine = pair_heights(one, other, places, normals)
         length = np.linalg.norm(chord, axis=0)
         turn = np.abs(np.where(cosine < 0.0, -right, right) - left)
         # Which way normals face each other across a right angle is chance: it bends, either way.
@@ -432,7 +432,7 @@ def _lengths_of_pairs(laplacian, report):
     on_all_cores(measure, blocks(len(first), _BLOCK), report)
     arcs = np.maximum(arcs, 1e-300)  # points at one place are neighbours too
 
-    def upper(chosen):
+    def upper(chosen: Any) -> sparse.csr_array:
         start = np.concatenate([[0], np.cumsum(np.bincount(first[chosen], minlength=count))])
         return sparse.csr_array((arcs[chosen], second[chosen], start.astype(np.int32)), shape=(count, count))
 

@@ -110,9 +110,8 @@ def deformation_gradients(laplacian, positions):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> gradients = core.deformation_gradients(laplacian, points * [1, 1, 2])
     >>> print(np.median(gradients[abs(z) < 0.05, 2, 2]).round(1))

@@ -8,6 +8,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..geometry import SMALLEST
+from ..operator import LaplaceBeltrami
+from ..types import Array, Bools, Floats, Ints
 
 _SEEN = 3  # times as many nearest points are looked at as are joined: those of close sheets are among them
 
@@ -27,17 +29,17 @@ class NearGraph:
     """
 
     lengths: sparse.csr_array
-    place: np.ndarray
-    first: np.ndarray
+    place: Ints
+    first: Ints
 
-    def scatter(self, quantity, neutral):
+    def scatter(self, quantity: Array, neutral: bool | int) -> Array:
         """Return a quantity of the places, (m,), for the caller's points; those left out get the neutral value."""
         result = quantity[self.place]
         result[self.place < 0] = neutral
         return result
 
 
-def near_graph(laplacian, count):
+def near_graph(laplacian: LaplaceBeltrami, count: int) -> NearGraph:
     """Join every point to its nearest ones among those that the operator couples it with.
 
     The operator's pairs lie on one sheet of the surface, so the graph does not cross the gap between close sheets; and
@@ -72,7 +74,7 @@ def near_graph(laplacian, count):
     return NearGraph(_bridge(lengths.maximum(lengths.T), points, component), place, first)
 
 
-def _coupled(stiffness, first, index):
+def _coupled(stiffness: sparse.csr_array, first: Ints, index: Ints) -> Bools:
     """Tell which of their neighbours, (m, k) int, the stiffness couples places with."""
     row = np.repeat(first, index.shape[1])
     number = np.arange(1.0, index.size + 1.0)  # survives a product with the pattern of the stiffness
@@ -82,7 +84,7 @@ def _coupled(stiffness, first, index):
     return result.reshape(index.shape)
 
 
-def _bridge(lengths, points, component):
+def _bridge(lengths: sparse.csr_array, points: Floats, component: Ints) -> sparse.csr_array:
     """Join pieces of one component at their nearest points, so that it hangs together.
 
     The stiffness leaves a point without pairs where no other one seems to lie on its sheet.
@@ -107,7 +109,7 @@ def _bridge(lengths, points, component):
     return (lengths + bridges + bridges.T).tocsr()
 
 
-def coupled_components(laplacian):
+def coupled_components(laplacian: LaplaceBeltrami) -> Ints:
     """Number the components of the cloud between which the operator couples no points, (n,) int.
 
     Those of fewer than 50 points are -1: points left out, and single ones within a component that are so far off
@@ -118,7 +120,7 @@ def coupled_components(laplacian):
     return np.where(large, np.cumsum(large) - 1, -1)[label]
 
 
-def mean_spacing(laplacian):
+def mean_spacing(laplacian: LaplaceBeltrami) -> Floats:
     """Return the distance between the points of an even sample as dense as the neighbours of each, (n,) [L]."""
     stiffness = laplacian.stiffness
     neighbors = sparse.csr_array((np.ones(stiffness.nnz), stiffness.indices, stiffness.indptr), shape=stiffness.shape)

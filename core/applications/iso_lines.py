@@ -1,13 +1,15 @@
 """Lines on a mesh along which values are the same."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
-from ..arguments import as_array, as_doubles, check_positions, real
+from ..arguments import as_array, as_doubles, check_array, check_positions, real
 from ..errors import InvalidPointsError, PointCloudError
+from ..types import Bools, Floats, Ints
 
 
 class IsoLine(NamedTuple):
@@ -24,11 +26,11 @@ class IsoLine(NamedTuple):
     """
 
     level: float
-    points: np.ndarray
+    points: Floats
     closed: bool
 
 
-def iso_lines(vertices, faces, values, levels):
+def iso_lines(vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: ArrayLike) -> list[IsoLine]:
     """Find the lines on a mesh along which values, linear on each triangle, are those of some levels.
 
     Parameters
@@ -62,9 +64,7 @@ def iso_lines(vertices, faces, values, levels):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> mesh = core.mesh_surface(core.build_laplacian(points))
     >>> (circle,) = core.iso_lines(mesh.vertices, mesh.faces, mesh.vertices[:, 2], [0.5])
     >>> steps = circle.points - np.roll(circle.points, 1, axis=0)
@@ -77,32 +77,24 @@ def iso_lines(vertices, faces, values, levels):
     return [line for part in parts for line in part]
 
 
-def _checked(vertices, faces, values, levels):
+def _checked(vertices: Any, faces: Any, values: Any, levels: ArrayLike) -> tuple[Floats, Ints, Floats, list[Any]]:
     """Return what `iso_lines` takes as arrays, with triangles for faces."""
     count = len(np.atleast_1d(as_array(vertices, "Vertices")))
     vertices = check_positions(vertices, count, "vertices", "vertex")
-    faces, values = as_array(faces, "Faces"), as_array(values, "Values")
-    if faces.ndim != 2 or faces.shape[1] not in (3, 4) or faces.dtype.kind not in "iu":
-        raise InvalidPointsError(
-            f"Faces have the shape {faces.shape} and type {faces.dtype}. Give three or four whole numbers for each."
-        )
+    faces = check_array(faces, "Faces", [(None, 3), (None, 4)], "Give three or four whole numbers for each.", "iu")
     if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
         raise InvalidPointsError(
             f"Faces have vertices from {faces.min()} to {faces.max()}, and there are {len(vertices)}. Count from zero."
         )
-    if values.shape != (len(vertices),) or values.dtype.kind not in "iufb":
-        raise InvalidPointsError(
-            f"Values have the shape {values.shape} and type {values.dtype}, and there are {len(vertices)} vertices."
-            " Give one real number per vertex."
-        )
-    levels = [real(level) for level in np.atleast_1d(as_array(levels, "Levels")).ravel().tolist()]
-    if not np.isfinite(levels).all():
-        raise PointCloudError(f"The levels are {levels}. Use finite numbers.")
+    values = check_array(values, "Values", [(count,)], f"Give one real number for each of {count} vertices.", "iufb")
+    numbers = [real(level) for level in np.atleast_1d(as_array(levels, "Levels")).ravel().tolist()]
+    if not np.isfinite(numbers).all():
+        raise PointCloudError(f"The levels are {numbers}. Use finite numbers.")
     triangles = faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
-    return vertices, triangles.astype(np.int64), as_doubles(values), levels
+    return vertices, triangles.astype(np.int64), as_doubles(values), numbers
 
 
-def _segments(triangles, above):
+def _segments(triangles: Ints, above: Bools) -> Ints:
     """Return the pieces of a line within triangles, (s, 2, 2) int: two edges each, given by their lower and upper end.
 
     An edge is cut where one end is above the level and the other one is not.
@@ -114,7 +106,7 @@ def _segments(triangles, above):
     return edges[cut[crossed]].reshape(-1, 2, 2)
 
 
-def _joined(vertices, values, level, segments):
+def _joined(vertices: Floats, values: Floats, level: float, segments: Ints) -> list[IsoLine]:
     """Join pieces to lines."""
     if not len(segments):
         return []
@@ -136,7 +128,7 @@ def _joined(vertices, values, level, segments):
     ]
 
 
-def _walk(ends, count):
+def _walk(ends: Ints, count: int) -> tuple[Ints, Ints, Bools]:
     """Order cuts along the lines that pieces, (s, 2) pairs of cuts, make up.
 
     Returns

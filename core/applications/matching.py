@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
@@ -10,6 +11,7 @@ from ..arguments import as_array, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_points
 from ..operator import Spectrum
+from ..types import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -27,10 +29,18 @@ class MatchedModes:
     """
 
     spectrum: Spectrum
-    overlaps: np.ndarray
+    overlaps: Floats
 
 
-def match_modes(spectrum, areas, points, spectrum_before, points_before, *, tolerance=0.02):
+def match_modes(
+    spectrum: Spectrum,
+    areas: ArrayLike,
+    points: ArrayLike,
+    spectrum_before: Spectrum,
+    points_before: ArrayLike,
+    *,
+    tolerance: float = 0.02,
+) -> MatchedModes:
     """Let the modes of a frame continue those of the frame before.
 
     Modes come with any sign, change places where eigenvalues cross, and are any basis of their space where eigenvalues
@@ -83,9 +93,7 @@ def match_modes(spectrum, areas, points, spectrum_before, points_before, *, tole
     --------
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> before = laplacian.eigenpairs(4)
     >>> after = core.Spectrum(before.eigenvalues, -before.eigenvectors)  # as another run may give them
@@ -129,21 +137,22 @@ def match_modes(spectrum, areas, points, spectrum_before, points_before, *, tole
     return MatchedModes(Spectrum(values @ turn**2, matched), np.sum(turn * overlaps, axis=0))
 
 
-def _overlaps(vectors, areas, carried):
+def _overlaps(vectors: Floats, areas: Floats, carried: Floats) -> Floats:
     """Return the inner products of modes with those before, (count, count), by the length that these have here."""
     weighted = areas[:, None] * carried
     lengths = np.sqrt(np.sum(carried * weighted, axis=0))
     return vectors.T @ weighted / np.where(lengths > 0.0, lengths, 1.0)
 
 
-def _equal(values, tolerance):
+def _equal(values: Floats, tolerance: float) -> list[Ints]:
     """Return sets of modes whose eigenvalues are as good as one, (g,) int each; they are cut at the widest gaps.
 
     Zeros, of which each component has one, are told from others by the mean distance of eigenvalues.
     """
     order = np.argsort(values, kind="stable")
     spacing = values[order[-1]] / len(values)
-    groups, rest = [], [order]
+    groups: list[Ints] = []
+    rest: list[Ints] = [order]
     while rest:
         group = rest.pop()
         sizes = values[group]

@@ -1,8 +1,10 @@
 """A mesh of the surface that the points lie on: surface nets on a grid that is known near the points only."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -12,7 +14,8 @@ from ..arguments import real
 from ..errors import NotEnoughMemoryError, PointCloudError
 from ..geometry import Prolongation, check_points
 from ..memory import available_memory
-from ..operator import ImplicitSurface
+from ..operator import ImplicitSurface, LaplaceBeltrami
+from ..types import Bools, Floats, Ints, Progress
 from .sides import find_sides
 
 _BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
@@ -38,11 +41,11 @@ class SurfaceMesh(NamedTuple):
         Quads, by their vertices: counterclockwise as the normals see them.
     """
 
-    vertices: np.ndarray
-    faces: np.ndarray
+    vertices: Floats
+    faces: Ints
 
 
-def mesh_surface(laplacian, detail=1.0, *, progress=None):
+def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: Progress | None = None) -> SurfaceMesh:
     """Make a mesh of the surface that the points lie on.
 
     Quadrics of near points tell how far the corners of a regular grid are from the surface, in a narrow band around
@@ -87,9 +90,7 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> mesh = core.mesh_surface(core.build_laplacian(points))
     >>> print(len(mesh.vertices) - len(mesh.faces))
     2
@@ -120,7 +121,9 @@ def mesh_surface(laplacian, detail=1.0, *, progress=None):
     return SurfaceMesh(surface.placed(vertices), faces)
 
 
-def values_on_mesh(laplacian, vertices, *, progress=None):
+def values_on_mesh(
+    laplacian: LaplaceBeltrami, vertices: ArrayLike, *, progress: Callable[[], Any] | None = None
+) -> Prolongation:
     """Prepare to carry functions on the points to the vertices of their mesh, along the surface.
 
     Parameters
@@ -151,7 +154,7 @@ def values_on_mesh(laplacian, vertices, *, progress=None):
     return Prolongation(places, subset, laplacian.normals, laplacian.component, progress=progress)
 
 
-def _check_memory(places, detail):
+def _check_memory(places: float, detail: float) -> None:
     free = available_memory()
     if free is not None and _BYTES * places > _SHARE * free:
         raise NotEnoughMemoryError(
@@ -164,7 +167,7 @@ def _check_memory(places, detail):
 class _Grid:
     """Corners of voxels of size one by their numbers, (k,) int64."""
 
-    def __init__(self, points, margin):
+    def __init__(self, points: Floats, margin: float) -> None:
         self.low = np.floor(points.min(axis=0)) - margin
         counts = np.ceil(np.ptp(points, axis=0)) + 2.0 * margin + 2.0
         if np.prod(counts) > 2.0**62:
@@ -174,18 +177,18 @@ class _Grid:
             )
         self.steps = np.array([counts[1] * counts[2], counts[2], 1.0]).astype(np.int64)
 
-    def keys(self, corners):
+    def keys(self, corners: Floats) -> Ints:
         """Return the numbers of corners, (..., 3) float whole numbers as from `corners`."""
         return (corners - self.low).astype(np.int64) @ self.steps
 
-    def corners(self, keys):
+    def corners(self, keys: Ints) -> Floats:
         """Return the places of corners, (k, 3) float."""
         first, rest = np.divmod(keys, self.steps[0])
         second, third = np.divmod(rest, self.steps[1])
         return np.column_stack([first, second, third]) + self.low
 
 
-def _band(surface, report):
+def _band(surface: ImplicitSurface, report: Callable[..., Any]) -> tuple[_Grid, Ints]:
     """Return a grid and its corners near the surface as sorted numbers: within gaps of the points, and above them."""
     reach = _REACH * surface.spacing + 1.0
     grid = _Grid(surface.points, np.ceil(reach.max()) + 3.0)
@@ -198,7 +201,7 @@ def _band(surface, report):
         steps = np.stack(np.meshgrid(across, across, across, indexing="ij"), axis=-1).reshape(-1, 3)
         parts += [(rows[part], steps) for part in blocks(len(rows), max(_CANDIDATES // len(steps), 1))]
 
-    def near(part):
+    def near(part: tuple[Ints, Ints]) -> Ints:
         rows, steps = part
         corner = np.round(surface.points[rows])
         shift = surface.points[rows] - corner
@@ -214,7 +217,9 @@ def _band(surface, report):
     return grid, np.unique(np.concatenate(found))
 
 
-def _cuts(surface, grid, keys, report):
+def _cuts(
+    surface: ImplicitSurface, grid: _Grid, keys: Ints, report: Callable[..., Any]
+) -> tuple[Ints, Ints, Bools, Floats, Bools]:
     """Find the edges of the grid that the surface cuts.
 
     Returns
@@ -244,7 +249,15 @@ def _cuts(surface, grid, keys, report):
     return keys[first[edge]], axis[edge], side[first[edge]] < 0.0, cut, belongs
 
 
-def _between(surface, corners, first, second, axis, side, report):
+def _between(
+    surface: ImplicitSurface,
+    corners: Floats,
+    first: Ints,
+    second: Ints,
+    axis: Ints,
+    side: Floats,
+    report: Callable[..., Any],
+) -> tuple[Ints, Floats, Bools]:
     """Find the edges between corners on two sides.
 
     Returns
@@ -261,7 +274,7 @@ def _between(surface, corners, first, second, axis, side, report):
     return edge, cut, surface.heights(cut, report).belongs
 
 
-def _bare(surface, cut):
+def _bare(surface: ImplicitSurface, cut: Floats) -> float:
     """Return the share of points without a cut near them, which get no mesh."""
     if not len(cut):
         return 1.0
@@ -269,7 +282,7 @@ def _bare(surface, cut):
     return np.mean(np.isinf(apart))
 
 
-def _quads(grid, begin, axis, forward, cut, belongs):
+def _quads(grid: _Grid, begin: Ints, axis: Ints, forward: Bools, cut: Floats, belongs: Bools) -> tuple[Floats, Ints]:
     """Return the vertices of the voxels that are cut, each the mean of its cuts, and a quad around each that belongs.
 
     A voxel that several sheets cut has a vertex for each.
@@ -288,7 +301,7 @@ def _quads(grid, begin, axis, forward, cut, belongs):
     return vertices, faces
 
 
-def _joined(around, sides, inner):
+def _joined(around: Ints, sides: Ints, inner: Ints) -> Ints:
     """Number the vertices of quads so that each of their edges has two quads at most, (4 q,) int.
 
     Parameters
@@ -314,7 +327,7 @@ def _joined(around, sides, inner):
     return connected_components(graph, directed=False)[1]
 
 
-def _without_fragments(vertices, faces, least):
+def _without_fragments(vertices: Floats, faces: Ints, least: float) -> tuple[Floats, Ints]:
     """Leave out the faces of pieces of less than so many faces, and all vertices without faces."""
     count = len(vertices)
     edges = (np.ones(3 * len(faces), dtype=bool), (np.repeat(faces[:, 0], 3), faces[:, 1:].ravel()))
@@ -324,7 +337,7 @@ def _without_fragments(vertices, faces, least):
     return vertices[used], faces.reshape(-1, 4).astype(np.int32)
 
 
-def _rim(faces):
+def _rim(faces: Ints) -> Ints:
     """Return the vertices at edges of one face, (k,) int."""
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1).astype(np.int64)
     keys, count = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)
@@ -332,7 +345,7 @@ def _rim(faces):
     return np.unique(np.concatenate([lone >> 32, lone & 0xFFFFFFFF]))
 
 
-def _onto(surface, vertices, rim, report):
+def _onto(surface: ImplicitSurface, vertices: Floats, rim: Ints, report: Callable[..., Any]) -> Floats:
     """Move vertices onto the surface, and those at the rim to the boundary where there is one within a voxel."""
     for _ in range(_ROUNDS):
         there = surface.heights(vertices[rim], report)

@@ -1,8 +1,11 @@
 """Minimal surfaces through fixed boundaries: the problem of Plateau, Figure 14 of the paper."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import cKDTree
 
@@ -12,6 +15,7 @@ from ..errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloud
 from ..geometry import FEWEST, as_mask, check_points, find_nearest
 from ..operator import LaplaceBeltrami, build_laplacian
 from ..options import LaplacianOptions, check_options
+from ..types import Bools, Floats, Ints, Progress
 from .boundary_curve import BoundaryCurve
 
 _REACH = 8.0  # smoothing lengths from the boundary at which no kernel sees it, also after a step
@@ -54,19 +58,26 @@ class MinimalSurface:
         What a user should know.
     """
 
-    points: np.ndarray
-    areas: np.ndarray
-    area_history: np.ndarray
+    points: Floats
+    areas: Floats
+    area_history: Floats
     initial_area: float
     converged: bool
     steps: int
     reason: str
-    notices: list
+    notices: list[str]
 
 
 def minimal_surface(
-    points, fixed, *, epsilon=1e-4, max_steps=100, options=LaplacianOptions(), callback=None, progress=None
-):
+    points: ArrayLike,
+    fixed: ArrayLike,
+    *,
+    epsilon: float = 1e-4,
+    max_steps: int = 100,
+    options: LaplacianOptions = LaplacianOptions(),
+    callback: Callable[..., Any] | None = None,
+    progress: Progress | None = None,
+) -> MinimalSurface:
     """Move points until the area is the least that the fixed points permit.
 
     Parameters
@@ -157,14 +168,14 @@ def minimal_surface(
             f"A tolerance of {epsilon!r} and {max_steps!r} steps were asked for. Give a tolerance of at least 0"
             " and a whole number of steps."
         )
-    epsilon, max_steps = real(epsilon), whole(max_steps)
+    epsilon, max_steps = real(epsilon), int(whole(max_steps))
     check_options(options)
     options = replace(options, projection="off")
     first = build_laplacian(points, options=options, progress=progress)
     film = _Film(first, fixed, options, progress)
     state = film.state(points, first)
     initial_area, bent = state.area, max(_NECK, state.bent)
-    area_history = []
+    area_history: list[float] = []
     reason = "step limit"
     try:
         while len(area_history) < max_steps:
@@ -195,7 +206,7 @@ def minimal_surface(
     )
 
 
-def _notices(reason, steps):
+def _notices(reason: str, steps: int) -> list[str]:
     texts = {
         "step limit": f"The surface had not settled after {steps} steps. Allow more steps, or a larger tolerance.",
         "stopped": f"The iteration was stopped after {steps} steps, before the surface had settled.",
@@ -232,10 +243,10 @@ class _State:
         Smoothing length over the radius to which the surface bends, where that is largest but for a few points.
     """
 
-    points: np.ndarray
+    points: Floats
     laplacian: LaplaceBeltrami
     area: float
-    step: np.ndarray
+    step: Floats
     savings: float
     definite: bool
     bent: float
@@ -244,17 +255,19 @@ class _State:
 class _Film:
     """What stays the same while the surface moves: its boundary, the free points, and the settings."""
 
-    def __init__(self, first, fixed, options, progress):
+    def __init__(
+        self, first: LaplaceBeltrami, fixed: Bools, options: LaplacianOptions, progress: Progress | None
+    ) -> None:
         self.options, self.progress = options, progress
         self.boundary = _boundary_points(first, fixed)
         self.curve = BoundaryCurve(first.points[self.boundary]) if len(self.boundary) else None
         self.free = np.flatnonzero(~fixed & (first.component >= 0))
         self.components = first.component.max()
 
-    def state(self, points, before):
+    def state(self, points: Floats, before: LaplaceBeltrami) -> _State:
         """Build the operator of moved points, the boundary's distances by the normals before, and the next step."""
         distance, foot = None, points
-        if len(self.boundary):
+        if self.curve is not None:
             foot, index = self.curve.nearest(points)
             if not self.curve.rough:  # otherwise the operator fits a boundary's course to them
                 normals = before.normals[self.boundary[self.curve.first]]
@@ -268,7 +281,7 @@ class _Film:
             raise NotASurfaceError(f"The surface came apart; {torn} points lie apart from the rest. Use more points.")
         return self._with_step(points, laplacian, foot)
 
-    def _with_step(self, points, laplacian, foot):
+    def _with_step(self, points: Floats, laplacian: LaplaceBeltrami, foot: Floats) -> _State:
         stiffness, pull = laplacian.dirichlet
         free = self.free[stiffness.diagonal()[self.free] > 0.0]  # in noise a point may lie on a sheet of its own
         pulled = (pull @ foot - stiffness @ points)[free]
@@ -297,7 +310,7 @@ class _Film:
             bent=float(np.partition(curvature * laplacian.smoothing_lengths[free], -few)[-few]),
         )
 
-    def advance(self, before, bent):
+    def advance(self, before: _State, bent: float) -> tuple[_State, str]:
         """Take a step, or a part of it, to a surface that bends no more than so much.
 
         Returns
@@ -321,7 +334,7 @@ class _Film:
         return before, failure
 
 
-def _boundary_points(laplacian, fixed):
+def _boundary_points(laplacian: LaplaceBeltrami, fixed: Bools) -> Ints:
     """Return those of the fixed points that lie at a boundary, (k,) int, after checks."""
     points, found, component = laplacian.points, laplacian.boundary, laplacian.component
     rows = np.flatnonzero(fixed)
@@ -356,7 +369,7 @@ def _boundary_points(laplacian, fixed):
     return rows if np.median(lopsided) > 0.5 else rows[:0]
 
 
-def _solve(matrix, load):
+def _solve(matrix: sparse.csr_array, load: Floats) -> Iterate:
     """Solve for a step, no more closely than it needs, or find that the matrix is not definite."""
     diagonal = matrix.diagonal()
     if not np.all(diagonal > 0.0):

@@ -1,6 +1,9 @@
 """Divide a surface into parts: nodal domains of a mode, and clusters of points in the spectral embedding."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
@@ -8,7 +11,9 @@ from ..arguments import real, whole
 from ..errors import ComponentError, InvalidPointsError, PointCloudError, TooFewPointsError, UnresolvedModesError
 from ..geometry import check_values
 from ..kernel import RESOLVED
-from .graph import near_graph
+from ..operator import LaplaceBeltrami, Spectrum
+from ..types import Array, Floats, Ints, Progress
+from .graph import NearGraph, near_graph
 
 _NEIGHBORS = 8  # nearest points on the same sheet that a domain may continue to
 _STEP = 0.75  # from level to level, on the way down the hills of a function
@@ -21,7 +26,9 @@ _LEAST = 0.03  # a cluster of a smaller share of the mean area is no part, but a
 _ROUNDS = 4  # of leaving such clusters out
 
 
-def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
+def nodal_domains(
+    values: ArrayLike, laplacian: LaplaceBeltrami, *, threshold: float = 0.02, bridge: float = 0.1, smallest: int = 5
+) -> Ints:
     """Divide the points into connected sets on which a function keeps its sign.
 
     Points hang together through their nearest neighbours on the same sheet, so that two domains of one sign do not join
@@ -71,9 +78,8 @@ def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> print(np.bincount(core.nodal_domains(z, laplacian)))
     [400 400]
@@ -100,7 +106,9 @@ def nodal_domains(values, laplacian, *, threshold=0.02, bridge=0.1, smallest=5):
     return _by_size(graph, domain, values)
 
 
-def segment(laplacian, parts, *, spectrum=None, progress=None):
+def segment(
+    laplacian: LaplaceBeltrami, parts: int, *, spectrum: Spectrum | None = None, progress: Progress | None = None
+) -> Ints:
     """Divide the surface into a number of parts, such as the limbs of a figure.
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
@@ -153,9 +161,8 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> dumbbell = points * (0.4 + np.abs(z))[:, None]
     >>> labels = core.segment(core.build_laplacian(dumbbell), 2)
     >>> print(labels.max() + 1, np.ptp(labels[z > 0.1]), np.ptp(labels[z < -0.1]))
@@ -198,7 +205,7 @@ def segment(laplacian, parts, *, spectrum=None, progress=None):
     return _by_size(graph, part, np.linalg.norm(laplacian.points - center, axis=1))
 
 
-def modes_needed(laplacian, parts):
+def modes_needed(laplacian: LaplaceBeltrami, parts: int) -> int:
     """Return how many modes `segment` works with, the constant ones included.
 
     Parameters
@@ -219,19 +226,19 @@ def modes_needed(laplacian, parts):
     return _constant_modes(laplacian) + _MODES * _check_parts(parts) + 1
 
 
-def _check_parts(parts):
+def _check_parts(parts: Any) -> int:
     if not whole(parts) >= 1:
         raise TooFewPointsError(f"{parts!r} parts were asked for. Ask for a whole number of at least 1.")
-    return whole(parts)
+    return int(whole(parts))
 
 
-def _constant_modes(laplacian):
+def _constant_modes(laplacian: LaplaceBeltrami) -> int:
     """Return the number of modes of eigenvalue zero: the parts that the stiffness does not couple."""
     pieces = connected_components(laplacian.stiffness, directed=False)[1]
     return len(np.unique(pieces[laplacian.component >= 0]))
 
 
-def _signature(laplacian, parts, spectrum, progress):
+def _signature(laplacian: LaplaceBeltrami, parts: int, spectrum: Spectrum | None, progress: Progress) -> Floats:
     """Return the faded global point signature, (n, modes)."""
     constant, count = _constant_modes(laplacian), modes_needed(laplacian, parts)
     if spectrum is None or len(spectrum.eigenvalues) < count:
@@ -253,7 +260,7 @@ def _signature(laplacian, parts, spectrum, progress):
     return spectrum.eigenvectors[:, constant : count - 1] * ((1.0 - values / last) / np.sqrt(values))
 
 
-def _deal(parts, areas):
+def _deal(parts: int, areas: Array) -> Ints:
     """Deal parts out to components: one to each, each other one where the area per part is largest then."""
     share = np.ones(len(areas), dtype=int)
     for _ in range(parts - len(areas)):
@@ -261,11 +268,11 @@ def _deal(parts, areas):
     return share
 
 
-def _areas_of_places(laplacian, graph):
+def _areas_of_places(laplacian: LaplaceBeltrami, graph: NearGraph) -> Array:
     return np.bincount(graph.place[graph.place >= 0], laplacian.areas[graph.place >= 0], minlength=len(graph.first))
 
 
-def _cluster(signature, weight, count):
+def _cluster(signature: Floats, weight: Floats, count: int) -> Ints:
     """Cluster points, (m, modes), and return labels, (m,); what is far too small for a part is left to the others."""
     for _ in range(_ROUNDS):
         centers = _k_means(signature, weight, count)
@@ -278,7 +285,7 @@ def _cluster(signature, weight, count):
     return label
 
 
-def _k_means(signature, weight, count):
+def _k_means(signature: Floats, weight: Floats, count: int) -> Floats:
     """Return the centers, (count, modes), of the better clusters that Lloyd's steps find from two starts.
 
     One start are points far from each other, which are the ends of limbs; the other halves the most scattered cluster
@@ -291,7 +298,7 @@ def _k_means(signature, weight, count):
     return _lloyd(points, weight, found[0], 0.0)[0]
 
 
-def _far_points(points, weight, count):
+def _far_points(points: Floats, weight: Floats, count: int) -> Floats:
     """Return the point farthest from the middle of all, then again and again the one farthest from those."""
     chosen = [points[np.argmax(_squares(points, weight @ points / weight.sum()))]]
     away = np.full(len(points), np.inf)
@@ -301,7 +308,7 @@ def _far_points(points, weight, count):
     return np.array(chosen)
 
 
-def _halves(points, weight, count):
+def _halves(points: Floats, weight: Floats, count: int) -> Floats:
     """Return the centers of clusters that halving across the axis of largest scatter gives."""
     clusters = [np.arange(len(points))]
     axes = [_main_axis(points, weight)]
@@ -315,7 +322,7 @@ def _halves(points, weight, count):
     return np.array([middle for _, middle, _ in axes])
 
 
-def _main_axis(points, weight):
+def _main_axis(points: Floats, weight: Floats) -> tuple[float, Floats, Floats]:
     """Return the scatter along the axis where it is largest, the middle of the points, and the axis."""
     if not len(points):
         return 0.0, np.zeros(points.shape[1]), np.zeros(points.shape[1])
@@ -325,9 +332,9 @@ def _main_axis(points, weight):
     return scatter[-1], middle, axes[:, -1]
 
 
-def _lloyd(points, weight, centers, rtol):
+def _lloyd(points: Floats, weight: Floats, centers: Floats, rtol: float) -> tuple[Floats, float]:
     """Move centers to the means of their clusters until these stay, or their squares fall by less than rtol."""
-    centers, total, label = centers.copy(), np.inf, None
+    centers, total, label = centers.copy(), np.inf, np.zeros(0, dtype=int)
     for _ in range(_STEPS):
         last, label = label, _nearest(points, centers)
         share = sparse.csr_array((weight, (label, np.arange(len(label)))), shape=(len(centers), len(label)))
@@ -343,15 +350,15 @@ def _lloyd(points, weight, centers, rtol):
     return centers, total
 
 
-def _nearest(points, centers):
+def _nearest(points: Floats, centers: Floats) -> Ints:
     return (np.sum(centers**2, axis=1) - 2.0 * (points @ centers.T)).argmin(axis=1)
 
 
-def _squares(points, center):
+def _squares(points: Floats, center: Floats) -> Floats:
     return np.sum((points - center) ** 2, axis=1)
 
 
-def _main_pieces(lengths, part, areas):
+def _main_pieces(lengths: sparse.csr_array, part: Ints, areas: Floats) -> Ints:
     """Keep the label of each part on its connected piece of the largest area, -1 elsewhere."""
     piece = _pieces(lengths, part)
     size = np.bincount(piece, areas)
@@ -361,7 +368,7 @@ def _main_pieces(lengths, part, areas):
     return np.where(main[part] == piece, part, -1)
 
 
-def _hills(lengths, sign, size, threshold, bridge):
+def _hills(lengths: sparse.csr_array, sign: Ints, size: Floats, threshold: float, bridge: float) -> Ints:
     """Number the hills of a function's size, by what hangs together above lower and lower levels; -1 for no hill.
 
     Hills of one sign that meet at a level become one, unless the level is below a share `bridge` of both.
@@ -396,14 +403,14 @@ def _hills(lengths, sign, size, threshold, bridge):
     return hill
 
 
-def _keep_edges(lengths, label):
+def _keep_edges(lengths: sparse.csr_array, label: Ints) -> sparse.csr_array:
     """Return the graph without edges between different labels, or from labels below zero."""
     edges = lengths.tocoo()
     kept = (label[edges.row] == label[edges.col]) & (label[edges.row] >= 0)
     return sparse.csr_array((edges.data[kept], (edges.row[kept], edges.col[kept])), shape=lengths.shape)
 
 
-def _pieces(lengths, label):
+def _pieces(lengths: sparse.csr_array, label: Ints) -> Ints:
     """Number the connected pieces of equal label; labels below zero stay -1."""
     piece, known = connected_components(_keep_edges(lengths, label), directed=False)[1], label >= 0
     result = np.full(len(label), -1)
@@ -411,7 +418,7 @@ def _pieces(lengths, label):
     return result
 
 
-def _join_nearest(lengths, label):
+def _join_nearest(lengths: sparse.csr_array, label: Ints) -> Ints:
     """Give every place of label -1 that a path leads to the label of the nearest place that has one."""
     start = np.flatnonzero(label >= 0)
     if len(start) in (0, len(label)):
@@ -423,7 +430,7 @@ def _join_nearest(lengths, label):
     return result
 
 
-def _by_size(graph, label, values):
+def _by_size(graph: NearGraph, label: Ints, values: Floats) -> Ints:
     """Return labels for the caller's points, numbered by how many points have them, and by mean values among equals."""
     label = graph.scatter(label, -1)
     known = label >= 0

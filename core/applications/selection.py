@@ -1,11 +1,16 @@
 """Sets of points: grown by distance along the surface, and around its ends."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import dijkstra
 
-from ..arguments import as_array, as_doubles, real
-from ..errors import InvalidPointsError, PointCloudError
+from ..arguments import as_doubles, check_array, real
+from ..errors import PointCloudError
 from ..geometry import as_mask
+from ..operator import LaplaceBeltrami
+from ..types import Bools, Floats, Ints
 from .geodesics import Geodesics
 from .graph import near_graph
 
@@ -13,7 +18,7 @@ _OBLIQUE = 3.0  # slope to the ray of a surface whose points are told from those
 _NEIGHBORS = 20  # so many directions make paths at most 2 % longer than the way along the surface
 
 
-def grow(laplacian, chosen, distance):
+def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bools:
     """Add all points within a distance along the surface to a set of points.
 
     Distances are those of `geodesic_distance`, so that the set does not jump to another sheet, or another component,
@@ -51,9 +56,7 @@ def grow(laplacian, chosen, distance):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> print(core.grow(laplacian, [0], np.pi / 3).mean().round(2))
     0.25
@@ -68,7 +71,7 @@ def grow(laplacian, chosen, distance):
     return mask | np.isfinite(Geodesics(laplacian).distance(sources, limit=reach))
 
 
-def front_point(points, eye, direction, reach):
+def front_point(points: ArrayLike, eye: ArrayLike, direction: ArrayLike, reach: float) -> int:
     """Find the point that one sees along a ray: the nearest to the eye among those around it.
 
     Of points of one surface it is the one that is nearest to the ray.
@@ -102,9 +105,7 @@ def front_point(points, eye, direction, reach):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> seen = core.front_point(points, eye=[0, 0, 5], direction=[0, 0, -1], reach=0.25)
     >>> print(points[seen, 2].round(1))
     1.0
@@ -124,18 +125,13 @@ def front_point(points, eye, direction, reach):
     return int(near[(depth + _OBLIQUE * away)[near].argmin()]) if len(near) else -1
 
 
-def _vectors(given, name, dimensions):
+def _vectors(given: Any, name: str, dimensions: int) -> Floats:
     """Return one vector, (3,), or several, (n, 3), in double precision; their numbers may be infinite or none."""
-    array = as_array(given, name.capitalize())
-    if array.ndim != dimensions or array.shape[-1] != 3 or array.dtype.kind not in "iuf":
-        wanted = "(n, 3)" if dimensions == 2 else "(3,)"
-        raise InvalidPointsError(
-            f"The {name} have the shape {array.shape} and type {array.dtype}. Give numbers {wanted}."
-        )
-    return as_doubles(array)
+    shape, text = ((None, 3), "(n, 3)") if dimensions == 2 else ((3,), "(3,)")
+    return as_doubles(check_array(given, name.capitalize(), [shape], f"Give numbers {text}."))
 
 
-def opposite_ends(laplacian, share=0.03):
+def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints, Ints]:
     """Choose the points around both ends of the longest way along the surface, on its largest component.
 
     From anywhere the point that is farthest along the surface is such an end, and the one that is farthest from there
@@ -171,9 +167,7 @@ def opposite_ends(laplacian, share=0.03):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> one, other = core.opposite_ends(laplacian, share=0.05)
     >>> print((points[one].mean(axis=0) @ points[other].mean(axis=0)).round(1))
@@ -186,14 +180,14 @@ def opposite_ends(laplacian, share=0.03):
     largest = np.flatnonzero(component == np.bincount(component[known], weights=areas[known]).argmax())
     graph = near_graph(laplacian, _NEIGHBORS)
 
-    def ways(start):
+    def ways(start: int) -> Floats:
         return dijkstra(graph.lengths, directed=False, indices=graph.place[start])[graph.place[largest]]
 
     offset = laplacian.points[largest] - laplacian.points[largest].mean(axis=0)
     one = ways(largest[np.einsum("ij,ij->i", offset, offset).argmax()]).argmax()
     from_one = ways(largest[one])
     from_other = ways(largest[from_one.argmax()])
-    ends = []
+    ends: list[Ints] = []
     for near, far in ((from_one, from_other), (from_other, from_one)):
         order = np.argsort(near, kind="stable")
         order = order[near[order] < far[order]]
@@ -203,4 +197,5 @@ def opposite_ends(laplacian, share=0.03):
                 f"{len(largest)} points of the largest component are too few for two ends. Choose handles yourself."
             )
         ends.append(np.sort(largest[order[: max(count, 3)]]))
-    return tuple(ends)
+    first, second = ends
+    return first, second

@@ -4,12 +4,16 @@ import numpy as np
 from scipy import sparse
 
 from ..geometry import ON, SMOOTH
+from ..operator import Heights, ImplicitSurface
+from ..types import Floats, Ints
 
 _FAINT = 0.1  # what an edge far from all points tells for one side, beside one next to them
 _PAST = 1.0  # how far beyond the boundary a surface has no sides
 
 
-def find_sides(surface, there, places, first, second, around):
+def find_sides(
+    surface: ImplicitSurface, there: Heights, places: Floats, first: Ints, second: Ints, around: bool
+) -> Floats:
     """Tell on which of two sides places near a surface are.
 
     Each edge between two places tells whether its ends are on one side or on two, by the quadrics of the points next to
@@ -39,7 +43,7 @@ def find_sides(surface, there, places, first, second, around):
     return np.where(votes[group] < 0.0, -side, side)
 
 
-def _told(surface, there, places, first, second, around):
+def _told(surface: ImplicitSurface, there: Heights, places: Floats, first: Ints, second: Ints, around: bool) -> Floats:
     """Return by how much each edge tells that its ends are on one side; negative for two, (e,).
 
     An end that is close to the surface tells little. That a quadric is cut counts as far as points support it, so that
@@ -63,7 +67,7 @@ def _told(surface, there, places, first, second, around):
     return np.where(unknown, 0.0, told)
 
 
-def agreeing(count, first, second, told):
+def agreeing(count: int, first: Ints, second: Ints, told: Floats) -> tuple[Floats, Ints]:
     """Choose signs that edges tell to agree or, where negative, to differ: in each round what tells most for a group.
 
     Parameters

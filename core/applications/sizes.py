@@ -1,8 +1,13 @@
 """Areas and volumes of surfaces whose points move, and the scale that keeps them."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from ..errors import PointCloudError, SolverError
+from ..operator import LaplaceBeltrami
+from ..types import Array, Bools, Floats
 
 _SCALE = 4.0  # a shape is not scaled by more than this, or its inverse
 _ROUNDS = 30  # of the secant steps that find the scale
@@ -17,7 +22,7 @@ class SurfaceSize:
     normal. What the kernel's width does to P cancels in the quotient with that of the surface before.
     """
 
-    def __init__(self, laplacian, kind):
+    def __init__(self, laplacian: LaplaceBeltrami, kind: str) -> None:
         """Prepare for one operator; kind is "area" or "volume"; `before` holds the sizes before the points move.
 
         Raises
@@ -27,7 +32,7 @@ class SurfaceSize:
         """
         self.laplacian, self.kind = laplacian, kind
         self.known = laplacian.component >= 0
-        self.factor, self.before = np.ones(self.known.sum()), None
+        self.factor: Floats = np.ones(self.known.sum())
         growth, _ = self._metric(laplacian.surface_points)
         self.factor = 1.0 / np.where(growth > 0.0, growth, 1.0)
         areas, normals = laplacian.areas[self.known], laplacian.normals[self.known]
@@ -41,12 +46,12 @@ class SurfaceSize:
                     " normals. Let the normals point outwards everywhere, or keep the area."
                 )
 
-    def __call__(self, moved):
+    def __call__(self, moved: Floats) -> Floats:
         """Return the size of each component for new places of all points, (components,)."""
         growth, normals = self._metric(moved)
         return self._sizes(moved, self.laplacian.areas[self.known] * growth, normals)
 
-    def _metric(self, places):
+    def _metric(self, places: Floats) -> tuple[Floats, Floats]:
         laplacian, known = self.laplacian, self.known
         x = places - places[known].mean(axis=0)
         a, b = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]).T
@@ -59,12 +64,12 @@ class SurfaceSize:
         side = np.where(np.einsum("ic,ic->i", normals, laplacian.normals[known]) < 0.0, -1.0, 1.0)
         return np.sqrt(np.maximum(values[:, 1] * values[:, 2], 0.0)) * self.factor, side[:, None] * normals
 
-    def _sizes(self, places, areas, normals):
+    def _sizes(self, places: Floats, areas: Floats, normals: Floats) -> Array:
         if self.kind == "area":
             return np.bincount(self.laplacian.component[self.known], areas)
         return self._along_axes(places, areas, normals).mean(axis=1)
 
-    def _along_axes(self, places, areas, normals):
+    def _along_axes(self, places: Any, areas: Any, normals: Any) -> Any:
         """Return the volume of each component by the divergence of (x, 0, 0), (0, y, 0) and (0, 0, z), (c, 3)."""
         component = self.laplacian.component[self.known]
         total = np.bincount(component)
@@ -75,7 +80,7 @@ class SurfaceSize:
         return np.column_stack(columns)
 
 
-def match_size(size, wanted, touched):
+def match_size(size: Callable[..., Any], wanted: Floats, touched: Bools) -> Floats:
     """Return the scale of each component at which its size is the one wanted, by secant steps on all of them together.
 
     Raises

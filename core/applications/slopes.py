@@ -1,12 +1,15 @@
 """Slopes of values along the surface, by which a point tells of what lies around it."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
-from ..arguments import as_array, as_doubles, check_positions
-from ..errors import InvalidPointsError
+from ..arguments import as_array, as_doubles, check_array, check_positions
 from ..geometry import Discs, frames
+from ..types import Floats
 from .gradients import lifted_inverse
 
 _COUNT = 12  # neighbours: two rings of an even sample
@@ -50,15 +53,14 @@ class Slopes:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> slopes = core.Slopes(points, core.surface_discs(points)).of(z)
     >>> print(slopes[abs(z) < 0.1].mean(axis=0).round(1) + 0.0)
     [0. 0. 1.]
     """
 
-    def __init__(self, points, discs: Discs):
+    def __init__(self, points: ArrayLike, discs: Discs) -> None:
         given = as_array(points, "Points")
         self._points = check_positions(given, len(given) if given.ndim else 0, "points", "point")
         self._points -= self._points.mean(axis=0) if len(self._points) else 0.0
@@ -66,26 +68,22 @@ class Slopes:
         found = range(1, min(_COUNT, max(len(self._points) - 1, 0)) + 2)  # the point itself first
         self._near = cKDTree(self._points).query(self._points, k=found, workers=-1)[1].astype(np.int32)
 
-    def of(self, values):
+    def of(self, values: Any) -> Floats:
         """Return the slopes of values, (n,), as vectors in the tangent planes, (n, 3) [1/L].
 
         Values that are not finite count as unknown, and have none.
         """
-        given = as_array(values, "Values")
-        if given.shape != (len(self._points),) or given.dtype.kind not in "iufb":
-            raise InvalidPointsError(
-                f"Values have the shape {given.shape} and type {given.dtype}, and there are {len(self._points)} points."
-                " Give one real number per point."
-            )
+        count = len(self._points)
+        given = check_array(values, "Values", [(count,)], f"Give one real number for each of {count} points.", "iufb")
         values, slopes = as_doubles(given), np.zeros(self._points.shape)
 
-        def find(rows):
+        def find(rows: Any) -> None:
             slopes[rows] = self._found(rows, values)
 
         on_all_cores(find, blocks(len(values), _BLOCK))
         return slopes
 
-    def _found(self, rows, values):
+    def _found(self, rows: Any, values: Floats) -> Floats:
         """Return the slopes at some points."""
         near, radii = self._near[rows], self._discs.radii[rows, None]
         axes = frames(self._discs.normals[rows])
@@ -98,7 +96,7 @@ class Slopes:
         return np.einsum("nac,nc->na", axes[:, :, 1:], np.divide(slope, radii, out=slope, where=radii > 0.0))
 
 
-def _fit(flat, height, rise):
+def _fit(flat: list[Floats], height: Floats, rise: Floats) -> Floats:
     """Fit quadratic functions to rises from points to their neighbours, (n, k); return their slopes, limited, (n, 2).
 
     Neighbours are given by their two steps in the tangent plane and their height above it, (n, k) each in radii.
@@ -124,19 +122,19 @@ def _fit(flat, height, rise):
     return slope * np.maximum(_limit(slope, rise), _freedom(weight, rise, missed))[:, None]
 
 
-def _determinant(sums):
+def _determinant(sums: Floats) -> Floats:
     """Return the determinants of the first two columns of matrices, (n, 2, 3)."""
     return sums[:, 0, 0] * sums[:, 1, 1] - sums[:, 0, 1] * sums[:, 1, 0]
 
 
-def _limit(slope, rise):
+def _limit(slope: Floats, rise: Floats) -> Floats:
     """Return which share of slopes stays within the range of the rises to neighbours, (n,)."""
     steep = np.hypot(*slope.T)
     room = np.maximum(np.minimum(rise.max(axis=1), -rise.min(axis=1)), 0.0)
     return np.divide(room, steep, out=np.ones_like(steep), where=steep > room)
 
 
-def _freedom(weight, rise, missed):
+def _freedom(weight: Floats, rise: Floats, missed: Floats) -> Floats:
     """Return how far a fit is to be trusted, (n,): 1 where it misses nothing, 0 and less where it misses much."""
     total, lost = (np.einsum("nk,nk->n", weight, part**2) for part in (rise, missed))
     return 1.0 - _UNFIT * np.divide(lost, total, out=np.zeros_like(total), where=total > 0.0)

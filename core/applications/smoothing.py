@@ -3,7 +3,10 @@
 And how far they are from the smooth ones.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -11,6 +14,8 @@ from ..algebra import solve_symmetric
 from ..arguments import check_switches, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
+from ..operator import LaplaceBeltrami, Spectrum
+from ..types import Floats, Progress, Response
 from .filters import chebyshev_filter, fairing, spectral_filter
 from .sizes import SurfaceSize, match_size
 
@@ -21,17 +26,17 @@ _AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 
 def smooth_points(
-    laplacian,
-    response,
-    spectrum=None,
+    laplacian: LaplaceBeltrami,
+    response: int | Response,
+    spectrum: Spectrum | None = None,
     *,
-    strength=1.0,
-    mask=None,
-    keep=None,
-    dirichlet=False,
-    progress=None,
-    base=None,
-):
+    strength: float = 1.0,
+    mask: ArrayLike | None = None,
+    keep: str | None = None,
+    dirichlet: bool = False,
+    progress: Progress | None = None,
+    base: Floats | None = None,
+) -> Floats:
     """Filter the shape of the surface by frequency.
 
     The coordinates are three functions on the points. Each component keeps its centre, so that the result moves
@@ -94,9 +99,7 @@ def smooth_points(
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> smaller = core.smooth_points(laplacian, core.exponential(0.1))
     >>> print(np.linalg.norm(smaller, axis=1).mean().round(2))
@@ -110,11 +113,11 @@ def smooth_points(
     blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
     base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
     rest = laplacian.points - base
-    if spectrum is None and callable(response):
+    if callable(response) and spectrum is None:
         filtered = chebyshev_filter(
             laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
         )
-    elif callable(response):
+    elif callable(response) and spectrum is not None:
         end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
         filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
     else:
@@ -131,17 +134,17 @@ def smooth_points(
 
 
 def fair_points(
-    laplacian,
-    time=None,
+    laplacian: LaplaceBeltrami,
+    time: float | None = None,
     *,
-    order=3,
-    strength=1.0,
-    mask=None,
-    keep=None,
-    dirichlet=False,
-    progress=None,
-    base=None,
-):
+    order: int = 3,
+    strength: float = 1.0,
+    mask: None = None,
+    keep: str | None = None,
+    dirichlet: bool = False,
+    progress: Progress | None = None,
+    base: None = None,
+) -> Floats:
     """Smooth the surface by an implicit step, without eigenvectors: for noise, also on large clouds.
 
     Solves ``(1 + (time L)^order) x = x0`` with the negated operator L, whose eigenvalues are the symbol-corrected ones.
@@ -192,9 +195,7 @@ def fair_points(
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
     >>> smooth = core.fair_points(core.build_laplacian(noisy))
     >>> print(np.linalg.norm(noisy, axis=1).std().round(3), np.linalg.norm(smooth, axis=1).std().round(3))
@@ -215,7 +216,9 @@ def fair_points(
     )
 
 
-def roughness(laplacian, wavelength=None, *, progress=None):
+def roughness(
+    laplacian: LaplaceBeltrami, wavelength: float | None = None, *, progress: Progress | None = None
+) -> Floats:
     """Measure how far the points stick out of the smooth surface.
 
     Parameters
@@ -250,9 +253,7 @@ def roughness(laplacian, wavelength=None, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> points[400] *= 1.02
     >>> rough = core.roughness(core.build_laplacian(points))
     >>> print(np.argmax(np.abs(rough)), rough[400].round(2))
@@ -267,7 +268,9 @@ def roughness(laplacian, wavelength=None, *, progress=None):
     return np.einsum("ij,ij->i", laplacian.points - smooth, laplacian.normals)
 
 
-def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
+def displace_by_mode(
+    laplacian: LaplaceBeltrami, mode: ArrayLike, amplitude: float | None = None, *, phase: float = 0.0
+) -> Floats:
     """Move the points along their normals by a vibration mode (Figure 9 of the paper).
 
     Parameters
@@ -304,9 +307,8 @@ def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
+    >>> z = points[:, 2]
     >>> laplacian = core.build_laplacian(points)
     >>> moved = core.displace_by_mode(laplacian, z, 0.2)
     >>> print(moved[:, 2].min().round(1), moved[:, 2].max().round(1))
@@ -325,7 +327,7 @@ def displace_by_mode(laplacian, mode, amplitude=None, *, phase=0.0):
     return points + (most * np.cos(angle)) * (mode / largest)[:, None] * laplacian.normals
 
 
-def smoothing_base(laplacian, *, dirichlet=False, progress=None):
+def smoothing_base(laplacian: LaplaceBeltrami, *, dirichlet: bool = False, progress: Progress | None = None) -> Floats:
     """Return the part of the points' places that filters leave alone.
 
     Parameters
@@ -364,7 +366,7 @@ def smoothing_base(laplacian, *, dirichlet=False, progress=None):
     return base
 
 
-def _centers(laplacian, weights):
+def _centers(laplacian: LaplaceBeltrami, weights: Floats) -> Floats:
     """Return the weighted mean of the points of each component, (components, 3); that of weight zero is not used."""
     known = laplacian.component >= 0
     component, weights = laplacian.component[known], weights[known]
@@ -374,7 +376,7 @@ def _centers(laplacian, weights):
     return np.column_stack(sums) / total[:, None]
 
 
-def boundary_places(laplacian):
+def boundary_places(laplacian: LaplaceBeltrami) -> Floats:
     """Return the place on the boundary nearest to every point next to one, (n, 3) [L]; other rows are the points
     themselves.
 
@@ -432,7 +434,15 @@ class PointBlend:
         A mask, strength or choice that makes no sense.
     """
 
-    def __init__(self, laplacian, *, strength=1.0, mask=None, keep=None, dirichlet=False):
+    def __init__(
+        self,
+        laplacian: LaplaceBeltrami,
+        *,
+        strength: Any = 1.0,
+        mask: ArrayLike | None = None,
+        keep: str | None = None,
+        dirichlet: bool | float = False,
+    ) -> None:
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         check_switches(dirichlet=dirichlet)
@@ -461,7 +471,7 @@ class PointBlend:
                 f"Components that have a boundary and enclose no volume: {components}. Keep the area instead."
             )
 
-    def __call__(self, filtered):
+    def __call__(self, filtered: Floats) -> Floats:
         """Return the result for filtered places.
 
         Parameters
@@ -486,7 +496,7 @@ class PointBlend:
         component = np.where(known, self.laplacian.component, 0)
         center = _centers(self.laplacian, self.laplacian.areas * self.mask)[component]
 
-        def result(scale):
+        def result(scale: Floats) -> Floats:
             return points + self.weights[:, None] * (center + scale[component][:, None] * (filtered - center) - points)
 
         measure = SurfaceSize(self.laplacian, self.keep)

@@ -1,12 +1,17 @@
 """Directions carried along the surface, and maps of it around a point."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..algebra import TwoGrid, blocks, on_all_cores
-from ..arguments import as_array, as_doubles
+from ..arguments import as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError
 from ..geometry import as_indices
-from ..operator import connection_laplacian, tangent_frames
+from ..operator import LaplaceBeltrami, connection_laplacian, tangent_frames
+from ..types import Array, Floats, Progress
 from .geodesics import Geodesics
 
 _TIME = 2.0  # smoothing lengths that heat spreads over: with fewer, the randomness of points is not averaged out
@@ -14,7 +19,9 @@ _FARTHEST = 200.0  # times as far the object may reach, or the heat there is bel
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 
 
-def transport(laplacian, sources, directions, *, progress=None):
+def transport(
+    laplacian: LaplaceBeltrami, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None
+) -> Floats:
     """Carry directions at some points along the surface to all others.
 
     Parameters
@@ -57,9 +64,7 @@ def transport(laplacian, sources, directions, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> direction = core.transport(laplacian, [0], [1, 0, 0])
     >>> ahead = np.argmax(points[:, 0])
@@ -100,18 +105,17 @@ class Transport:
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> carried = core.Transport(core.build_laplacian(points))
     >>> print(np.abs(carried.extend([0], [1, 0, 0]) + carried.extend([0], [-1, 0, 0])).max().round(6))
     0.0
     """
 
-    def __init__(self, laplacian, *, progress=None):
+    def __init__(self, laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> None:
         report = progress or _silent
         report("Equations", 0.0)
-        self._laplacian, self._geodesics = laplacian, None
+        self._laplacian = laplacian
+        self._geodesics: Geodesics | None = None
         self.frames = tangent_frames(laplacian.normals)
         areas = laplacian.areas
         reach = max(
@@ -124,7 +128,7 @@ class Transport:
         )
         self._flow = TwoGrid(flow, mass, laplacian.points, report)
 
-    def extend(self, sources, directions, *, progress=None):
+    def extend(self, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None) -> Floats:
         """Carry directions to all points; see `transport`.
 
         Parameters
@@ -151,14 +155,9 @@ class Transport:
         index = as_indices(sources, len(self.frames), "sources")
         if not len(index):
             raise InvalidPointsError("There are no points with directions. Choose at least one point.")
-        directions = as_array(directions, "Directions")
-        numbers = directions.dtype.kind in "iuf"
-        directions = as_doubles(directions) if numbers else directions
-        if not numbers or directions.shape not in ((3,), (len(index), 3)) or not np.isfinite(directions).all():
-            raise InvalidPointsError(
-                f"The directions have the shape {directions.shape}, or are not finite numbers. Give three of these for"
-                f" each of {len(index)} points."
-            )
+        advice = f"Give three numbers for each of {len(index)} points."
+        directions = as_doubles(check_array(directions, "Directions", [(3,), (len(index), 3)], advice))
+        check_finite(directions.reshape(-1, 3), "directions", advice)
         given = np.einsum("ij,ij->i", np.broadcast_to(directions, (len(index), 3)), self.frames[index])
         size = np.abs(given)
         wrong = np.count_nonzero(size <= 1e-9 * np.linalg.norm(directions, axis=-1))
@@ -173,7 +172,14 @@ class Transport:
         size = np.abs(found)
         return np.einsum("i,ij->ij", found.conj() / np.where(size > 0.0, size, 1.0), self.frames).real
 
-    def logarithmic_map(self, source, direction=None, *, geodesics=None, progress=None):
+    def logarithmic_map(
+        self,
+        source: int,
+        direction: ArrayLike | None = None,
+        *,
+        geodesics: Geodesics | None = None,
+        progress: Progress | None = None,
+    ) -> Floats:
         """Lay the surface out flat around a point; see `logarithmic_map`.
 
         Parameters
@@ -220,7 +226,9 @@ class Transport:
         return np.column_stack([place.real, place.imag])
 
 
-def logarithmic_map(laplacian, source, direction=None, *, progress=None):
+def logarithmic_map(
+    laplacian: LaplaceBeltrami, source: int, direction: ArrayLike | None = None, *, progress: Progress | None = None
+) -> Floats:
     """Lay the surface out flat around a point: polar coordinates by distance and direction along the surface.
 
     Parameters
@@ -266,9 +274,7 @@ def logarithmic_map(laplacian, source, direction=None, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> place = core.logarithmic_map(core.build_laplacian(points), 0)
     >>> print(place[0], np.hypot(*place.T).max().round(1))
     [0. 0.] 3.1
@@ -276,13 +282,13 @@ def logarithmic_map(laplacian, source, direction=None, *, progress=None):
     return Transport(laplacian, progress=progress).logarithmic_map(source, direction, progress=progress)
 
 
-def _gradient(laplacian, frames, values, report):
+def _gradient(laplacian: LaplaceBeltrami, frames: Array, values: Floats, report: Callable[..., Any]) -> Array:
     """Return the gradient of a function, (n,) complex in the frames, by least squares over all pairs."""
     stiffness = laplacian.stiffness
     places, axes = np.ascontiguousarray(laplacian.surface_points.T), np.ascontiguousarray(frames.T)
     result = np.empty(len(values), dtype=complex)
 
-    def fit(rows):
+    def fit(rows: Any) -> None:
         start = stiffness.indptr[rows.start : rows.stop + 1]
         second, weight = stiffness.indices[start[0] : start[-1]], -stiffness.data[start[0] : start[-1]]
         own = np.repeat(np.arange(len(start) - 1), np.diff(start))  # a pair of a point with itself has no length
@@ -290,7 +296,7 @@ def _gradient(laplacian, frames, values, report):
         u, v = (np.einsum("ak,ak->k", offset, axis[:, rows].take(own, axis=1)) for axis in (axes.real, axes.imag))
         rise = values[second] - values[rows][own]
 
-        def total(left, right):
+        def total(left: Floats, right: Floats) -> Array:
             return np.bincount(own, weight * left * right, minlength=len(start) - 1)
 
         xx, xy, yy, x, y = total(u, u), total(u, v), total(v, v), total(rise, u), total(rise, v)
@@ -302,5 +308,5 @@ def _gradient(laplacian, frames, values, report):
     return result
 
 
-def _silent(stage, fraction):
+def _silent(stage: str, fraction: float) -> None:
     """Report nothing."""

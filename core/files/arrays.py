@@ -2,6 +2,8 @@
 
 import re
 import zipfile
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +20,7 @@ _RATIO = 100  # of an unpacked to a packed array; those of points have 1 to 20 .
 _HARMLESS = 64e6  # ... or fewer bytes than this
 
 
-def read_array(path) -> PointTable:
+def read_array(path: Path) -> PointTable:
     """Read an array (n, 3), or the one named points among several, whatever the file is called.
 
     Raises
@@ -53,7 +55,7 @@ def read_array(path) -> PointTable:
                 return _read_rows(member, path, unpacked)
 
 
-def _read_rows(file, path, size):
+def _read_rows(file: Any, path: Path, size: int) -> PointTable:
     """Read an array (n, 3) of a file, or a part of one, that has so many bytes, and take memory for no more.
 
     The header is not given to numpy, which reads it as Python.
@@ -61,8 +63,14 @@ def _read_rows(file, path, size):
     start = file.read(8)
     length = int.from_bytes(file.read(2 if start[6:7] == b"\x01" else 4), "little")
     header = file.read(length).decode("latin-1") if length <= _LONGEST else ""
-    found = [re.search(rf"'{name}'\s*:\s*({value})", header.replace('"', "'")) for name, value in _FIELDS.items()]
-    if not start.startswith(_MAGIC) or None in found:
+    found = [
+        match
+        for match in (
+            re.search(rf"'{name}'\s*:\s*({value})", header.replace('"', "'")) for name, value in _FIELDS.items()
+        )
+        if match
+    ]
+    if not start.startswith(_MAGIC) or len(found) < len(_FIELDS):
         raise InvalidPointsError(f"{path} holds no array of points. Save it again with numpy.")
     kind, columnwise, shape = (match[1] for match in found)
     rows = re.fullmatch(_ROWS, shape)

@@ -24,7 +24,7 @@ LETTERS = str.maketrans(  # where leaving out an accent does not do
 )
 
 
-def ascii_words(names) -> list:
+def ascii_words(names: list[str]) -> list[str]:
     """Return names as words of ASCII, in their order, with numbers where they would be the same.
 
     Parameters
@@ -44,7 +44,7 @@ def ascii_words(names) -> list:
     return result
 
 
-def _ascii_word(name):
+def _ascii_word(name: str) -> str:
     """Return a name without accents, and _ in place of what is no letter, digit or sign of ASCII."""
     composed = unicodedata.normalize("NFKC", name).translate(LETTERS)
     letters = "".join(letter for letter in unicodedata.normalize("NFKD", composed) if not unicodedata.combining(letter))

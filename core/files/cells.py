@@ -1,15 +1,17 @@
 """Rows of text to columns of numbers: what separates them, quotes, decimal commas, and cells without a number."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array, Floats, Ints
 from .lines import brief, is_number
 
 _DELIMITERS = (";", "\t", "|", None, ",")  # in this order; None is white space
@@ -44,12 +46,12 @@ class Rows:
         Whether cells without a number are read as NaN.
     """
 
-    blocks: Callable
+    blocks: Callable[..., Any]
     path: Path
     first: int
     delimiter: str | None
-    before: list
-    sample: list = field(default_factory=list)
+    before: list[str]
+    sample: list[Any] = field(default_factory=list)
     filled: bool = False
 
     @property
@@ -57,17 +59,17 @@ class Rows:
         """Return the number of columns, of the longest row of the sample."""
         return max(map(len, self.sample))
 
-    def lines(self):
+    def lines(self) -> Any:
         """Yield the lines from the first row on."""
         return islice(chain.from_iterable(self.blocks()), self.first, None)
 
 
-def is_comment(line) -> bool:
+def is_comment(line: str) -> bool:
     """Tell whether a line is marked as a comment."""
     return line.lstrip().startswith(_COMMENTS)
 
 
-def find_rows(blocks, path) -> Rows:
+def find_rows(blocks: Callable[..., Any], path: Path) -> Rows:
     """Find the first line with three numbers, and what separates them.
 
     Raises
@@ -75,7 +77,8 @@ def find_rows(blocks, path) -> Rows:
     InvalidPointsError
         There is none, or too much stands before it.
     """
-    before, texts = [], 0
+    before: list[str] = []
+    texts = 0
     lines = chain.from_iterable(blocks())
     for number, line in enumerate(lines):
         if not line.strip():
@@ -94,7 +97,7 @@ def find_rows(blocks, path) -> Rows:
     raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {problem}. Correct the file.")
 
 
-def _is_row(words):
+def _is_row(words: list[str]) -> bool:
     """Tell whether words are those of a point: three numbers, of which cells may lack one; not numbers of columns.
 
     As pandas writes them, with an empty name for that of rows.
@@ -104,12 +107,12 @@ def _is_row(words):
     return not numbered and (numbers >= 3 or (numbers == 2 and "" in words))
 
 
-def is_numeric(words) -> bool:
+def is_numeric(words: list[str]) -> bool:
     """Tell whether there are numbers among words, and nothing else."""
     return any(map(is_number, words)) and all(is_number(word) or _IS_MISSING.fullmatch(word) for word in words)
 
 
-def split_row(line, delimiter) -> list:
+def split_row(line: str, delimiter: str | None) -> list[str]:
     """Split a line without its comment, with decimal points; no words if the delimiter cannot be meant."""
     line = _unquoted(_unmarked(line.replace("#N/A", "")), delimiter).split("#")[0].split("//")[0].strip(" ")
     if delimiter is None and re.search(r"\s,|,\s|,$", line):
@@ -119,13 +122,13 @@ def split_row(line, delimiter) -> list:
     return [word.strip() for word in line.split(delimiter)]
 
 
-def _unmarked(text):
+def _unmarked(text: str) -> str:
     """Return text with NaN and infinity as numpy reads them: in 1.#QNAN stands a # that begins no comment."""
     marked = "#" in text or "(" in text
     return _MARKED.sub(lambda match: "inf" if match[1] else "nan", text) if marked else text
 
 
-def _unquoted(text, delimiter):
+def _unquoted(text: str, delimiter: str | None) -> str:
     """Return text without quotes, and what they protect as it does no harm: a decimal comma as a point."""
     if '"' not in text:
         return text
@@ -133,9 +136,11 @@ def _unquoted(text, delimiter):
     return re.sub(r'"([^"\n]*)"', lambda match: match[1].replace(delimiter or " ", inside), text)
 
 
-def kinds(rows):
+def kinds(rows: Rows) -> tuple[list[int], list[int], list[int]]:
     """Return the indices of the columns that hold numbers, text, or nothing, in most rows of the sample."""
-    numeric, textual, empty = [], [], []
+    numeric: list[int] = []
+    textual: list[int] = []
+    empty: list[int] = []
     for index in range(rows.width):
         words = [row[index] for row in rows.sample if index < len(row)]
         there = [word for word in words if not _IS_MISSING.fullmatch(word)]
@@ -146,7 +151,9 @@ def kinds(rows):
     return numeric, textual, empty
 
 
-def load(rows, places, others, name):
+def load(
+    rows: Rows, places: list[int], others: list[int], name: Callable[..., Any]
+) -> tuple[list[Any], Floats, list[Any]]:
     """Read columns of numbers.
 
     A cell without a number becomes NaN, and a column in which another one holds text is left out, unless it is a place.
@@ -187,21 +194,21 @@ def load(rows, places, others, name):
     return [], _load(rows, places), notices
 
 
-def _refuse_places(faults, places, path):
+def _refuse_places(faults: dict[int, str], places: list[int], path: Path) -> None:
     """Refuse a file in which a place is text, or missing."""
     fatal = next((text for index, text in faults.items() if index in places and text), "")
     if fatal:
         raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {fatal}. Correct the file.") from None
 
 
-def _tell_faults(faults, name, path):
+def _tell_faults(faults: dict[int, str], name: Callable[..., Any], path: Path) -> list[str]:
     """Tell which columns are left out, and for what."""
     wrong = [name(index) for index, text in faults.items() if text]
     why = next(filter(None, faults.values()), "")
     return [f"{path.name}: left out {brief(', '.join(wrong))}, for {why}."] if wrong else []
 
 
-def load_whole(rows, index):
+def load_whole(rows: Rows, index: int) -> tuple[Ints | None, bool]:
     """Read a column of whole numbers that are too large for doubles.
 
     Returns
@@ -220,13 +227,13 @@ def load_whole(rows, index):
     return None, bool(np.char.isdecimal(np.char.lstrip(texts[texts != "nan"], "+-")).all())
 
 
-def _load(rows, columns, dtype=float):
+def _load(rows: Rows, columns: list[int], dtype: str | type[Any] = float) -> Array:
     clean = partial(_filled, columns=columns) if rows.filled else _plain
     lines = chain.from_iterable(clean(block, rows.delimiter) for block in _blocks(rows))
     return np.loadtxt(lines, dtype=dtype, delimiter=rows.delimiter, usecols=columns, ndmin=2)
 
 
-def _blocks(rows):
+def _blocks(rows: Rows) -> Iterator[list[str]]:
     """Yield the blocks of lines from the first row on."""
     left = rows.first
     for lines in rows.blocks():
@@ -235,7 +242,7 @@ def _blocks(rows):
         left = max(left - len(lines), 0)
 
 
-def _plain(lines, delimiter):
+def _plain(lines: list[str], delimiter: str | None) -> list[str]:
     """Return lines as numpy reads them: it knows comments with # alone, decimal points, and no quotes."""
     if delimiter is not None and any(map(str.isspace, lines)):
         lines = ["" if line.isspace() else line for line in lines]
@@ -250,7 +257,7 @@ def _plain(lines, delimiter):
     return (text.replace(",", ".") if commas else text).split("\n")
 
 
-def _filled(lines, delimiter, columns):
+def _filled(lines: list[str], delimiter: str | None, columns: list[int]) -> list[str]:
     """Return lines as numpy reads them, with NaN for cells without a number."""
     text = "\n".join(_plain([line.replace("#N/A", "") for line in lines], delimiter))
     text = re.sub("#.*", "", text)
@@ -267,7 +274,7 @@ def _filled(lines, delimiter, columns):
     return re.sub(gap, r"\1nan", "\n".join(lines)).split("\n") if lines else []
 
 
-def _find_faults(rows, places, others):
+def _find_faults(rows: Rows, places: list[int], others: list[int]) -> dict[int, str]:
     """Return what is wrong in the first row that lacks numbers: by column a text, which is empty for an empty cell."""
     for number, line in enumerate(rows.lines(), start=rows.first + 1):
         words = split_row(line, rows.delimiter) if line.strip() else []
@@ -277,20 +284,22 @@ def _find_faults(rows, places, others):
             continue
         faults = {}
         for index in places + others:
-            word = words[index] if index < len(words) else None
-            if word is None and (index in places or rows.delimiter is None):
+            word = words[index] if index < len(words) else ""
+            if index >= len(words) and (index in places or rows.delimiter is None):
                 faults[index] = f"line {number} has {len(words)} columns only"
-            elif not _IS_MISSING.fullmatch(word or ""):
+            elif not _IS_MISSING.fullmatch(word):
                 if not is_number(word):
                     faults[index] = f"line {number} has {brief(word)!r} where a number should be"
-            elif not rows.filled and not (word and is_number(word)):
+            elif not rows.filled and not is_number(word):
                 faults[index] = ""
         if faults:
             return faults
     return {}
 
 
-def _without_empty(rows, values, places, others, name, notices):
+def _without_empty(
+    rows: Rows, values: Floats, places: list[int], others: list[int], name: Callable[..., Any], notices: list[str]
+) -> tuple[list[Any], Floats, list[Any]]:
     """Leave out columns without any number, and tell how many cells of which others have none."""
     if not rows.filled:
         return others, values, notices

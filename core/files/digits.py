@@ -1,8 +1,11 @@
 """Whole numbers and times whose digits single precision would lose: less an offset, or in two parts."""
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from ..types import Array, Floats, Ints
 
 _WHOLE = 2**31  # of a whole number of Blender, 32 bits with a sign
 _EXACT = 2**53  # beyond this, doubles are no longer all whole numbers
@@ -33,14 +36,14 @@ class Digits(NamedTuple):
         By what whole numbers less the offset were divided: times in nanoseconds may all be multiples of a microsecond.
     """
 
-    offset: int | float | list
+    offset: Any  # a number, or a list of them for vectors
     decimals: int | None = None
     part: str = ""
     unsigned: bool = False
     step: int = 1
 
 
-def split_digits(values, known=None):
+def split_digits(values: Array, known: Digits | None = None) -> tuple[list[Array], Digits | None]:
     """Return numbers in parts of 32 bits, and how these are put together.
 
     Parameters
@@ -65,7 +68,7 @@ def split_digits(values, known=None):
     return _split_floats(values, known)
 
 
-def join_digits(parts, digits):
+def join_digits(parts: list[Array], digits: Digits) -> Array:
     """Return the numbers that `split_digits` gave in parts, or those that users made of them."""
     first = parts[0]
     if digits.part == "high" and [part.dtype for part in parts] == [np.int32, np.int32]:
@@ -82,7 +85,7 @@ def join_digits(parts, digits):
     return np.where(np.abs(rounded - values) <= error, rounded, values)
 
 
-def shortest(values):
+def shortest(values: Array) -> Floats:
     """Return numbers of single precision as doubles of so few decimals that they still are these numbers.
 
     Single precision keeps 0.123 as 0.123000003.
@@ -98,7 +101,7 @@ def shortest(values):
     return doubles
 
 
-def _split_whole(values, known):
+def _split_whole(values: Ints, known: Digits | None) -> tuple[list[Ints], Digits | None]:
     low, high = (int(values.min()), int(values.max())) if len(values) else (0, 0)
     if _fit(low, high):
         return [values.astype(np.int32)], None
@@ -112,12 +115,12 @@ def _split_whole(values, known):
     return [lower, upper], Digits(0, part="high", unsigned=high >= 2**63)
 
 
-def _fit(low, high):
+def _fit(low: int, high: int) -> bool:
     """Whether Blender has whole numbers of this range."""
     return low >= -_WHOLE and high < _WHOLE
 
 
-def _whole_offsets(bits, low, high, known):
+def _whole_offsets(bits: Ints, low: int, high: int, known: Digits | None) -> Iterator[tuple[int, int]]:
     """Yield what may be subtracted from whole numbers, and what divides the rest.
 
     That is what serves others, a round number, or the middle; and at last what all differences are multiples of.
@@ -131,24 +134,24 @@ def _whole_offsets(bits, low, high, known):
         yield low, int(np.gcd.reduce(bits - np.uint64(low % 2**64)))
 
 
-def _put_together(whole, digits):
+def _put_together(whole: Ints, digits: Digits) -> Ints:
     """Return whole numbers of 32 bits times a step and plus an offset, of 64 bits; all of them go round at 2**64."""
     bits = whole.astype(np.int64).view(np.uint64) * np.uint64(digits.step) + np.uint64(digits.offset % 2**64)
     return bits if int(whole.max(initial=0)) * digits.step + digits.offset >= 2**63 else bits.view(np.int64)
 
 
-def _is_kept(values):
+def _is_kept(values: Floats) -> bool:
     """Whether single precision keeps what numbers say: they are such numbers, or these written with their digits."""
     with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are infinite, or become so
         single = values.astype(np.float32)
         return _same(single.astype(np.float64), values) or _same(_significant(single), values)
 
 
-def _same(found, values):
+def _same(found: Array, values: Array) -> bool:
     return bool(np.array_equal(found, values, equal_nan=True))
 
 
-def _significant(single):
+def _significant(single: Array) -> Floats:
     """Return numbers of single precision as they are read again that were written with all their digits."""
     sizes = np.abs(single.astype(np.float64))
     with np.errstate(divide="ignore"):
@@ -158,7 +161,7 @@ def _significant(single):
     return np.where(places >= 0.0, np.rint(scaled) / power, np.rint(scaled) * power)
 
 
-def _split_floats(values, known):
+def _split_floats(values: Floats, known: Digits | None) -> tuple[list[Array], Digits | None]:
     finite = values[np.isfinite(values)]
     if len(finite) == 0 or np.abs(finite).max() > _LARGEST:
         return [values], None
@@ -176,7 +179,7 @@ def _split_floats(values, known):
     return [first, (less - first).astype(np.float32)], Digits(offset, decimals, "rest")
 
 
-def _split_vectors(values):
+def _split_vectors(values: Floats) -> tuple[list[Floats], Digits | None]:
     finite = values[np.isfinite(values).all(axis=1)]
     if values.dtype != np.float64 or len(finite) == 0 or np.abs(finite).max() > _LARGEST:
         return [values], None
@@ -184,7 +187,7 @@ def _split_vectors(values):
     return ([values - offsets], Digits(offsets)) if any(offsets) else ([values], None)
 
 
-def _decimals(values):
+def _decimals(values: Floats) -> int | None:
     """Return how many decimals numbers have at most; None if they are no decimals."""
     largest = np.abs(values).max()
     for decimals in range(_MOST_DECIMALS + 1):
@@ -195,7 +198,7 @@ def _decimals(values):
     return None
 
 
-def _float_offset(values):
+def _float_offset(values: Floats) -> float:
     """Return the middle of numbers, rounded to a power of ten below their extent; zero if that does not help."""
     low, high = float(values.min()), float(values.max())
     if high - low < _SMALLEST:
@@ -205,12 +208,12 @@ def _float_offset(values):
     return offset if left < _HELPFUL * max(abs(low), abs(high)) else 0.0
 
 
-def _is_plain(values, decimals=None):
+def _is_plain(values: Floats, decimals: int | None = None) -> bool:
     """Whether single precision does not hurt numbers as they are."""
     return _is_fine(values, 0.0, _decimals(values) if decimals is None else decimals, _FINEST)
 
 
-def _is_fine(values, offset, decimals, finest=np.inf):
+def _is_fine(values: Floats, offset: float, decimals: int | None, finest: float = np.inf) -> bool:
     """Whether single precision does not hurt numbers less an offset.
 
     Those that were measured to some decimals have these again when they are rounded. Others keep their differences, in

@@ -3,13 +3,15 @@
 import itertools
 import os
 import struct
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array, Floats, Ints
 from .e57_bytes import PAGE, place_of, read_bytes, read_streams, unpack
 from .lines import brief
 from .table import NORMAL, SCANNER, PointTable, full_color, unit_colors
@@ -38,12 +40,12 @@ class _Field(NamedTuple):
 
 class _Scan(NamedTuple):
     element: Element  # that describes it
-    fields: list
-    count: int  # of its points
+    fields: list[Any]
+    count: int  # type: ignore[assignment]  # of its points
     offset: int  # in the file
 
 
-def read_e57(path) -> PointTable:
+def read_e57(path: Path) -> PointTable:
     """Read the points of all scans of an E57 file, where their poses put them, with all fields that are numbers.
 
     Each point gets the place of its scanner as a vector, if the file tells it, and the number of its scan, if there are
@@ -74,7 +76,7 @@ def read_e57(path) -> PointTable:
     return table
 
 
-def _find_scans(file, path):
+def _find_scans(file: BinaryIO, path: Path) -> list[_Scan]:
     head = file.read(struct.calcsize(_HEAD)).ljust(struct.calcsize(_HEAD), b"\0")
     magic, version, begin, length, page = struct.unpack(_HEAD, head)
     if (magic, version, page) != (b"ASTM-E57", 1, PAGE):
@@ -85,7 +87,7 @@ def _find_scans(file, path):
     return [_describe(scan) for scan in root.findall("data3D/vectorChild")]
 
 
-def _parse(text):
+def _parse(text: bytes) -> Any:
     """Return the root of a tree of XML, whose tags keep their prefixes; in UTF-8, which is what E57 files use."""
     builder, parser = TreeBuilder(), expat.ParserCreate("UTF-8")
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
@@ -98,12 +100,12 @@ def _parse(text):
     return builder.close()
 
 
-def _refuse_doctype(*_):
+def _refuse_doctype(*_: int | str | None) -> None:
     """A few entities that it declares could stand for any amount of text."""
     raise ValueError("its description has a DOCTYPE, which E57 files never have")
 
 
-def _describe(scan):
+def _describe(scan: Any) -> _Scan:
     points, prototype = scan.find("points"), scan.find("points/prototype")
     if prototype is None:
         raise ValueError("it describes a scan without its points")
@@ -114,7 +116,7 @@ def _describe(scan):
     return _Scan(scan, fields, count, offset)
 
 
-def _field(element):
+def _field(element: Any) -> _Field:
     name, kind = element.tag, element.get("type")
     if kind == "Float":
         return _Field(name, kind, 32 if element.get("precision") == "single" else 64)
@@ -129,7 +131,7 @@ def _field(element):
     return _Field(name, kind, width, low, high, float(element.get("scale", 1.0)), float(element.get("offset", 0.0)))
 
 
-def _read_scan(file, place, end, scan, path):
+def _read_scan(file: BinaryIO, place: int, end: float, scan: _Scan, path: Path) -> PointTable:
     streams = read_streams(file, place, end, [field.width for field in scan.fields], scan.count, path)
     fields, columns = {}, {}
     for field in scan.fields:
@@ -163,7 +165,7 @@ def _read_scan(file, place, end, scan, path):
     return table
 
 
-def _values(stream, field, count):
+def _values(stream: Ints, field: _Field, count: int) -> Array:
     """Return the values of a field, (n,): floats, or whole numbers, which may be scaled to floats."""
     if field.kind == "Float":
         code = f"f{field.width // 8}"
@@ -176,21 +178,21 @@ def _values(stream, field, count):
     return values.astype(np.int32) if field.low >= -(2**31) and field.high < 2**31 else values
 
 
-def _from_spherical(points):
+def _from_spherical(points: Floats) -> Floats:
     """Return the places of ranges, azimuths and elevations, (n, 3)."""
     distance, azimuth, elevation = points.T
     flat = distance * np.cos(elevation)
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)], axis=1)
 
 
-def _color_range(scan, field):
+def _color_range(scan: Any, field: _Field) -> list[float] | tuple[float, float]:
     """Return the values of no and of full color: those that the scan tells, or else those that the field can have."""
     told = [_number(scan, f"colorLimits/{field.name}{end}", np.nan) for end in ("Minimum", "Maximum")]
     own = [field.scale * limit + field.offset for limit in (field.low, field.high)]
     return next(limits for limits in (told, own, (0.0, 255.0)) if limits[0] < limits[1])
 
 
-def _unit_colors(values, low, high):
+def _unit_colors(values: Array, low: Floats, high: Floats) -> Array:
     """Return colors from 0 to 1 by their limits; by their numbers where they use the low byte alone, or exceed 1."""
     full = full_color(values)
     if not low.any() and (255.0 == full < high.min() or 1.0 == high.max() < full):
@@ -198,7 +200,7 @@ def _unit_colors(values, low, high):
     return unit_colors((values - low) / (high - low))
 
 
-def _put(table, scan):
+def _put(table: PointTable, scan: Any) -> None:
     """Turn and move points and normals from where the scanner is the origin, if the file tells where it was."""
     if scan.find("pose/rotation") is not None:
         w, x, y, z = (_number(scan, f"pose/rotation/{name}") for name in "wxyz")
@@ -219,13 +221,13 @@ def _put(table, scan):
         table.single = table.single and not place.any()
 
 
-def _number(scan, path, default=0.0):
+def _number(scan: Any, path: str, default: float = 0.0) -> float:
     """Return a number that describes a scan; where its element is empty it is zero."""
     element = scan.find(path)
     return default if element is None else float(element.text or 0.0)
 
 
-def _join(tables):
+def _join(tables: list[PointTable]) -> PointTable:
     """Return one table of several, whose columns are gone afterwards; what a scan lacks is zero, its colors white."""
     if len(tables) == 1:
         return tables[0]
@@ -243,7 +245,7 @@ def _join(tables):
     return result
 
 
-def _stacked(parts, tables, missing):
+def _stacked(parts: list[Array | None], tables: list[PointTable], missing: Array) -> Array:
     """Return the parts of all tables one after another; a table without one gets the missing value at each point."""
     return np.concatenate(
         [

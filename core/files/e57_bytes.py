@@ -3,10 +3,13 @@
 import os
 import struct
 from functools import cache
+from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array, Ints
 from .rows import too_short
 
 PAGE = 1024  # bytes ...
@@ -17,7 +20,7 @@ _PACKET = "<BxHH"  # kind, length less one, number of streams
 _POINTS, _INDEX, _VALUES, _EMPTY = 1, 0, 1, 2  # kinds of sections and of packets
 
 
-def place_of(offset) -> int:
+def place_of(offset: int) -> int:
     """Return how many bytes lie before an offset in the file if checksums are not counted."""
     page, rest = divmod(offset, PAGE)
     if page < 0 or rest >= _BODY:
@@ -25,7 +28,7 @@ def place_of(offset) -> int:
     return page * _BODY + rest
 
 
-def read_bytes(file, place, count, path):
+def read_bytes(file: BinaryIO, place: int, count: int, path: Path) -> Ints:
     """Read bytes of an open file from a place on, both without checksums, which are compared.
 
     Returns
@@ -55,7 +58,7 @@ def read_bytes(file, place, count, path):
     return result.reshape(-1)[place - first * _BODY :][:count]
 
 
-def _checksums(pages):
+def _checksums(pages: Ints) -> Ints:
     """Return the CRC-32C of each page: of all at once, two bytes at a time."""
     table, sums = _crc_table(), np.full(len(pages), 0xFFFFFFFF, np.int64)
     for words in pages.view("<u2").T[: _BODY // 2].astype(np.int64):
@@ -64,7 +67,7 @@ def _checksums(pages):
 
 
 @cache
-def _crc_table():
+def _crc_table() -> Ints:
     """Return what each two bytes do to a CRC-32C, (65536,)."""
     table = np.arange(2**16)
     for _ in range(16):
@@ -72,7 +75,7 @@ def _crc_table():
     return table
 
 
-def read_streams(file, place, end, widths, count, path) -> list:
+def read_streams(file: BinaryIO, place: int, end: float, widths: list[int], count: int, path: Path) -> list[Array]:
     """Read the values of points, field by field, from the packets that they are divided among.
 
     Parameters
@@ -108,23 +111,23 @@ def read_streams(file, place, end, widths, count, path) -> list:
             found = min(8 * size // width for size, width in zip(filled, widths, strict=True) if width)
             raise too_short(path, found, count)
         kind, length, number = struct.unpack_from(_PACKET, data, place)
-        end, at = place + length + 1, place + head + 2 * number
-        if kind not in (_INDEX, _VALUES, _EMPTY) or end % 4 or end > len(data):
+        behind, at = place + length + 1, place + head + 2 * number
+        if kind not in (_INDEX, _VALUES, _EMPTY) or behind % 4 or behind > len(data):
             raise ValueError("its points are not divided as they should be")
         if kind == _VALUES:
-            sizes = data[place + head : at].view("<u2").tolist() if at <= end else []
-            if len(sizes) != len(widths) or at + sum(sizes) > end:
+            sizes = data[place + head : at].view("<u2").tolist() if at <= behind else []
+            if len(sizes) != len(widths) or at + sum(sizes) > behind:
                 raise ValueError("a packet of its points does not hold what it says")
             for index, size in enumerate(sizes):
                 part = data[at : at + min(size, needed[index] - filled[index])]
                 streams[index][filled[index] : filled[index] + len(part)] = part
                 filled[index] += len(part)
                 at += size
-        place = end
+        place = behind
     return streams
 
 
-def unpack(stream, width, count):
+def unpack(stream: Ints, width: int, count: int) -> Ints:
     """Return whole numbers of so many bits each, up to 64, the lowest bit first.
 
     Parameters

@@ -4,11 +4,14 @@ import os
 import struct
 import zipfile
 import zlib
+from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
+from ..types import Floats
 from .arrays import read_array
 from .e57 import read_e57
 from .las import read_las
@@ -49,7 +52,7 @@ WRITABLE = (".ply", ".xyz", ".csv")
 SPLATS = (".splat", ".spz")  # of Gaussian splats alone, which core.splats reads
 
 
-def read_points(path, columns="", las=LasChoices()) -> PointTable:
+def read_points(path: Path, columns: str = "", las: LasChoices = LasChoices()) -> PointTable:
     """Read the points of a file of one of the kinds in `READABLE`.
 
     Parameters
@@ -87,7 +90,7 @@ def read_points(path, columns="", las=LasChoices()) -> PointTable:
     return table
 
 
-def _doubts(table, path):
+def _doubts(table: PointTable, path: Path) -> Iterator[str]:
     """Yield what a user should know about the coordinates of a table."""
     units = np.ones(3)
     if table.degrees or look_like_degrees(table.points):
@@ -101,7 +104,7 @@ def _doubts(table, path):
         yield from told_steps(table.points, path, units)
 
 
-def told_steps(points, path, units=1.0):
+def told_steps(points: Floats, path: Path, units: Floats | float = 1.0) -> Iterator[str]:
     """Yield that points, (n, 3), were kept in single precision, where its steps, in some units, are wide for them."""
     steps = units * np.spacing(np.abs(points).max(axis=0).astype(np.float32))
     if steps.max() * 8192.0 > np.ptp(points, axis=0).max():
@@ -113,7 +116,7 @@ def told_steps(points, path, units=1.0):
 
 
 @contextmanager
-def reading(path):
+def reading(path: Path) -> Iterator[None]:
     """Turn what may go wrong while a file is read into errors that tell its name and what to do.
 
     Parameters
@@ -144,7 +147,7 @@ def reading(path):
         ) from error
 
 
-def write_points(path, table, double=True) -> list:
+def write_points(path: Path, table: PointTable, double: bool = True) -> list[str]:
     """Write a table to a file of one of the kinds in `WRITABLE`; an older file stays if that fails.
 
     Parameters

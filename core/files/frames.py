@@ -2,14 +2,16 @@
 
 import re
 from itertools import pairwise
+from pathlib import Path
 
 from ..errors import PointCloudError
+from ..types import FilePath
 from .formats import READABLE, SPLATS
 
 _NUMBERED = re.compile(r"(.*?)(\d+)(\D*)", re.ASCII)
 
 
-def numbered_files(folder) -> list:
+def numbered_files(folder: Path) -> list[Path]:
     """Find the frames of a sequence: the files with points in a folder whose names differ by a number alone.
 
     Files without a number are no frames. See `order_frames`.
@@ -41,7 +43,7 @@ def numbered_files(folder) -> list:
     return order_frames(frames)
 
 
-def order_frames(paths) -> list:
+def order_frames(paths: list[Path]) -> list[Path]:
     """Put files in the order of the last number in their names, however many digits it has.
 
     Parameters
@@ -57,10 +59,7 @@ def order_frames(paths) -> list:
     PointCloudError
         A name without a number, names that differ by more than that, or the same number twice.
     """
-    found = [(path, _NUMBERED.fullmatch(path.stem)) for path in paths]
-    plain = next((path for path, match in found if match is None), None)
-    if plain is not None:
-        raise PointCloudError(f"{plain.name} has no number, so that its place is unknown. Name frames by numbers.")
+    found = [(path, _parts(path)) for path in paths]
     patterns = sorted({f"{match[1]}#{match[3]}{path.suffix}" for path, match in found})
     if len(patterns) > 1:
         shown = ", ".join(patterns[:3]) + (", ..." if len(patterns) > 3 else "")
@@ -72,6 +71,14 @@ def order_frames(paths) -> list:
     return [path for path, _ in frames]
 
 
-def frame_number(path) -> int:
+def frame_number(path: FilePath) -> int:
     """Return the last number in the name of a file, by which `order_frames` goes."""
-    return int(_NUMBERED.fullmatch(path.stem)[2])
+    return int(_parts(Path(path))[2])
+
+
+def _parts(path: Path) -> re.Match[str]:
+    """Divide the name of a file at its last number."""
+    match = _NUMBERED.fullmatch(path.stem)
+    if match is None:
+        raise PointCloudError(f"{path.name} has no number, so that its place is unknown. Name frames by numbers.")
+    return match

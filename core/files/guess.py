@@ -1,6 +1,11 @@
 """What columns without names are, by their numbers: colors, normals, or values of an unknown kind."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+
+from ..types import Array, Floats
 
 _COLORS = ("r", "g", "b")
 _SCANNED = ("intensity", *_COLORS)
@@ -12,7 +17,7 @@ _LENGTH = 0.02  # that normals, rounded to a few digits, may differ from 1
 _STEP = 1e-4  # that shares of 255 may differ from whole ones, in a file of a few digits
 
 
-def guess_names(values, unknown, scanned=True):
+def guess_names(values: Array, unknown: list[str], scanned: bool = True) -> list[str]:
     """Name columns that a file does not name.
 
     Parameters
@@ -44,7 +49,7 @@ def guess_names(values, unknown, scanned=True):
     return names
 
 
-def _triples(values, fits):
+def _triples(values: Array, fits: Callable[..., Any]) -> list[int | None]:
     """Return where three columns fit, or None for nowhere."""
     sample = values[:: max(len(values) // _SAMPLE, 1)]
     firsts = range(min(values.shape[1], _MOST) - 2) if len(values) else ()
@@ -54,7 +59,7 @@ def _triples(values, fits):
     ]
 
 
-def _best_pair(colors, normals, values):
+def _best_pair(colors: list[int | None], normals: list[int | None], values: Array) -> tuple[int | None, int | None]:
     """Choose columns of colors and of normals that explain most; of colors those whose channels differ least.
 
     What stands beside them differs more: opacities, intensities, labels.
@@ -66,7 +71,7 @@ def _best_pair(colors, normals, values):
         if color is None or normal is None or abs(color - normal) >= 3
     ]
 
-    def quality(pair):
+    def quality(pair: tuple[int | None, int | None]) -> tuple[int, float, bool]:
         color, normal = pair
         explained = (color is not None) + (normal is not None)
         return explained, -_spread(values, color), color is not None
@@ -74,7 +79,7 @@ def _best_pair(colors, normals, values):
     return max(pairs, key=quality)
 
 
-def _spread(values, first):
+def _spread(values: Floats, first: int | None) -> float:
     if first is None:
         return 0.0
     channels = values[:, first : first + 3]
@@ -82,7 +87,7 @@ def _spread(values, first):
     return float(np.ptp(channels, axis=1).mean()) + alpha
 
 
-def _are_colors(values):
+def _are_colors(values: Floats) -> bool:
     """Tell whether three columns are whole numbers from 0 to 255, or their shares, and not all 0 or 1."""
     if not ((values >= 0.0) & (values <= _FULL)).all() or _are_normals(values):
         return False
@@ -92,7 +97,7 @@ def _are_colors(values):
     return bool((np.abs(shares - np.round(shares)) < _FULL * _STEP).all() and (shares % _FULL != 0.0).any())
 
 
-def _are_normals(values):
+def _are_normals(values: Floats) -> bool:
     """Tell whether three columns are vectors of length 1, but for some that are zero or missing."""
     lengths = np.linalg.norm(values, axis=1)
     there = lengths > 0.0

@@ -2,8 +2,9 @@
 
 import re
 from collections import Counter
+from collections.abc import Iterator, Sequence
 
-from .cells import is_comment
+from .cells import Rows, is_comment
 from .lines import is_number
 from .names import find_places, is_known, is_other, is_place
 
@@ -11,7 +12,7 @@ _MARKS = "#/%! "
 _MOST_DIGITS = 15  # of a number of a point
 
 
-def find_names(rows, numeric) -> list:
+def find_names(rows: Rows, numeric: list[int]) -> list[str | None]:
     """Find the names of the columns in the lines before the first row.
 
     Parameters
@@ -26,10 +27,10 @@ def find_names(rows, numeric) -> list:
         None for those without a name; fewer than there are columns if a list of any length follows; empty if no line
         names them.
     """
-    usual = []
+    usual: list[str | None] = []
     for line in reversed(rows.before):
-        for names in _split(line, rows.delimiter):
-            names = _fit(names, is_comment(line), rows, numeric)
+        for words in _split(line, rows.delimiter):
+            names = _fit(words, is_comment(line), rows, numeric)
             found = find_places(names, numeric) if names else None
             if found and found.sure:
                 return names
@@ -37,7 +38,7 @@ def find_names(rows, numeric) -> list:
     return usual
 
 
-def _split(line, delimiter, least=3):
+def _split(line: str, delimiter: str | None, least: int = 3) -> Iterator[list[str]]:
     """Yield the words of a line that may be names, so many at least, by all that could separate them."""
     body = _unmarked(line.strip(" \r\n").lstrip(_MARKS) if is_comment(line) else line.strip(" \r\n"))
     bodies = [body.partition(":")[2], body] if is_comment(line) and ":" in body else [body]
@@ -49,23 +50,23 @@ def _split(line, delimiter, least=3):
                 yield names
 
 
-def _unmarked(text):
+def _unmarked(text: str) -> str:
     """Return text without a mark of comments before it: any that does not come again, as what separates names does."""
     mark = re.match(r"(rem\s|[^\w\s\"',|]+)\s*", text, re.IGNORECASE)
     return text[mark.end() :] if mark and text.count(mark[1]) == 1 else text
 
 
-def names_places(line, delimiter) -> bool:
+def names_places(line: str, delimiter: str | None) -> bool:
     """Tell whether a line names two coordinates or more."""
     return any(sum(map(is_place, names)) > 1 for names in _split(line, delimiter, least=2))
 
 
-def _closed(text):
+def _closed(text: str) -> str:
     """Return text with its brackets closed up to the words before them, so that white space divides names alone."""
     return re.sub(r"\s*([\[(])([^\])]*)", lambda match: match[1] + "_".join(match[2].split()), text)
 
 
-def _fit(names, marked, rows, numeric):
+def _fit(names: list[str], marked: bool, rows: Rows, numeric: list[int]) -> list[str | None]:
     """Return names of columns if they can be those of the rows; otherwise none."""
     if any(map(is_number, names)):
         return []
@@ -80,15 +81,16 @@ def _fit(names, marked, rows, numeric):
     if marked and lists is None and len(known) < len(names):
         return []
     nameless = len(names) == width - 1 and not is_other(names[0])
+    fitted: list[str | None] = [*names]
     if nameless and (0 not in numeric or counts(rows)):  # R gives no name to those of rows
-        names = [None, *names]
+        fitted = [None, *names]
     if lists is None:
-        names = [*names[:width], *[None] * (width - len(names))]
-    found = find_places(names, numeric)
-    return _distinct(names) if found and found.sure else []
+        fitted = [*fitted[:width], *[None] * (width - len(fitted))]
+    found = find_places(fitted, numeric)
+    return _distinct(fitted) if found and found.sure else []
 
 
-def counts(rows, index=0) -> bool:
+def counts(rows: Rows, index: int = 0) -> bool:
     """Tell whether a column counts the rows."""
     words = [row[index] for row in rows.sample if index < len(row)]
     if len(words) < 3 or not all(word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS for word in words):
@@ -97,14 +99,15 @@ def counts(rows, index=0) -> bool:
     return [int(word) for word in words] == [*range(first, first + len(words))]
 
 
-def unnamed(index) -> str:
+def unnamed(index: int) -> str:
     """Return what a column without a name is called, by its number in the file."""
     return f"column_{index + 1}"
 
 
-def _distinct(names):
+def _distinct(names: Sequence[str | None]) -> list[str | None]:
     """Number names that come again."""
-    seen, result = Counter(), []
+    seen: Counter[str | None] = Counter()
+    result: list[str | None] = []
     for index, name in enumerate(names):
         name = unnamed(index) if name == "" else name
         seen[name] += 1

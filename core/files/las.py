@@ -2,10 +2,13 @@
 
 import os
 import struct
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ..errors import InvalidPointsError, PointCloudError, TooFewPointsError
+from ..types import Array
 from .las_choices import LasChoices
 from .table import PointTable, told_depth, unit_colors
 
@@ -32,7 +35,7 @@ _MOST_DEGREES = 360.0
 _GEOGRAPHIC = (1024, 2)  # key of GeoTIFF and its value
 
 
-def read_las(path, las=LasChoices()) -> PointTable:
+def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
     """Read a LAS or LAZ file: coordinates, intensity, class, return, colors and what its maker added.
 
     Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not.
@@ -60,7 +63,7 @@ def read_las(path, las=LasChoices()) -> PointTable:
             raise ValueError(f"{error}") from error  # `read_points` tells it as it tells numpy's
 
 
-def _check_header(file, path):
+def _check_header(file: BinaryIO, path: Path) -> None:
     """Refuse what is no LAS file, or names more records than it has room for: laspy would look for them all."""
     size = os.fstat(file.fileno()).st_size
     data = file.read(_SHORTEST)
@@ -75,7 +78,7 @@ def _check_header(file, path):
     file.seek(0)
 
 
-def _check_size(file, header, path):
+def _check_size(file: BinaryIO, header: Any, path: Path) -> None:
     """Refuse a file that is too short for its points, before there is memory for them."""
     begin, size = header.offset_to_point_data, os.fstat(file.fileno()).st_size
     needed = header.point_count * header.point_format.size
@@ -88,7 +91,7 @@ def _check_size(file, header, path):
         file.seek(begin)
 
 
-def _check_packing(file, begin, size, header, path):
+def _check_packing(file: BinaryIO, begin: int, size: int, header: Any, path: Path) -> None:
     """Refuse packed points whose parts are longer than the file.
 
     lazrs takes memory for whatever a file names, and ends the whole program where there is too little.
@@ -107,7 +110,7 @@ def _check_packing(file, begin, size, header, path):
         raise InvalidPointsError(f"{path} is packed in a way that is not known, or broken. Save it again as LAS.")
     fault = InvalidPointsError(f"{path} is broken: its packed points are not where it says. Copy or export it again.")
 
-    def read(code, place):
+    def read(code: str, place: int) -> tuple[int, ...]:
         length = struct.calcsize(code)
         if not begin <= place <= size - length:
             raise fault
@@ -137,13 +140,13 @@ def _check_packing(file, begin, size, header, path):
         raise fault
 
 
-def _read_items(data):
+def _read_items(data: bytes) -> tuple[int, list[Any]]:
     """Return the kind of packing, and number and bytes of each item of a point."""
     (kind,), (count,) = struct.unpack_from("<H", data), struct.unpack_from("<H", data, 32)
     return kind, [struct.unpack_from("<HH", data, 34 + 6 * index) for index in range(count)]
 
 
-def _read(reader, path, choices):
+def _read(reader: Any, path: Path, choices: LasChoices) -> PointTable:
     header = reader.header
     count, known = header.point_count, set(header.point_format.dimension_names)
     names = [name for name in (*_COLUMNS, *header.point_format.extra_dimension_names) if name in known]
@@ -188,23 +191,23 @@ def _read(reader, path, choices):
 class _Tally:
     """Which points are read by choice, and how many there are of each class."""
 
-    def __init__(self, choices):
+    def __init__(self, choices: LasChoices) -> None:
         self._choices = choices
         self.total = self._withheld = 0
         self._found = np.zeros(_CLASSES, int)  # but withheld ones, unless these are read
 
-    def keep(self, block):
+    def keep(self, block: Any) -> Any:
         """Return which points of a block are read, as an index."""
         withheld, classes = np.asarray(block["withheld"]).astype(bool), np.asarray(block["classification"])
         kept = ~withheld | self._choices.withheld
         self.total += len(kept)
-        self._withheld += np.count_nonzero(withheld)
+        self._withheld += int(np.count_nonzero(withheld))
         self._found += np.bincount(classes[kept], minlength=_CLASSES)
         if self._choices.classes:
             kept &= np.isin(classes, [*self._choices.classes])
         return slice(None) if kept.all() else kept
 
-    def notices(self, path, count) -> list:
+    def notices(self, path: Path, count: int) -> list[str]:
         """Tell what was left out so that this many points are read; refuse a file of which nothing is left."""
         others, result = self._found.sum() - count, []
         if self._withheld and self._choices.withheld:
@@ -225,14 +228,14 @@ class _Tally:
         return result
 
 
-def _put(table, name, rows, values, count):
+def _put(table: PointTable, name: str, rows: Any, values: Array, count: int) -> None:
     """Put values into some rows of an attribute that has so many, which is made for the first of them."""
     if name not in table.attributes:
         table.attributes[name] = np.empty((count, *values.shape[1:]), values.dtype)
     table.attributes[name][rows] = values
 
 
-def _is_geographic(header):
+def _is_geographic(header: Any) -> bool:
     """Whether a file says that its coordinates are longitude and latitude: by its keys of GeoTIFF, or in words."""
     words = "".join(detail.string for detail in header.vlrs.get("WktCoordinateSystemVlr"))
     if words:

@@ -20,11 +20,11 @@ class LasChoices:
         Whether points are read that are flagged as withheld, which stands for deleted.
     """
 
-    classes: frozenset = frozenset()
+    classes: frozenset[int] = frozenset()
     withheld: bool = False
 
 
-def parse_classes(text) -> frozenset:
+def parse_classes(text: str) -> frozenset[int]:
     """Return the classes of a text such as "2 5", "2, 5" or "2-5"; none of an empty one.
 
     Raises
@@ -32,7 +32,7 @@ def parse_classes(text) -> frozenset:
     PointCloudError
         It holds something else.
     """
-    classes = set()
+    classes: set[int] = set()
     for word in re.split(r"[\s,;]+", text.strip()) if text.strip() else ():
         match = re.fullmatch(r"(\d{1,3})(?:-(\d{1,3}))?", word, re.ASCII)
         first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)

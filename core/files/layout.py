@@ -1,12 +1,14 @@
 """Which columns of a text are x y z, and which others are read by which names."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import InvalidPointsError
-from .cells import is_numeric, kinds, split_row
+from .cells import Rows, is_numeric, kinds, split_row
 from .header import counts, find_names, names_places, unnamed
 from .lines import brief
-from .names import find_places, is_other
+from .names import Places, find_places, is_other
 
 _SKIPPED, _REST = "-", "..."  # among names that a user gives
 _GIVE = "If that is wrong, give the names of all columns in Columns at the import"
@@ -31,19 +33,19 @@ class Layout(NamedTuple):
         Whether x and y are angles.
     """
 
-    names: list
-    places: list
-    others: list
-    notices: list
+    names: Sequence[str | None]
+    places: list[int]
+    others: list[int]
+    notices: list[str]
     announced: int | None = None
     degrees: bool = False
 
-    def label(self, index):
+    def label(self, index: int) -> str:
         """Return the name of a column, or one by its number in the file."""
         return self.names[index] or unnamed(index)
 
 
-def given_layout(columns, rows) -> Layout:
+def given_layout(columns: str, rows: Rows) -> Layout:
     """Return the layout that a user gives.
 
     Parameters
@@ -58,9 +60,9 @@ def given_layout(columns, rows) -> Layout:
     InvalidPointsError
         x, y or z is missing, a name comes twice, or the file has another number of columns.
     """
-    names = columns.replace(",", " ").split()
-    all_told = names[-1] != _REST
-    names = [None if name == _SKIPPED else name for name in names[: len(names) - (not all_told)]]
+    words = columns.replace(",", " ").split()
+    all_told = words[-1] != _REST
+    names = [None if word == _SKIPPED else word for word in words[: len(words) - (not all_told)]]
     lower = [name and name.lower() for name in names]
     missing = [axis for axis in "xyz" if axis not in lower]
     twice = [name for name in lower if name and lower.count(name) > 1]
@@ -76,11 +78,11 @@ def given_layout(columns, rows) -> Layout:
     numeric, textual, empty = kinds(rows)
     places = [lower.index(axis) for axis in "xyz"]
     others = [index for index in (*numeric, *empty) if index < len(names) and names[index] and index not in places]
-    texts = [names[index] for index in textual if index < len(names) and names[index] and index not in places]
+    texts = [name for index, name in enumerate(names) if name and index in textual and index not in places]
     return Layout(names, places, others, _tell_texts(texts, rows.path))
 
 
-def find_layout(rows, usual) -> Layout:
+def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
     """Find the layout of a text by its names, or by what columns hold.
 
     Parameters
@@ -133,13 +135,13 @@ def find_layout(rows, usual) -> Layout:
     return layout
 
 
-def _is_odd_row(line, delimiter):
+def _is_odd_row(line: str, delimiter: str | None) -> bool:
     """Tell whether a line before the first point holds numbers, but is neither a point nor their number."""
     words = split_row(line, delimiter)
     return len(words) > 1 and is_numeric(words)
 
 
-def _tell_places(found, names, path):
+def _tell_places(found: Places, names: list[str | None], path: Path) -> list[str]:
     """Tell which columns are x y z, unless they are called so."""
     told = ", ".join(names[index] for index in found.indices)
     notices = []
@@ -150,7 +152,7 @@ def _tell_places(found, names, path):
     return notices
 
 
-def _refuse_others(names, path):
+def _refuse_others(names: Sequence[str | None], path: Path) -> None:
     """Refuse a file with names of columns that are no places, if there are too few others; a title has none of them."""
     told = [name for name in names if name]
     if any(map(is_other, told)):
@@ -160,17 +162,17 @@ def _refuse_others(names, path):
         )
 
 
-def _first_places(rows, numeric):
+def _first_places(rows: Rows, numeric: list[int]) -> list[int]:
     """Return the first three columns of numbers; not one before them that counts the points, as they do not."""
     counted = len(numeric) > 3 and counts(rows, numeric[0]) and not counts(rows, numeric[1])
     return numeric[1:4] if counted else numeric[:3]
 
 
-def _tell_texts(texts, path):
+def _tell_texts(texts: Sequence[str], path: Path) -> list[str]:
     return [f"{path.name}: left out {brief(', '.join(texts))}, which holds text."] if texts else []
 
 
-def _announced(rows):
+def _announced(rows: Rows) -> int | None:
     """Return the number of points that the last line before them tells, if it does."""
     word = rows.before[-1].strip().lstrip("#/%! ") if rows.before else ""
     return int(word) if word.isdecimal() and len(word) <= _MOST_DIGITS else None

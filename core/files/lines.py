@@ -1,6 +1,9 @@
 """Text in blocks of lines: all lines of a file at once would take many times its size."""
 
 import codecs
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, AnyStr
 
 from ..errors import InvalidPointsError
 
@@ -9,13 +12,13 @@ _LONGEST = 100_000  # characters of a line, thousands of columns
 _BRIEF = 100  # characters of what a text of an error quotes
 
 
-def read_text(path, skipped=()):
+def read_text(path: Path, skipped: tuple[str, ...] = ()) -> Iterator[list[str]]:
     """Yield lists of lines of a file of text; see `read_blocks`."""
     with open(path, encoding=_encoding(path), errors="replace") as file:
         yield from read_blocks(file, path, skipped)
 
 
-def _encoding(path):
+def _encoding(path: Path) -> str:
     """Return the encoding of a file of text: its first bytes tell UTF-16, and what is no UTF-8 is Windows' own."""
     with open(path, "rb") as file:
         start = file.read(_BLOCK)
@@ -28,7 +31,7 @@ def _encoding(path):
     return "utf-8-sig"
 
 
-def read_blocks(file, path, skipped=()):
+def read_blocks(file: IO[AnyStr], path: Path, skipped: tuple[AnyStr, ...] = ()) -> Iterator[list[AnyStr]]:
     """Yield lists of lines, without their ends, of an open file of characters or bytes.
 
     Parameters
@@ -57,7 +60,7 @@ def read_blocks(file, path, skipped=()):
         yield lines
 
 
-def is_number(word) -> bool:
+def is_number(word: str) -> bool:
     """Tell whether a word is a number for numpy, which takes fewer than Python: no 1_0, and no digits but 0 to 9."""
     try:
         float(word)
@@ -66,6 +69,6 @@ def is_number(word) -> bool:
     return word.isascii() and "_" not in word
 
 
-def brief(text) -> str:
+def brief(text: str) -> str:
     """Return the beginning of a text that came from a file."""
     return text if len(text) <= _BRIEF else f"{text[:_BRIEF]}..."

@@ -1,17 +1,23 @@
 """Meshes to files: vertices with what they hold, and faces."""
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import TextIO
+
 import numpy as np
 
 from ..errors import PointCloudError
+from ..types import Array, Ints
 from .origin import is_coarse
 from .ply import write_ply
 from .polygons import triangles
+from .table import PointTable
 from .whole import replacing
 
 _BLOCK = 10_000  # lines that are written at once
 
 
-def write_mesh(path, table, faces, double=True) -> list:
+def write_mesh(path: Path, table: PointTable, faces: list[Ints], double: bool = True) -> list[str]:
     """Write a mesh to a file of one of the kinds in `MESHES`; an older file stays if that fails.
 
     Parameters
@@ -36,7 +42,7 @@ def write_mesh(path, table, faces, double=True) -> list:
         return _WRITERS[suffix](part, table, double, faces) or []
 
 
-def _write_obj(path, table, double, faces):
+def _write_obj(path: Path, table: PointTable, double: bool, faces: list[Ints]) -> None:
     """Write text: vertices, with colors after the coordinates if they have any, and faces."""
     values, digits = table.points, "%.15g" if double else "%.9g"
     line = " ".join(["v", *3 * [digits]])
@@ -48,14 +54,14 @@ def _write_obj(path, table, double, faces):
             _write_rows(file, " ".join(["f", *part.shape[1] * ["%d"]]), part + 1)
 
 
-def _write_rows(file, line, rows):
+def _write_rows(file: TextIO, line: str, rows: Array) -> None:
     line += "\n"
     for start in range(0, len(rows), _BLOCK):
         block = rows[start : start + _BLOCK]
         file.write((line * len(block)) % tuple(block.reshape(-1).tolist()))
 
 
-def _write_stl(path, table, double, faces):
+def _write_stl(path: Path, table: PointTable, double: bool, faces: list[Ints]) -> None:
     """Write binary triangles, in single precision, which is all that STL has."""
     if is_coarse(table.points):
         raise PointCloudError(
@@ -73,5 +79,5 @@ def _write_stl(path, table, double, faces):
         rows.tofile(file)
 
 
-_WRITERS = {".ply": write_ply, ".obj": _write_obj, ".stl": _write_stl}
+_WRITERS: dict[str, Callable[..., list[str] | None]] = {".ply": write_ply, ".obj": _write_obj, ".stl": _write_stl}
 MESHES = tuple(_WRITERS)

@@ -2,17 +2,19 @@
 
 import re
 import unicodedata
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
+from ..types import Array
 from .ascii_words import LETTERS
 
 
 class _System(NamedTuple):
     """Words for coordinates that go together."""
 
-    x: set
-    y: set
-    z: tuple  # sets of words, the surest first
+    x: set[str]
+    y: set[str]
+    z: tuple[set[str], ...]  # sets of words, the surest first
 
 
 _HEIGHTS = (
@@ -95,20 +97,20 @@ _TRIPLES = {
 class Places(NamedTuple):
     """Which columns are x y z."""
 
-    indices: list
+    indices: list[Any]
     sure: bool  # whether their names say so
     plain: bool  # whether they are x y z by name
     degrees: bool  # whether x and y are angles
 
 
-def _words(text):
+def _words(text: str) -> list[str]:
     """Return the words of a name that say something, in lower case and without accents."""
     text = unicodedata.normalize("NFKD", text.translate(LETTERS)).encode("ascii", "ignore").decode()
     text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text).lower())
     return [word for word in re.findall(r"[a-z0-9]+", text) if not _FILLERS.fullmatch(word)]
 
 
-def _place(name):
+def _place(name: str) -> str:
     """Return the word of a name that tells its axis, such as x of POINT_X, empty if there is none.
 
     What stands in brackets is most often a unit, but may tell it better: Y (Rechtswert).
@@ -118,29 +120,29 @@ def _place(name):
     return max(words, key=len) if words and _ANY.issuperset(words) else ""
 
 
-def _hint(name):
+def _hint(name: str) -> str:
     """Return the only word of a name that could tell its axis, beside others that are not known: Shape_X."""
     words = [word for word in _words(_BRACKETS.sub(" ", name)) if word in _ANY]
     return words[0] if len(words) == 1 and not is_other(name) else ""
 
 
-def is_other(name) -> bool:
+def is_other(name: str) -> bool:
     """Tell whether a name is known as one of what is no place: a number, a time, a color and so on."""
     words = _words(_BRACKETS.sub(" ", name))
     return not words or (not _place(name) and any(_OTHERS.fullmatch(word) for word in words))
 
 
-def is_place(name) -> bool:
+def is_place(name: str) -> bool:
     """Tell whether a name is a word for a coordinate."""
     return bool(_place(name))
 
 
-def is_known(name) -> bool:
+def is_known(name: str) -> bool:
     """Tell whether a name is a word for what files of points hold."""
     return bool(_place(name)) or (bool(_words(name)) and is_other(name))
 
 
-def find_places(names, numeric):
+def find_places(names: Sequence[str | None], numeric: list[int]) -> Places | None:
     """Find the columns of x y z by their names.
 
     Parameters
@@ -154,23 +156,23 @@ def find_places(names, numeric):
     Places or None
         None if there are no three that could be.
     """
-    names = [name or "" for name in names]
-    words = {index: _place(names[index]) for index in numeric if index < len(names)}
+    given = [name or "" for name in names]
+    words = {index: _place(given[index]) for index in numeric if index < len(given)}
     found = _find_system(words)
     if found:
         return found
-    hints = {index: word or _hint(names[index]) for index, word in words.items()}
+    hints = {index: word or _hint(given[index]) for index, word in words.items()}
     found = _find_system(hints)
     if found:
         return found._replace(sure=False)
-    unknown = [index for index in words if not is_other(names[index])]
+    unknown = [index for index in words if not is_other(given[index])]
     system, *pair = next((found for found in _pairs(hints) if found[0].z is _HEIGHTS), [None])
     if pair:
         unknown = [*pair, *(index for index in unknown if not hints[index])]
     return Places(unknown[:3], False, False, system is _DEGREES) if len(unknown) > 2 else None
 
 
-def _find_system(words):
+def _find_system(words: dict[int, str]) -> Places | None:
     """Find columns of x y z by words that tell their axes, by index."""
     for system, x, y in _pairs(words):
         z = next((z for z in (_first(words, kind) for kind in system.z) if z is not None), None)
@@ -180,7 +182,7 @@ def _find_system(words):
     return None
 
 
-def _pairs(words):
+def _pairs(words: dict[int, str]) -> Iterator[tuple[_System, int, int]]:
     """Yield systems of which there are x and y, with the indices of both."""
     for system in _SYSTEMS:
         x, y = _first(words, system.x), _first(words, system.y)
@@ -188,13 +190,13 @@ def _pairs(words):
             yield system, x, y
 
 
-def standard_names(names) -> dict:
+def standard_names(names: dict[str, Array]) -> dict[str, str]:
     """Return new names for columns of colors and normals that are called otherwise, such as colorRed or NormalX."""
-    found = {}
+    found: dict[str, str] = {}
     for name in names:
         words = [word for word in _words(name) if word not in _ABOUT_COLORS]
         found.setdefault(" ".join(words), name)
-    result = {}
+    result: dict[str, str] = {}
     for triple, standard in _TRIPLES.items():
         if all(word in found for word in triple.split(",")):
             result |= {found[word]: name for word, name in zip(triple.split(","), standard, strict=True)}
@@ -203,5 +205,5 @@ def standard_names(names) -> dict:
     return result
 
 
-def _first(words, kind):
+def _first(words: dict[int, str], kind: set[str]) -> int | None:
     return next((index for index, word in words.items() if word in kind), None)

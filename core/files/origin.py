@@ -1,6 +1,9 @@
 """A local origin for coordinates that are too large for single precision, such as those of a national grid."""
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from ..types import Bools, Floats
 
 _FINE = 1e-5  # step of single precision that does not hurt, as a share of the extent ...
 _FINEST = 1e-3  # ... and in all: a millimetre where the unit is the metre, ...
@@ -13,12 +16,12 @@ _NARROW = 100.0  # of heights in metres to degrees, and ...
 _FAR = 10.0  # ... of degrees to their extent, at least
 
 
-def is_coarse(points) -> bool:
+def is_coarse(points: Floats) -> bool:
     """Whether single precision would hurt the points where they are."""
     return bool((_steps(points) > _allowed(points, look_like_degrees(points))).any())
 
 
-def look_like_degrees(points) -> bool:
+def look_like_degrees(points: Floats) -> bool:
     """Whether x and y look like longitude and latitude, in either order, beside heights in metres.
 
     They are then in the range of such, far from zero by their own extent, and narrow as no thing would be.
@@ -34,19 +37,19 @@ def look_like_degrees(points) -> bool:
     )
 
 
-def _steps(points):
+def _steps(points: Floats) -> Floats:
     """Distance of neighbouring numbers of single precision at the largest coordinate of each axis, (3,)."""
     return np.spacing(np.abs(points).max(axis=0).astype(np.float32)).astype(np.float64)
 
 
-def _extents(points):
+def _extents(points: Floats) -> tuple[float, Floats]:
     """Longest side of the box around the points, and all three; that of points at one place counts as one."""
     extents = np.ptp(points, axis=0)
     longest = float(extents.max())
     return longest if longest > _POINT else 1.0, extents
 
 
-def _allowed(points, degrees):
+def _allowed(points: Floats, degrees: bool) -> Floats:
     """Steps of single precision that do not hurt, (3,).
 
     What does not hurt lengths in one unit goes by the longest side. An axis of another unit goes by its own side, if
@@ -63,7 +66,7 @@ def _allowed(points, degrees):
     return allowed
 
 
-def choose_origin(points, known=None, *, degrees=False):
+def choose_origin(points: Floats, known: ArrayLike | None = None, *, degrees: bool = False) -> Floats:
     """Choose what is subtracted from points before they are stored in single precision.
 
     Parameters
@@ -83,7 +86,7 @@ def choose_origin(points, known=None, *, degrees=False):
     longest, extents = _extents(points)
     allowed = _allowed(points, degrees or look_like_degrees(points))
     own = allowed < min(_FINE * longest, _FINEST)
-    if known is not None and _share(points - known, allowed, own, longest):
+    if known is not None and _share(points - np.asarray(known), allowed, own, longest):
         return np.array(known, dtype=np.float64)
     coarse = _steps(points) > allowed
     shifted = coarse & own if not (coarse & ~own).any() else np.full(3, True)
@@ -92,6 +95,6 @@ def choose_origin(points, known=None, *, degrees=False):
     return np.where(shifted, np.round(middle / grid) * grid, 0.0)
 
 
-def _share(points, allowed, own, longest):
+def _share(points: Floats, allowed: Floats, own: Bools, longest: float) -> bool:
     """Whether points less the origin of others have steps that are fine enough for the sake of a common one."""
     return bool((_steps(points) <= np.where(own, _SHARED * allowed, _SHARED * _FINE * longest)).all())

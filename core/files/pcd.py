@@ -1,11 +1,13 @@
 """PCD, the point files of the Point Cloud Library: text, binary, or packed by LZF."""
 
 import struct
-from typing import NamedTuple
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array
 from .lines import brief
 from .rows import read_records, read_rows, too_short
 from .table import PointTable, from_columns
@@ -23,10 +25,10 @@ _MOST_REPEATED = 88  # times that LZF may make data longer: three bytes repeat 2
 class _Field(NamedTuple):
     name: str
     code: str  # numpy's, without the byte order
-    count: int  # numbers of each point
+    count: int  # type: ignore[assignment]  # numbers of each point
 
 
-def read_pcd(path) -> PointTable:
+def read_pcd(path: Path) -> PointTable:
     """Read the points of a PCD file with all their fields of one number; those that the sensor missed are left out.
 
     Raises
@@ -36,14 +38,14 @@ def read_pcd(path) -> PointTable:
     """
     with open(path, "rb") as file:
         fields, count, kind = _read_header(file, path)
-        columns = {"ascii": _read_text, "binary": _read_binary, "binary_compressed": _read_packed}[kind](
+        values = {"ascii": _read_text, "binary": _read_binary, "binary_compressed": _read_packed}[kind](
             file, fields, count, path
         )
     left_out = [field.name for field in fields if field.count != 1 and field.name != "_"]
     columns = {
         field.name: column
-        for field, column in zip(fields, columns, strict=True)
-        if field.count == 1 and field.name != "_"  # which only fills records
+        for field, column in zip(fields, values, strict=True)
+        if column is not None and field.name != "_"  # which only fills records
     }
     for name in _COLORS:
         if name in columns:
@@ -55,9 +57,9 @@ def read_pcd(path) -> PointTable:
     return table
 
 
-def _read_header(file, path):
+def _read_header(file: BinaryIO, path: Path) -> tuple[list[_Field], int, str]:
     """Return the fields, the number of points and the kind of data; leave the file where the data begin."""
-    found = {}
+    found: dict[str, list[str]] = {}
     for number in range(1, _MOST_LINES):
         line = file.readline(_LONGEST).decode(errors="replace").strip()
         key, *words = line.split() or ["#"]
@@ -67,7 +69,7 @@ def _read_header(file, path):
             case "FIELDS" | "SIZE" | "TYPE" | "COUNT":
                 found[key] = words
             case "WIDTH" | "HEIGHT" | "POINTS" if len(words) == 1 and _is_count(words[0]):
-                found[key] = int(words[0])
+                found[key] = words
             case "VERSION" | "VIEWPOINT":
                 pass
             case "DATA" if words in (["ascii"], ["binary"], ["binary_compressed"]):
@@ -80,19 +82,20 @@ def _read_header(file, path):
     raise InvalidPointsError(f"{path} has no header of a PCD file that ends with DATA. Export it again.")
 
 
-def _is_count(word):
+def _is_count(word: str) -> bool:
     return word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS
 
 
-def _read_fields(found, path):
+def _read_fields(found: dict[str, list[str]], path: Path) -> tuple[list[_Field], int]:
     """Return the fields and the number of points that the lines of a header tell."""
     names, sizes, types = (found.get(key, []) for key in ("FIELDS", "SIZE", "TYPE"))
     counts = found.get("COUNT", ["1"] * len(names))
-    count = found.get("POINTS", found.get("WIDTH", 0) * found.get("HEIGHT", 1))
-    codes = [_TYPES.get(f"{kind} {size}") for kind, size in zip(types, sizes, strict=False)]
+    width, height = (int(found.get(key, [usual])[0]) for key, usual in (("WIDTH", "0"), ("HEIGHT", "1")))
+    count = int(found["POINTS"][0]) if "POINTS" in found else width * height
+    codes = [_TYPES.get(f"{kind} {size}", "") for kind, size in zip(types, sizes, strict=False)]
     if (
         not len(names) == len(sizes) == len(types) == len(counts)
-        or None in codes
+        or "" in codes
         or not all(map(_is_count, counts))
         or sum(map(int, counts)) > _WIDEST
     ):
@@ -102,14 +105,14 @@ def _read_fields(found, path):
     return [_Field(name, code, int(number)) for name, code, number in zip(names, codes, counts, strict=True)], count
 
 
-def _read_text(file, fields, count, path):
+def _read_text(file: BinaryIO, fields: list[_Field], count: int, path: Path) -> list[Array | None]:
     types = [field.code for field in fields for _ in range(field.count)]
     columns = read_rows(file, types, count, path)
     firsts = np.cumsum([0] + [field.count for field in fields])
     return [columns[first] if field.count == 1 else None for field, first in zip(fields, firsts, strict=False)]
 
 
-def _read_binary(file, fields, count, path):
+def _read_binary(file: BinaryIO, fields: list[_Field], count: int, path: Path) -> list[Array | None]:
     record = np.dtype([(f"f{index}", f"<{field.code}", (field.count,)) for index, field in enumerate(fields)])
     rows = read_records(file, file.tell(), record, count, path)
     return [
@@ -117,7 +120,7 @@ def _read_binary(file, fields, count, path):
     ]
 
 
-def _read_packed(file, fields, count, path):
+def _read_packed(file: BinaryIO, fields: list[_Field], count: int, path: Path) -> list[Array | None]:
     """Read data packed as a whole: all values of the first field, then all of the next one."""
     head = file.read(8)
     packed, length = struct.unpack("<II", head) if len(head) == 8 else (0, 0)
@@ -134,8 +137,9 @@ def _read_packed(file, fields, count, path):
     ]
 
 
-def _unpack(data, length):
+def _unpack(data: bytes, length: int) -> bytearray:
     """Undo LZF: runs of bytes as they are, and repetitions of bytes before; only one after another can be undone."""
+    part: bytes | bytearray
     result = bytearray(length)
     place = done = 0
     try:
@@ -170,7 +174,7 @@ def _unpack(data, length):
     return result
 
 
-def _split_color(column, alpha):
+def _split_color(column: Array, alpha: bool) -> dict[str, Array]:
     """Return the columns of a color whose bytes are alpha, red, green and blue of a whole number, or of a float."""
     bits = column.astype(np.float32).view(np.uint32) if column.dtype.kind == "f" else column.astype(np.uint32)
     parts = {name: (bits >> shift).astype(np.uint8) for name, shift in (("red", 16), ("green", 8), ("blue", 0))}

@@ -1,10 +1,13 @@
 """PLY, the Stanford polygon format: the vertices and their properties, in text or binary."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array, Ints
 from .ascii_words import ascii_words
 from .lines import brief
 from .ply_lists import end_of_records, read_fixed
@@ -24,12 +27,12 @@ _MOST_DIGITS = 15  # of a count
 
 class _Element(NamedTuple):
     name: str
-    count: int
-    names: list  # of the properties
-    types: list  # numpy's codes; a pair for a list: of its length and of its items
+    count: int  # type: ignore[assignment]  # in place of the method of tuples
+    names: list[Any]  # of the properties
+    types: list[Any]  # numpy's codes; a pair for a list: of its length and of its items
 
     @property
-    def lists(self):
+    def lists(self) -> list[str]:
         """Names of the properties that are lists."""
         return [name for name, code in zip(self.names, self.types, strict=True) if isinstance(code, tuple)]
 
@@ -49,13 +52,13 @@ class PlyVertices(NamedTuple):
         What was left out.
     """
 
-    columns: dict
+    columns: dict[str, Any]
     order: str | None
-    comments: list
-    notices: list
+    comments: list[str]
+    notices: list[str]
 
 
-def read_ply(path) -> PointTable:
+def read_ply(path: Path) -> PointTable:
     """Read the vertices of a PLY file with all their properties.
 
     Raises
@@ -69,7 +72,7 @@ def read_ply(path) -> PointTable:
     return table
 
 
-def read_vertex_columns(path) -> PlyVertices:
+def read_vertex_columns(path: Path) -> PlyVertices:
     """Read the vertices of a PLY file as they stand there; errors as of `read_ply`."""
     with open(path, "rb") as file:
         order, elements, comments = _read_header(file, path)
@@ -96,14 +99,14 @@ def read_vertex_columns(path) -> PlyVertices:
     return PlyVertices(dict(zip(single, columns, strict=True)), order, comments, notices)
 
 
-def read_vertex_names(path) -> list:
+def read_vertex_names(path: Path) -> list[str]:
     """Read the names of the properties of the vertices of a PLY file; none if it has no vertices."""
     with open(path, "rb") as file:
         elements = _read_header(file, path)[1]
     return next((element.names for element in elements if element.name == "vertex"), [])
 
 
-def read_elements(path):
+def read_elements(path: Path) -> tuple[str | None, list[str], dict[str, dict[str, Array]]]:
     """Read all elements of a PLY file that has no lists, as they stand there; errors as of `read_ply`.
 
     Returns
@@ -115,7 +118,8 @@ def read_elements(path):
     dict of str to dict of str to ndarray
         By the names of the elements, their columns by the names of the properties.
     """
-    found, before = {}, []
+    found: dict[str, dict[str, Array]] = {}
+    before: list[_Element] = []
     with open(path, "rb") as file:
         order, elements, comments = _read_header(file, path)
         begin = file.tell()
@@ -134,11 +138,13 @@ def read_elements(path):
     return order, comments, found
 
 
-def _read_header(file, path):
+def _read_header(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element], list[str]]:
     """Return the byte order, None for text, the elements and comments; leave the file where the data begin."""
     if file.readline(_LONGEST).strip() != b"ply":
         raise InvalidPointsError(f"{path} is no PLY file: its first line is not 'ply'. Export it again.")
-    order, elements, comments = "", [], []
+    order: str | None = ""
+    elements: list[_Element] = []
+    comments: list[str] = []
     for number in range(2, _LONGEST):
         line = file.readline(_LONGEST).decode(errors="replace").strip()
         match line.split():
@@ -166,7 +172,7 @@ def _read_header(file, path):
     raise InvalidPointsError(f"{path} has a header without an end. Export it again.")
 
 
-def _read_binary(file, order, before, vertex, path):
+def _read_binary(file: BinaryIO, order: str, before: list[_Element], vertex: _Element, path: Path) -> list[Array]:
     begin = file.tell()
     for element in before:
         begin = end_of_records(file, begin, order, element.types, element.count, path)
@@ -177,7 +183,9 @@ def _read_binary(file, order, before, vertex, path):
     return [rows[f"f{index}"].astype(code) for index, code in enumerate(vertex.types)]
 
 
-def write_ply(path, table, double=True, faces=()) -> list:
+def write_ply(
+    path: Path, table: PointTable, double: bool = True, faces: list[Ints] | tuple[Any, ...] = ()
+) -> list[str]:
     """Write a table as a binary PLY file, and return notices; see `write_vertex_columns`.
 
     Parameters
@@ -195,7 +203,13 @@ def write_ply(path, table, double=True, faces=()) -> list:
     return write_vertex_columns(path, columns, faces=faces)
 
 
-def write_vertex_columns(path, columns, order="<", comments=(), faces=()) -> list:
+def write_vertex_columns(
+    path: Path,
+    columns: dict[str, Array],
+    order: str = "<",
+    comments: Sequence[str] = (),
+    faces: Sequence[Ints] = (),
+) -> list[str]:
     """Write a binary PLY file.
 
     Parameters
@@ -247,12 +261,12 @@ def write_vertex_columns(path, columns, order="<", comments=(), faces=()) -> lis
     return notices
 
 
-def _all_triangles(faces, columns):
+def _all_triangles(faces: list[Ints], columns: dict[str, Array]) -> Ints:
     places = np.stack([columns[axis] for axis in "xyz"], axis=1)
     return np.concatenate([triangles(part, places) for part in faces])
 
 
-def _with_types(columns):
+def _with_types(columns: dict[str, Array]) -> tuple[dict[str, Array], list[Any]]:
     """Return columns in types that PLY has, and notices of those that became two."""
     result, notices = {}, []
     for name, values in columns.items():
@@ -270,7 +284,7 @@ def _with_types(columns):
     return result, notices
 
 
-def _whole_type(values):
+def _whole_type(values: Ints) -> str | None:
     """Return the smallest type of PLY that holds whole numbers of 8 bytes; None if there is none."""
     low, high = (int(values.min()), int(values.max())) if len(values) else (0, 0)
     limits = (("i4", -(2**31), 2**31 - 1), ("u4", 0, 2**32 - 1), ("f8", -(2**53), 2**53))

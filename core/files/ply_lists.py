@@ -2,17 +2,24 @@
 
 import os
 import struct
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import BinaryIO, TypeAlias
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ..errors import InvalidPointsError
+from ..types import Array, Ints
 from .rows import too_short
+
+Code: TypeAlias = str | tuple[str, str]  # of a number, or of the length and the items of a list
+Part: TypeAlias = tuple[list[str], tuple[str, str] | None]
 
 _BLOCK = 2**16  # records that are found before their numbers are read
 
 
-def read_fixed(file, begin, order, types, count, path) -> list:
+def read_fixed(file: BinaryIO, begin: int, order: str, types: Sequence[Code], count: int, path: Path) -> list[Array]:
     """Read the columns of records that are no lists.
 
     Parameters
@@ -41,15 +48,16 @@ def read_fixed(file, begin, order, types, count, path) -> list:
         index = 0
         for starts, (codes, _) in zip(marks.T, parts, strict=True):
             record = np.dtype([(f"f{number}", order + code) for number, code in enumerate(codes)])
-            if codes:
-                rows = sliding_window_view(octets, record.itemsize)[starts].view(record)[:, 0]
+            if not codes:
+                continue
+            records = sliding_window_view(octets, record.itemsize)[starts].view(record)[:, 0]
             for number in range(len(codes)):
-                columns[index][done : done + len(marks)] = rows[f"f{number}"]
+                columns[index][done : done + len(marks)] = records[f"f{number}"]
                 index += 1
     return columns
 
 
-def end_of_records(file, begin, order, types, count, path) -> int:
+def end_of_records(file: BinaryIO, begin: int, order: str, types: Sequence[Code], count: int, path: Path) -> int:
     """Return where records end; the parameters are those of `read_fixed`."""
     if all(isinstance(code, str) for code in types):
         return begin + count * np.dtype([(f"f{index}", code) for index, code in enumerate(types)]).itemsize
@@ -62,7 +70,7 @@ def end_of_records(file, begin, order, types, count, path) -> int:
     return begin + place
 
 
-def _rest(file, begin, types, count, path):
+def _rest(file: BinaryIO, begin: int, types: Sequence[Code], count: int, path: Path) -> bytes:
     """Return the bytes of a file from a place on; refuse one that is too short for so many empty lists."""
     least = sum(int((code if isinstance(code, str) else code[0])[1:]) for code in types)
     found = max(os.fstat(file.fileno()).st_size - begin, 0) // least
@@ -72,7 +80,7 @@ def _rest(file, begin, types, count, path):
     return file.read()
 
 
-def _equal_records(data, order, types, count):
+def _equal_records(data: bytes, order: str, types: Sequence[Code], count: int) -> Array | None:
     """Return records whose lists are all as long as those of the first one; None if they are not."""
     fields, lengths, size = [], {}, 0
     for index, code in enumerate(types):
@@ -93,9 +101,9 @@ def _equal_records(data, order, types, count):
     return rows if all((rows[name] == length).all() for name, length in lengths.items()) else None
 
 
-def _divide(types):
+def _divide(types: Sequence[Code]) -> list[Part]:
     """Divide properties behind each list: codes of those before it, and its own, which are None behind the last one."""
-    parts = [([], None)]
+    parts: list[Part] = [([], None)]
     for code in types:
         if isinstance(code, tuple):
             parts[-1] = (parts[-1][0], code)
@@ -105,7 +113,7 @@ def _divide(types):
     return parts
 
 
-def _reader(data, order, code):
+def _reader(data: bytes, order: str, code: str) -> Callable[[int], int]:
     """Return a function of a place in a file that gives the number there."""
     if code == "u1":
         return data.__getitem__
@@ -113,7 +121,9 @@ def _reader(data, order, code):
     return lambda place: read(data, place)[0]
 
 
-def _walk(data, place, order, parts, count, path, progress):
+def _walk(
+    data: bytes, place: int, order: str, parts: list[Part], count: int, path: Path, progress: tuple[int, int]
+) -> tuple[Ints, int]:
     """Go through records one by one, since where one begins depends on all before: in .8 s for a million of two lists.
 
     Returns
@@ -125,7 +135,8 @@ def _walk(data, place, order, parts, count, path, progress):
     """
     steps = [
         (sum(int(code[1:]) for code in codes), _reader(data, order, pair[0]), int(pair[0][1:]), int(pair[1][1:]))
-        for codes, pair in parts[:-1]
+        for codes, pair in parts
+        if pair is not None
     ]
     tail, marks = sum(int(code[1:]) for code in parts[-1][0]), []
     try:

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from ..types import Floats, Ints
 
-def triangles(faces, points):
+
+def triangles(faces: Ints, points: Floats) -> Ints:
     """Divide faces of k corners into triangles, quads along their shorter diagonal, others into fans.
 
     Parameters

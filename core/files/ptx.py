@@ -1,12 +1,16 @@
 """PTX, rasters of rays as scanners by Leica export them: scans one after another, each with its place and matrix."""
 
+from collections.abc import Iterator
 from itertools import chain, islice
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Bools, Floats
 from .lines import brief, is_number, read_text
-from .table import SCANNER, from_columns
+from .table import SCANNER, PointTable, from_columns
 
 _HEAD = 10  # lines: columns, rows, the scanner's place and axes, and four rows of a matrix
 _MOST_DIGITS = 9  # of a number of columns or rows
@@ -17,12 +21,12 @@ _ROUNDED = 1e-6  # ... but for rounding
 _UNKNOWN = 0.5  # intensity of rays that hit nothing
 
 
-def holds_ptx(blocks) -> bool:
+def holds_ptx(blocks: Iterator[Any]) -> bool:
     """Tell whether a text begins as PTX does, whatever the file is called."""
     return _parse([*islice(_filled(blocks), _HEAD)]) is not None
 
 
-def read_ptx(path):
+def read_ptx(path: Path) -> PointTable:
     """Read a PTX file: the points of all scans, where their matrices put them, without rays that hit nothing.
 
     Each point gets the place of its scanner as a vector, and the number of its scan, if there are several.
@@ -36,9 +40,10 @@ def read_ptx(path):
     InvalidPointsError
         It is no PTX file, or announces another number of points than it has; the text says where.
     """
-    scans, missed = [], 0
-    lines = enumerate(chain.from_iterable(read_text(path)), start=1)
-    lines = ((number, line) for number, line in lines if _is_filled(line))
+    scans: list[tuple[Floats, Floats]] = []
+    missed = 0
+    numbered = enumerate(chain.from_iterable(read_text(path)), start=1)
+    lines = ((number, line) for number, line in numbered if _is_filled(line))
     while head := [*islice(lines, _HEAD)]:
         values, center, misses = _read_scan(lines, head, len(scans), path)
         scans.append((values, center))
@@ -46,16 +51,16 @@ def read_ptx(path):
     return _join(scans, missed, path)
 
 
-def _filled(blocks):
+def _filled(blocks: Iterator[Any]) -> Any:
     return filter(_is_filled, chain.from_iterable(blocks))
 
 
-def _is_filled(line):
+def _is_filled(line: str) -> bool:
     """Tell whether a line is neither empty nor a comment, as some programs write before the first scan."""
     return bool(line.strip()) and not line.lstrip().startswith(("#", "//"))
 
 
-def _parse(lines):
+def _parse(lines: list[str]) -> tuple[int, Floats, Floats] | None:
     """Return the number of points, the scanner's place and the matrix that the first lines of a scan tell, or None."""
     words = [line.split() for line in lines]
     if [len(row) for row in words] != [1, 1, 3, 3, 3, 3, 4, 4, 4, 4]:
@@ -75,7 +80,9 @@ def _parse(lines):
     return int(sizes[0]) * int(sizes[1]), np.array(words[2], dtype=np.float64), matrix
 
 
-def _read_scan(lines, head, number, path):
+def _read_scan(
+    lines: Iterator[Any], head: list[tuple[int, str]], number: int, path: Path
+) -> tuple[Floats, Floats, int]:
     """Read a scan: its points, (n, k), where its matrix puts them, the scanner's place, the number of missed rays."""
     found = _parse([line for _, line in head])
     if found is None and number:
@@ -93,10 +100,10 @@ def _read_scan(lines, head, number, path):
     missed = _missed(values)
     values = values[~missed]
     values[:, :3] = values[:, :3] @ matrix[:3, :3] + matrix[3, :3]
-    return values, _center(values[:, :3], place, matrix), np.count_nonzero(missed)
+    return values, _center(values[:, :3], place, matrix), int(np.count_nonzero(missed))
 
 
-def _missed(values):
+def _missed(values: Floats) -> Bools:
     """Tell which rays hit nothing: those at 0 0 0, except a single one that has an intensity."""
     missed = (values[:, :3] == 0.0).all(axis=1)
     if values.shape[1] in (4, 7):
@@ -106,10 +113,10 @@ def _missed(values):
     return missed
 
 
-def _read_rows(lines, count, number, path):
+def _read_rows(lines: Iterator[Any], count: int, number: int, path: Path) -> Floats:
     seen = [0]  # the line that numpy read last
 
-    def rows():
+    def rows() -> Iterator[str]:
         for seen[0], line in islice(lines, count):
             yield line
 
@@ -131,7 +138,7 @@ def _read_rows(lines, count, number, path):
     return values
 
 
-def _center(points, place, matrix):
+def _center(points: Floats, place: Floats, matrix: Floats) -> Floats:
     """Return where the scanner stood: the origin of its own coordinates, which the matrix moves.
 
     Programs that have moved the points themselves write a matrix that does nothing.
@@ -143,11 +150,12 @@ def _center(points, place, matrix):
     return moved
 
 
-def _join(scans, missed, path):
+def _join(scans: list[tuple[Floats, Floats]], missed: int, path: Path) -> PointTable:
     """Return one table of all scans; what a scan lacks is zero, its colors white."""
     counts = [len(values) for values, _ in scans]
     total = sum(counts)
-    columns, colored = {}, np.zeros(total, bool)
+    columns: dict[str, Floats] = {}
+    colored = np.zeros(total, bool)
     for start, (values, _) in zip(np.cumsum([0, *counts]), scans, strict=False):
         names = _NAMES if values.shape[1] != 6 else [name for name in _NAMES if name != "intensity"]
         for name, column in zip(names, values.T, strict=False):

@@ -1,18 +1,22 @@
 """Points one after another, as many as a header names: rows of text, or records of bytes."""
 
 import os
+from collections.abc import Iterator, Sequence
 from itertools import chain, groupby, islice
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array, Floats, Ints
 from .lines import brief, is_number, read_blocks
 
 _LONG = ("i8", "u8")
 _EXACT = 2.0**53  # beyond this, doubles are no longer all whole numbers
 
 
-def read_records(file, begin, record, count, path):
+def read_records(file: BinaryIO, begin: int, record: np.dtype[Any], count: int, path: Path) -> Array:
     """Read records that begin at a place in an open file.
 
     Parameters
@@ -32,7 +36,7 @@ def read_records(file, begin, record, count, path):
     return np.fromfile(file, record, count)
 
 
-def read_rows(file, types, count, path, skipped=0) -> list:
+def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Path, skipped: int = 0) -> list[Array]:
     """Read the columns of the rows of text from here on.
 
     Parameters
@@ -55,7 +59,7 @@ def read_rows(file, types, count, path, skipped=0) -> list:
     """
     begin, codes = file.tell(), [code for code in types if code is not None]
 
-    def rows():
+    def rows() -> Any:
         """Return the lines of the points from the first on; there may be fewer than the header names."""
         file.seek(begin)
         filled = filter(bytes.strip, chain.from_iterable(read_blocks(file, path)))
@@ -82,7 +86,7 @@ def read_rows(file, types, count, path, skipped=0) -> list:
     ]
 
 
-def _without_lists(lines, types, path):
+def _without_lists(lines: Any, types: Sequence[str | None], path: Path) -> Iterator[bytes]:
     """Yield lines without their lists: each is a number of numbers, and these."""
     steps = [(len([*run]), is_list) for is_list, run in groupby(code is None for code in types)]
     for number, line in enumerate(lines, start=1):
@@ -103,7 +107,7 @@ def _without_lists(lines, types, path):
         yield b" ".join(kept)
 
 
-def _is_long(column, code):
+def _is_long(column: Floats, code: str) -> bool:
     """Whether a column has whole numbers of 8 bytes whose last digits doubles would lose."""
     if code not in _LONG or not len(column):
         return False
@@ -111,12 +115,12 @@ def _is_long(column, code):
     return float(limits.min) <= column.min() and _EXACT <= np.abs(column).max() < float(limits.max)
 
 
-def _load_whole(lines, index, code):
+def _load_whole(lines: Any, index: int, code: str) -> Ints:
     """Read a column of whole numbers as such."""
     return np.loadtxt(lines, code, usecols=index, ndmin=1, comments=None, encoding="ascii")
 
 
-def _typed(column, code):
+def _typed(column: Floats, code: str) -> Array:
     """Give numbers of text the type that the header names, unless that would lose what the text holds.
 
     It may hold more digits than the float of the header, and numbers that are no whole ones, or too large.
@@ -129,14 +133,14 @@ def _typed(column, code):
     return column.astype("f8")
 
 
-def too_short(path, found, count):
+def too_short(path: Path, found: int, count: int) -> InvalidPointsError:
     """Return the error of a file with fewer points than its header names."""
     return InvalidPointsError(
         f"{path} ends after {found} of the {count} points that its header names. Copy or save it again."
     )
 
 
-def _refuse_row(lines, width, path):
+def _refuse_row(lines: Any, width: int, path: Path) -> None:
     """Say which of some lines does not hold so many numbers."""
     for number, line in enumerate(lines, start=1):
         words = line.decode("ascii", errors="replace").split()

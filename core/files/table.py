@@ -1,12 +1,15 @@
 """What a point file holds: a place, and other values, for each point."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import chain, count
+from pathlib import Path
 
 import numpy as np
 
 from ..errors import InvalidPointsError, TooFewPointsError
+from ..types import Array, Floats
 from .lines import brief
 
 NORMAL = "normal"  # the attribute that files call nx ny nz
@@ -38,15 +41,15 @@ class PointTable:
         What was left out.
     """
 
-    points: np.ndarray
-    attributes: dict = field(default_factory=dict)
-    colors: np.ndarray | None = None
+    points: Floats
+    attributes: dict[str, Array] = field(default_factory=dict)
+    colors: Floats | None = None
     single: bool = False
     degrees: bool = False
-    notices: list = field(default_factory=list)
+    notices: list[str] = field(default_factory=list)
 
 
-def from_columns(columns, path):
+def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
     """Make a table of columns by the names that files give them.
 
     Parameters
@@ -65,20 +68,20 @@ def from_columns(columns, path):
         )
     left = dict(columns)
 
-    def take(names):
+    def take(names: tuple[str, ...]) -> list[Array] | None:
         """Take columns out by their lower case names; none if one is missing."""
         if not all(name in named and named[name] in left for name in names):
             return None
         return [left.pop(named[name]) for name in names]
 
-    places = take(_AXES)
+    places = [left.pop(named[axis]) for axis in _AXES]
     table = PointTable(np.stack(places, axis=1, dtype=np.float64))
     table.single = any(place.dtype == np.float32 for place in places)
-    colors = next(filter(None, map(take, _COLORS)), None)
-    if colors is not None:
+    channels = next(filter(None, map(take, _COLORS)), None)
+    if channels is not None:
         alpha = next(filter(None, map(take, _ALPHAS)), None)
-        colors = np.stack(colors, axis=1)
-        table.colors = unit_colors(colors, alpha and alpha[0])
+        colors = np.stack(channels, axis=1)
+        table.colors = unit_colors(colors, alpha[0] if alpha else None)
         table.notices += told_depth(colors, path)
     normals = take(_NORMALS)
     if normals is not None:
@@ -86,14 +89,14 @@ def from_columns(columns, path):
     for name in columns:
         match = re.fullmatch(r"(.+)_x", name)
         vector = [f"{match[1]}_{axis}" for axis in _AXES] if match else []
-        if vector and all(part in left for part in vector):
+        if match and all(part in left for part in vector):
             table.attributes[match[1]] = np.stack([left.pop(part) for part in vector], axis=1)
         elif name in left:
             table.attributes[name] = left.pop(name)
     return table
 
 
-def unit_colors(colors, alpha=None):
+def unit_colors(colors: Array, alpha: Floats | None = None) -> Array:
     """Return colors from 0 to 1.
 
     Parameters
@@ -115,7 +118,7 @@ def unit_colors(colors, alpha=None):
     return np.fmin(np.fmax(result, 0.0, out=result), 1.0, out=result)  # NaN becomes 0
 
 
-def full_color(values) -> float:
+def full_color(values: Array) -> float:
     """Return the number that stands for a full color: by the type of bytes, which is told, otherwise by the numbers.
 
     Programs write 8, 10 or 12 bits in types of 16, and from 0 to 1 in whole numbers where all colors are pure.
@@ -129,18 +132,18 @@ def full_color(values) -> float:
     return next((2.0**bits - 1.0 for bits in _DEPTHS if largest < 2.0**bits), 1.0)
 
 
-def told_depth(colors, path):
+def told_depth(colors: Array, path: Path) -> Iterator[str]:
     """Yield of what depth colors are, where that is not usual."""
     full = full_color(colors)
     if full in (1023.0, 4095.0):
         yield f"{path.name}: no color is above {full:g}, so that these are taken for colors from 0 to {full:g}."
 
 
-def to_columns(table) -> dict:
+def to_columns(table: PointTable) -> dict[str, Array]:
     """Return the columns of a table by the names of files, numbers as they are; the reverse of `from_columns`."""
     columns = dict(zip(_AXES, table.points.T, strict=True))
     attributes = dict(table.attributes)
-    if np.ndim(attributes.get(NORMAL)) == 2:
+    if NORMAL in attributes and attributes[NORMAL].ndim == 2:
         columns.update(zip(_NORMALS, attributes.pop(NORMAL).T, strict=True))
     if table.colors is not None:
         values = np.round(255.0 * table.colors).astype(np.uint8)
@@ -150,20 +153,20 @@ def to_columns(table) -> dict:
     return columns
 
 
-def split_columns(name, values) -> dict:
+def split_columns(name: str, values: Array) -> dict[str, Array]:
     """Return an attribute as columns of numbers by their names: vectors as one of each axis."""
     if values.ndim == 1:
         return {name: values}
     return {f"{name}_{axis}": part for axis, part in zip(_AXES[: len(values.T)], values.T, strict=True)}
 
 
-def _free_name(name, columns):
+def _free_name(name: str, columns: dict[str, Array]) -> str:
     """Return a name for one more column, with a number if it is taken: an attribute may be called x."""
     numbered = (f"{name}_{number}" for number in count(2))
     return next(free for free in chain([name], numbered) if free not in columns)
 
 
-def without_missed(table, path) -> PointTable:
+def without_missed(table: PointTable, path: Path) -> PointTable:
     """Return a table without the points that have no place: sensors with a raster of rays write NaN where they miss.
 
     Other programs write the largest number there is.
@@ -175,7 +178,7 @@ def without_missed(table, path) -> PointTable:
     path : pathlib.Path
         The file, for the texts.
     """
-    kept = (np.abs(table.points) <= FARTHEST).all(axis=1)
+    kept = np.all(np.abs(table.points) <= FARTHEST, axis=1)
     missed = len(kept) - np.count_nonzero(kept)
     far = np.isfinite(table.points).all(axis=1) & ~kept
     if not missed or far.all():
@@ -191,7 +194,7 @@ def without_missed(table, path) -> PointTable:
     return table
 
 
-def check_places(points, path) -> float:
+def check_places(points: Floats, path: Path) -> float:
     """Refuse a file without points, or with coordinates that are no places, and return the largest coordinate."""
     if len(points) == 0:
         raise TooFewPointsError(f"{path} has no points. Give a file with points.")

@@ -1,12 +1,16 @@
 """Columns of numbers as text: XYZ, CSV, PTS, and the vertices of OBJ files."""
 
 import re
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain, islice
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array, Floats
 from .cells import Rows, find_rows, load, load_whole
 from .digits import shortest
 from .guess import guess_names
@@ -28,7 +32,7 @@ _SCAN_NAMES = {  # of the columns of PTS files
 }
 
 
-def read_columns(path, columns="") -> PointTable:
+def read_columns(path: Path, columns: str = "") -> PointTable:
     """Read a text file with a point a line.
 
     Columns are separated by semicolons, tabs, bars, white space or commas; beside commas, numbers have decimal
@@ -45,12 +49,14 @@ def read_columns(path, columns="") -> PointTable:
     return _read_text(partial(read_text, path, _SKIPPED), path, columns)
 
 
-def read_scan(path, columns="") -> PointTable:
+def read_scan(path: Path, columns: str = "") -> PointTable:
     """Read a PTS file: scans one after another, each begins with the number of its points; columns as above."""
     return _read_text(lambda: _without_counts(read_text(path, _SKIPPED), path), path, columns, _SCAN_NAMES)
 
 
-def _read_text(blocks, path, columns, usual=None):
+def _read_text(
+    blocks: Callable[..., Any], path: Path, columns: str, usual: dict[int, tuple[str, ...]] | None = None
+) -> PointTable:
     """Read rows of numbers, in which columns without names have the usual ones for their number."""
     columns = columns.strip()
     if not columns and holds_ptx(read_text(path, _SKIPPED)):
@@ -77,7 +83,7 @@ def _read_text(blocks, path, columns, usual=None):
     return table
 
 
-def _exact(rows, index, values):
+def _exact(rows: Rows, index: int, values: Floats) -> tuple[Array, bool]:
     """Return values as whole numbers if doubles would lose their digits, and whether some are lost nevertheless."""
     if not (np.abs(values) >= _EXACT).any():
         return values, False
@@ -85,20 +91,20 @@ def _exact(rows, index, values):
     return (values if whole is None else whole), lost
 
 
-def _renamed(columns, names):
+def _renamed(columns: dict[str, Array], names: dict[str, str]) -> dict[str, Array]:
     """Return columns by new names, but for those that others have, such as the places."""
     taken = {*"xyz", *columns} - {*names}
     return {_free(names.get(name, name), name, taken): values for name, values in columns.items()}
 
 
-def _free(new, old, taken):
+def _free(new: str, old: str, taken: set[str]) -> str:
     """Return the new name of a column if it is free, otherwise the old one, which no place may have."""
     if new != old and new not in taken:
         return new
     return f"{old}_2" if old in ("x", "y", "z") else old
 
 
-def _tell_guess(path, places, labels, names):
+def _tell_guess(path: Path, places: list[int], labels: list[str], names: list[str]) -> str:
     """Tell what columns without names were taken for."""
     parts = [
         (what, [label for label, name in zip(labels, names, strict=True) if name in kind])
@@ -116,7 +122,7 @@ def _tell_guess(path, places, labels, names):
     )
 
 
-def _without_counts(blocks, path):
+def _without_counts(blocks: Iterator[Any], path: Path) -> Iterator[list[str]]:
     """Yield the lines of a PTS file, empty ones for the numbers of points, which must be right if there are any."""
     count = missing = passed = 0
     counted = None  # whether the first line was a number of points
@@ -145,16 +151,16 @@ def _without_counts(blocks, path):
         )
 
 
-def _holds_numbers(line):
+def _holds_numbers(line: str) -> bool:
     """Tell whether a line is a point, and not one of names after a number of points."""
     return any(map(is_number, re.split(r"[\s,;]+", line)))
 
 
-def read_vertices(path) -> PointTable:
+def read_vertices(path: Path) -> PointTable:
     """Read the vertices of an OBJ file, with colors if they have any."""
     faces = 0
 
-    def blocks():
+    def blocks() -> Iterator[list[str]]:
         """Yield the lines of vertices without their v, and empty ones in place of others."""
         nonlocal faces
         faces = 0
@@ -178,7 +184,7 @@ def read_vertices(path) -> PointTable:
     return table
 
 
-def _vertex_names(rows):
+def _vertex_names(rows: Rows) -> list[str]:
     """Return the names of the numbers of a vertex: of seven the fourth is a weight if it is 1, or the last alpha."""
     if rows.width == 7:
         weighted = all(float(words[3]) == 1.0 for words in rows.sample if len(words) == 7 and is_number(words[3]))
@@ -186,7 +192,7 @@ def _vertex_names(rows):
     return ["x", "y", "z", "r", "g", "b"] if rows.width == 6 else ["x", "y", "z"]
 
 
-def write_columns(path, table, delimiter=" ", double=True):
+def write_columns(path: Path, table: PointTable, delimiter: str = " ", double: bool = True) -> None:
     """Write a table as text, a point a line, with the names of the columns before them.
 
     Parameters
@@ -217,7 +223,7 @@ def write_columns(path, table, delimiter=" ", double=True):
             file.write((line * len(rows)) % tuple(rows.reshape(-1).tolist()))
 
 
-def _text_format(values):
+def _text_format(values: Array) -> str:
     """Return how numbers are written so that they are the same when they are read again, in as few digits."""
     if values.dtype.kind in "biu":
         return "%d"

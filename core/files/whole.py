@@ -1,13 +1,15 @@
 """Files that are there whole or not at all."""
 
 import os
+from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from ..errors import PointCloudError
 
 
 @contextmanager
-def replacing(path):
+def replacing(path: Path) -> Iterator[Path]:
     """Give the name of a file beside this one to write to, and put it in its place at the end.
 
     If writing fails, what was there before stays. The folder is made if it is missing.

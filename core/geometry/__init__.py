@@ -1,12 +1,15 @@
 """What the points tell: neighbourhoods, components, normals, boundary, bandwidth and pairs; `cloud` runs the stages."""
 
-from .cloud import Discs, estimate_normals, read_cloud, surface_discs
+from .boundary import Boundary
+from .cloud import Cloud, Discs, estimate_normals, read_cloud, surface_discs
 from .components import SMALLEST, move_apart
 from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights
 from .nearest import ON, ROUNDS, SMOOTH, fading_weights, find_nearest, nearest_rows, typical_distance
 from .normals import unit_normals
 from .orientation import orient_normals, toward
-from .points import FEWEST, as_indices, as_mask, check_points, check_values
+from .pairs import Pairs
+from .patches import Patch
+from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import frames
 from .subset import blue_noise_subset

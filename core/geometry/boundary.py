@@ -1,15 +1,17 @@
 """Boundaries of open surfaces: which points lie at one, and how far every point is from it."""
 
 from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, inverses, on_all_cores
 from ..kernel import SUPPORT
+from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
-from .nearest import ON, SMOOTH, fading_weights
+from .nearest import ON, SMOOTH, Nearest, fading_weights
 from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
@@ -49,16 +51,16 @@ class Boundary:
         Unit vector across the boundary; zero where it is not known.
     """
 
-    at_boundary: np.ndarray
-    distance: np.ndarray
-    curvature: np.ndarray
-    outward: np.ndarray
+    at_boundary: Bools
+    distance: Floats
+    curvature: Floats
+    outward: Floats
 
-    def reached(self, lengths):
+    def reached(self, lengths: Floats) -> Bools:
         """Tell from which points a kernel of these smoothing lengths reaches beyond the boundary, (m,) bool."""
         return self.distance[:, 0] < SUPPORT * lengths
 
-    def with_nearest(self, distance, spacing):
+    def with_nearest(self, distance: Floats, spacing: Floats) -> Self:
         """Return the same with given distances to the nearest boundary, (m,), but for measured ones next to corners."""
         measured = self.distance[:, 0]
         # Around a corner that the surface fills, the nearest place is the corner, which mirrors nothing.
@@ -67,14 +69,14 @@ class Boundary:
         return replace(self, distance=np.column_stack([np.where(same, distance, measured), self.distance[:, 1]]))
 
 
-def no_boundary(count):
+def no_boundary(count: int) -> Boundary:
     """Return the boundary of a closed surface."""
     return Boundary(
         np.zeros(count, dtype=bool), np.full((count, 2), np.inf), np.zeros((count, 2)), np.zeros((count, 2, 3))
     )
 
 
-def find_boundary(nearest, oriented, gaps):
+def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     """Find the points at which the surface ends.
 
     Candidates are points around which the directions of the neighbours leave a wide gap, and far into which there is
@@ -97,7 +99,7 @@ def find_boundary(nearest, oriented, gaps):
     points = nearest.points
     result = np.zeros(len(points), dtype=bool)
 
-    def facing_a_gap(part):
+    def facing_a_gap(part: Any) -> Ints:
         block = np.arange(part.start, part.stop)
         offset = points[nearest.index[block]] - points[block, None]
         flat = offset @ frames(oriented[block])[:, :, 1:]
@@ -122,7 +124,7 @@ def find_boundary(nearest, oriented, gaps):
     return result
 
 
-def _bends_away(nearest, oriented, rows):
+def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
     """Tell around which points neighbours lie off their sheet or face elsewhere: it goes on there, past an edge."""
     cosine = np.einsum("ikc,ic->ik", oriented[nearest.index[rows]], oriented[rows])
     beside = nearest.apart[rows]
@@ -130,26 +132,26 @@ def _bends_away(nearest, oriented, rows):
     return np.count_nonzero(beside, axis=1) > _FOLDED
 
 
-def _row_sizes(points, reach):
+def _row_sizes(points: Floats, reach: Floats) -> Ints:
     """Return how many candidates, (k, 3), the row of each one has; those of a row are within reach of each other."""
     distance, other = cKDTree(points).query(points, k=min(9, len(points)), workers=-1)
     label = label_connected(other, distance <= reach[:, None])
     return np.bincount(label)[label]
 
 
-def outward_directions(nearest, normals, rows):
+def outward_directions(nearest: Nearest, normals: Floats, rows: Ints) -> Floats:
     """Return unit vectors in the tangent planes of some points, away from their neighbours, (k, 3)."""
     offset = nearest.points[nearest.index[rows]] - nearest.points[rows, None]
     return _tangents(-np.einsum("ik,ikc->ic", nearest.weight[rows], offset), normals[rows])
 
 
-def _tangents(directions, normals):
+def _tangents(directions: Floats, normals: Floats) -> Floats:
     """Return the directions in the tangent planes as unit vectors, (k, 3)."""
     flat = directions - np.einsum("ic,ic->i", directions, normals)[:, None] * normals
     return flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
 
 
-def measure_boundary(nearest, normals, at_boundary):
+def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> Boundary:
     """Measure how far the points are from the boundary.
 
     Around every boundary point the boundary's course is a parabola through the boundary points next to it, on one side
@@ -178,7 +180,7 @@ def measure_boundary(nearest, normals, at_boundary):
     span, view = tree.query(nearest.points, k=min(_VIEWS, len(rows)), workers=-1)
     close = np.flatnonzero(span[:, 0] < reach)
 
-    def measure(part):
+    def measure(part: Any) -> None:
         block = close[part]
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
@@ -224,14 +226,14 @@ def measure_boundary(nearest, normals, at_boundary):
 class _Course:
     """Parabolas that the boundary follows around each boundary point: e = a + b t + c t^2 along two tangents."""
 
-    rows: np.ndarray
-    along: np.ndarray
-    across: np.ndarray
-    outward: np.ndarray
-    coefficients: np.ndarray
-    kinked: np.ndarray
+    rows: Ints
+    along: Array
+    across: Array
+    outward: Array
+    coefficients: Floats
+    kinked: Bools
 
-    def ahead(self, points, chosen, seen):
+    def ahead(self, points: Floats, chosen: Ints, seen: Ints) -> tuple[Floats, Floats]:
         """Return how far other boundary points lie outside a parabola's tangent, and its direction across there."""
         chord = points[self.rows[seen]] - points[self.rows[chosen]]
         t = np.einsum("ikc,ikc->ik", chord, self.along[chosen])
@@ -240,7 +242,7 @@ class _Course:
         expected /= np.linalg.norm(expected, axis=2)[:, :, None]
         return np.einsum("ikc,ikc->ik", chord, self.outward[chosen]), expected
 
-    def measure(self, points, normals, block, seen):
+    def measure(self, points: Floats, normals: Floats, block: Ints, seen: Ints) -> tuple[Floats, Floats]:
         """Return the distance of points from the parabolas that they see, and the curvature of these, (k, views)."""
         chord = points[block, None] - points[self.rows[seen]]
         other = normals[self.rows[seen]]
@@ -259,7 +261,7 @@ class _Course:
         return (a + b * t + c * t * t - e) / np.sqrt(slope), -2.0 * c / (1.0 + b**2) ** 1.5
 
 
-def _fit_course(nearest, normals, rows):
+def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     points = nearest.points
     distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
     # A boundary that is given may be sparse, so that its rows are found without a reach.
@@ -293,13 +295,13 @@ def _fit_course(nearest, normals, rows):
     return _Course(rows, along, across, outward / np.linalg.norm(outward, axis=1)[:, None], fit, kinked)
 
 
-def _on_sheet(nearest, normals, rows, other, distance):
+def _on_sheet(nearest: Nearest, normals: Floats, rows: Ints, other: Ints, distance: Floats) -> Bools:
     """Tell which of other points lie on the sheet of some points, and face the same way, (k, views) each."""
     same, cosine = on_sheet(nearest, normals, rows, other, distance)
     return same & (cosine > 0.0)
 
 
-def _parabola(t, e, weight):
+def _parabola(t: Floats, e: Floats, weight: Floats) -> tuple[Floats, Floats]:
     """Fit e = a + b t + c t^2, with c shrunk as far as chance may have made it; return it and the scatter about it."""
     basis = np.stack([np.ones_like(t), t, t * t], axis=2)
     weighted = np.swapaxes(basis * weight[:, :, None], 1, 2)
@@ -316,7 +318,7 @@ def _parabola(t, e, weight):
     return fit, scatter
 
 
-def given_boundary(nearest, normals, distance):
+def given_boundary(nearest: Nearest, normals: Floats, distance: Floats) -> Boundary:
     """Take distances to the boundary as they are, and find the boundary's direction and curvature from them.
 
     Parameters
@@ -337,7 +339,7 @@ def given_boundary(nearest, normals, distance):
     known = np.isfinite(distance)
     rows = np.flatnonzero(known & known[nearest.index].all(axis=1))
 
-    def measure(part):
+    def measure(part: Any) -> None:
         block = rows[part]
         index = nearest.index[block]
         unit = nearest.distance[block, -1]

@@ -1,13 +1,22 @@
 """Voronoi cells of the points within the surface: what area is nearest to each, and how far the cell reaches."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
+from ..types import Bools, Floats, Ints
 from .distances import arc_squared
+from .nearest import Nearest
 from .quadrics import frames
 from .sheets import on_sheet
+
+if TYPE_CHECKING:
+    from .boundary import Boundary
 
 _BLOCK = 1 << 12
 _WIDER = 1, 4, 16  # times the 40 neighbours are looked at where a cell is open: a jump of density has them on one side
@@ -31,11 +40,18 @@ class Cells:
         spacing or a little more; larger where points are irregular, or sparser in one direction than in the other.
     """
 
-    areas: np.ndarray
-    reach: np.ndarray
+    areas: Floats
+    reach: Floats
 
 
-def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None, report=lambda: None):
+def measure_cells(
+    nearest: Nearest,
+    normals: Floats,
+    gaussian_curvature: Floats,
+    boundary: Boundary,
+    component: Ints | None = None,
+    report: Callable[..., Any] = lambda: None,
+) -> Cells:
     """Measure the cell of every point in geodesic polar coordinates around it.
 
     A neighbour at the distance d cuts the plane at d / 2; next to a boundary the cell ends there. On a surface of
@@ -63,12 +79,12 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None
     count = len(normals)
     component = np.zeros(count, dtype=int) if component is None else component
     cells = Cells(np.empty(count), np.empty(count))
-    whole = ~nearest.apart.any(axis=1)  # no neighbour was left out: more of them can close a cell
+    whole = ~np.any(nearest.apart, axis=1)  # no neighbour was left out: more of them can close a cell
     spacing, rows = nearest.spacing, np.arange(count)
     for wider in _WIDER:
         still_open = np.zeros(count, dtype=bool)
 
-        def measure(part, rows=rows, wider=wider, still_open=still_open):
+        def measure(part: slice, rows: Ints = rows, wider: int = wider, still_open: Bools = still_open) -> None:
             block = rows[part]
             cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, wider)
             areas, reach, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
@@ -86,7 +102,15 @@ def measure_cells(nearest, normals, gaussian_curvature, boundary, component=None
     return cells
 
 
-def _cuts(nearest, normals, gaussian_curvature, boundary, component, rows, wider):
+def _cuts(
+    nearest: Nearest,
+    normals: Floats,
+    gaussian_curvature: Floats,
+    boundary: Boundary,
+    component: Ints,
+    rows: Ints,
+    wider: int,
+) -> tuple[Floats, Floats]:
     """Return the cuts of some points, (k, cuts, 2), and how far the last of their neighbours is.
 
     A cut is the vector across it, as long as one over its distance; one that does not count is zero.
@@ -116,7 +140,7 @@ def _cuts(nearest, normals, gaussian_curvature, boundary, component, rows, wider
     return np.concatenate([cuts, outward], axis=1), np.sqrt(squared[:, -1])
 
 
-def _caps(cuts, size):
+def _caps(cuts: Floats, size: Floats) -> Floats:
     """Return cuts of one size opposite to all others, and to the sides of the nearest one: they close any cell."""
     length = np.linalg.norm(cuts, axis=2)
     unit = cuts / np.maximum(length, 1e-300)[:, :, None]
@@ -125,7 +149,7 @@ def _caps(cuts, size):
     return size[:, None, None] * np.concatenate([-unit, side, -side], axis=1)
 
 
-def _intersect(cuts, gaussian_curvature, furthest):
+def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | float) -> tuple[Floats, Floats, Bools]:
     """Return the area of what no cut takes away, how far it reaches, and whether it is closed and no larger, (k,) each.
 
     Its corners are the edges of the convex hull of the cuts, which is wrapped around the origin from the longest cut
@@ -138,7 +162,7 @@ def _intersect(cuts, gaussian_curvature, furthest):
     ahead = np.stack([-here[:, 1], here[:, 0]], axis=1)
     areas, reach = np.zeros(count), np.zeros(count)
     closed = np.zeros(count, dtype=bool)
-    start = corner = None
+    start = corner = np.zeros((0, 2))
     rows = np.arange(count)
     for _ in range(cuts.shape[1] + 1):
         way = cuts[rows] - here[:, None]
@@ -150,10 +174,11 @@ def _intersect(cuts, gaussian_curvature, furthest):
         there, ahead = cuts[rows, chosen], way[every, chosen] / length[every, chosen, None]
         across = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
         out = across <= _SAME * np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
-        before, corner = corner, np.stack([there[:, 1] - here[:, 1], here[:, 0] - there[:, 0]], axis=1)
+        before = corner
+        corner = np.stack([there[:, 1] - here[:, 1], here[:, 0] - there[:, 0]], axis=1)
         corner /= np.where(out, 1.0, across)[:, None]
         reach[rows] = np.maximum(reach[rows], np.where(out, 0.0, np.linalg.norm(corner, axis=1)))
-        if before is None:
+        if not len(before):
             start = corner
         else:
             areas[rows] += _triangles(before, corner, gaussian_curvature[rows])
@@ -168,7 +193,7 @@ def _intersect(cuts, gaussian_curvature, furthest):
     return areas, reach, closed & (reach < furthest)
 
 
-def _triangles(corner, other, gaussian_curvature):
+def _triangles(corner: Floats, other: Floats, gaussian_curvature: Floats) -> Floats:
     """Return the areas of triangles with one corner at the point, on a surface of that curvature."""
     plane = 0.5 * (corner[:, 0] * other[:, 1] - corner[:, 1] * other[:, 0])
     squared = np.einsum("ic,ic->i", corner, corner) + np.einsum("ic,ic->i", other, corner + other)

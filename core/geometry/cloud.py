@@ -460,9 +460,7 @@ def estimate_normals(points, options=LaplacianOptions()):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> print(np.abs(core.estimate_normals(points) - points).max().round(2))
     0.0
     """
@@ -539,9 +537,7 @@ def surface_discs(points, *, progress=None):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> discs = core.surface_discs(points)
     >>> print(discs.radii.mean().round(2), np.abs(discs.normals - points).max().round(2))
     0.08 0.0

@@ -4,12 +4,15 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ..types import Bools, Floats, Ints
+from .nearest import Nearest
+
 SMALLEST = 50  # points of a component that gets an operator of its own
 _GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap
 _REACH = 8
 
 
-def label_components(nearest):
+def label_components(nearest: Nearest) -> Ints:
     """Number the components of the cloud, which gaps separate.
 
     Points are joined to their forty neighbours, as points may crowd along lines, except over gaps far wider than the
@@ -32,7 +35,7 @@ def label_components(nearest):
     return result
 
 
-def label_connected(index, joined):
+def label_connected(index: Ints, joined: Bools) -> Ints:
     """Number the components of points whose neighbours, (m, k) int, are joined to them, (m, k) bool."""
     label = np.arange(len(index), dtype=np.int32)
     # The nearest neighbours make few components, so that hardly a step to the others is left that joins two.
@@ -44,7 +47,7 @@ def label_connected(index, joined):
     return label
 
 
-def number_by_size(label, smallest=SMALLEST):
+def number_by_size(label: Ints, smallest: int = SMALLEST) -> Ints:
     """Number labels by how many points have them, the most frequent 0; rarer ones than the smallest size are -1."""
     _, label, size = np.unique(label, return_inverse=True, return_counts=True)
     order = np.argsort(-size, kind="stable")
@@ -53,7 +56,7 @@ def number_by_size(label, smallest=SMALLEST):
     return number[label]
 
 
-def move_apart(points, component):
+def move_apart(points: Floats, component: Ints) -> Floats:
     """Move components so far from each other that no search finds neighbours in another one; nothing else changes."""
     if component.max() == 0:
         return points

@@ -1,15 +1,25 @@
 """Distances between neighbours along the surface, from their normals."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..algebra import on_all_cores
-from .nearest import SMOOTH
+from ..types import Floats
+from .nearest import SMOOTH, Nearest
+from .patches import Patch
+
+if TYPE_CHECKING:
+    from .cloud import Cloud
 
 _STEPS = 8  # nearest neighbours whose chords tell of roughness
 _ACROSS = 3  # of these chords lead across a sharp edge: it is no roughness there
 
 
-def arc_squared(squared, left, right, cosine=1.0):
+def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | float = 1.0) -> Floats:
     """Return the squared length of arcs over chords, from the normals at both ends.
 
     ``s^2 = r^2 + (e - d)^2 (1 / 12 + c / 45) + (e + d)^2 / 20``, of the cubic that has these normals: the first term
@@ -28,12 +38,12 @@ def arc_squared(squared, left, right, cosine=1.0):
     return squared + (right - left) ** 2 * (1.0 / 12.0 + (1.0 - cosine) / 45.0) + (left + right) ** 2 / 20.0
 
 
-def circle_arc(chord, bend):
+def circle_arc(chord: Floats, bend: Floats) -> Floats:
     """Return the length of circular arcs over chords, to all orders, by the sine of half their angle, |t| / (2 r)."""
     return chord * np.where(bend > 1e-4, np.arcsin(bend) / np.maximum(bend, 1e-4), 1.0)
 
 
-def arc_length(cloud):
+def arc_length(cloud: Cloud) -> Floats:
     """Return the length of the arc that joins each pair within the surface.
 
     That of `arc_squared`, and ``g max(r^2 - a^2, 0)`` more: the way up and down over roughness of mean squared slope g,
@@ -54,7 +64,7 @@ def arc_length(cloud):
     result = np.empty(len(pairs.first))
     points, normals = pairs.points.T.copy(), cloud.normals.T.copy()
 
-    def measure(patch):
+    def measure(patch: Patch) -> None:
         _, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
         right = np.where(cosine < 0.0, -right, right)
         squared = pairs.distance[patch.pairs] ** 2
@@ -67,7 +77,7 @@ def arc_length(cloud):
     return result
 
 
-def measure_roughness(nearest, normals):
+def measure_roughness(nearest: Nearest, normals: Floats) -> Floats:
     """Measure what rises and falls between neighbouring points faster than the normals, fitted to many, can tell.
 
     Parameters
@@ -96,7 +106,9 @@ def measure_roughness(nearest, normals):
     return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
 
 
-def pair_heights(first, second, points, normals):
+def pair_heights(
+    first: Callable[..., Any], second: Callable[..., Any], points: Floats, normals: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Return the chords of pairs, their heights along the first normal and along the second, and the normals' cosine.
 
     Parameters
@@ -116,6 +128,6 @@ def pair_heights(first, second, points, normals):
     return chord, dots(chord, left), dots(chord, right), dots(left, right)
 
 
-def dots(left, right):
+def dots(left: Floats, right: Floats) -> Floats:
     """Return the inner products of the columns of two arrays, (p,)."""
     return np.einsum("cp,cp->p", left, right)

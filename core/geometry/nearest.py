@@ -2,12 +2,14 @@
 
 import functools
 from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from .quadrics import fit_quadrics
+from ..types import Bools, Floats, Ints
+from .quadrics import Quadrics, fit_quadrics
 
 COUNT = 41  # the point itself and 40 others
 ROUNDS = 9  # of averaging over neighbours, after which what is left is of the place and not of single points
@@ -32,31 +34,31 @@ class Nearest:
     """
 
     tree: cKDTree
-    index: np.ndarray
-    distance: np.ndarray
-    weight: np.ndarray
+    index: Ints
+    distance: Floats
+    weight: Floats
 
     @property
-    def points(self):
+    def points(self) -> Floats:
         """Coordinates, (m, 3)."""
         return self.tree.data
 
     @property
-    def spacing(self):
+    def spacing(self) -> Floats:
         """Distance between points of an even sample as dense as the nearest twelve neighbours, (m,)."""
         return spacing_of(self.distance)
 
     @property
-    def apart(self):
+    def apart(self) -> Bools:
         """Which neighbours were left out, as they lie on another sheet, (m, 41) bool."""
         return (self.weight == 0.0) & (fading_weights(self.distance) > 0.0)
 
     @functools.cached_property
-    def quadrics(self):
+    def quadrics(self) -> Quadrics:
         """A quadric around every point through its neighbours, fitted once: `Quadrics`."""
         return fit_quadrics(self.points, self.index, self.weight)
 
-    def keep(self, kept):
+    def keep(self, kept: Bools) -> Self:
         """Return the same neighbours with the weight of those not kept, (m, 41) bool, set to zero.
 
         A quadric has six coefficients: a point that would keep fewer than a dozen neighbours keeps all of them.
@@ -64,7 +66,7 @@ class Nearest:
         few = np.count_nonzero(kept & (self.weight > 0.0), axis=1) < 12
         return replace(self, weight=np.where(kept | few[:, None], self.weight, 0.0))
 
-    def averaging(self):
+    def averaging(self) -> sparse.csr_array:
         """Return the (m, m) CSR matrix whose product is the weighted mean over the neighbours."""
         count, width = self.index.shape
         weight = self.weight / self.weight.sum(axis=1, keepdims=True)
@@ -72,26 +74,26 @@ class Nearest:
         return sparse.csr_array((weight.ravel(), self.index.ravel(), start), shape=(count, count))
 
 
-def find_nearest(points):
+def find_nearest(points: Floats) -> Nearest:
     """Find the 40 nearest neighbours of every point, (m, 3)."""
     tree = cKDTree(points)
     distance, index = tree.query(points, k=min(COUNT, len(points)), workers=-1)
     return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance))
 
 
-def changed_rows(nearest, before):
+def changed_rows(nearest: Nearest, before: Nearest) -> Ints:
     """Return which of the same points have moved, or have neighbours that did or that are others than before, (k,)."""
     moved = (nearest.points != before.points).any(axis=1)
     return np.flatnonzero(moved | moved[nearest.index].any(axis=1) | (nearest.index != before.index).any(axis=1))
 
 
-def spacing_of(distance):
+def spacing_of(distance: Floats) -> Floats:
     """Return the spacing of an even sample as dense as the nearest twelve neighbours, by their distances (n, k)."""
     last = min(12, distance.shape[1] - 1)
     return distance[:, last] * np.sqrt(np.pi / last)
 
 
-def fading_weights(distance):
+def fading_weights(distance: Floats) -> Floats:
     """Return weights that fall from 1 to 0 at the last neighbour, (n, k).
 
     Which of several neighbours at the same last distance was found then makes no difference. Only where nearly all of
@@ -103,7 +105,7 @@ def fading_weights(distance):
     return weights
 
 
-def typical_distance(positions):
+def typical_distance(positions: Any) -> Any:
     """Return the typical distance between neighbouring points of a surface, (n, 3); 0 if unknown.
 
     The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8. Of very many
@@ -120,6 +122,6 @@ def typical_distance(positions):
     return float(distance * np.sqrt(np.pi / 8.0 * len(few) / len(positions)))
 
 
-def nearest_rows(points, places):
+def nearest_rows(points: Any, places: Any) -> Any:
     """Return which of the points, (n, 3), is nearest to each of some places, (k, 3)."""
     return cKDTree(points).query(places)[1]

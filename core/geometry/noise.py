@@ -1,9 +1,13 @@
 """Noise: its measure around every point, and points moved onto the surface that their neighbours describe."""
 
+from typing import Any
+
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
-from .nearest import fading_weights
+from ..types import Floats, Ints
+from .nearest import Nearest, fading_weights
 from .quadrics import fit_quadrics
 
 _FEW = 20  # neighbours of the fit that tells noise from shape, by that to all 40
@@ -17,7 +21,7 @@ _NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and a
 _BLOCK = 1 << 12  # points projected at one time
 
 
-def near_misfit(nearest, rows=None):
+def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
     """Return how far quadrics through 20 neighbours miss these, of all m points or of some rows, (k,)."""
     rows = np.arange(len(nearest.points)) if rows is None else rows
     part = slice(_FEW + 1)
@@ -25,7 +29,7 @@ def near_misfit(nearest, rows=None):
     return fit_quadrics(nearest.points, nearest.index[rows, part], weight, rows).misfit
 
 
-def noise_level(nearest, near, mixed, misfit):
+def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -> Floats:
     """Measure the noise around every point as a share of the spacing.
 
     Parameters
@@ -53,7 +57,7 @@ def noise_level(nearest, near, mixed, misfit):
     return np.where(averaging @ noisy.astype(float) > 0.5, few, 0.0)
 
 
-def project_points(tree, rows, noise, component=None):
+def project_points(tree: cKDTree, rows: Ints, noise: Floats, component: Ints | None = None) -> Floats:
     """Move some points onto quadrics through their neighbours.
 
     Parameters
@@ -78,7 +82,7 @@ def project_points(tree, rows, noise, component=None):
     order = np.argsort(many, kind="stable")  # those who ask for few neighbours do not wait for others' many
     result = np.empty((len(rows), 3))
 
-    def project(part):
+    def project(part: Any) -> None:
         block = order[part]
         result[block] = _projected(tree, rows[block], many[block])
 
@@ -86,7 +90,7 @@ def project_points(tree, rows, noise, component=None):
     return result
 
 
-def _projected(tree, rows, many):
+def _projected(tree: cKDTree, rows: Ints, many: Ints) -> Floats:
     points = tree.data
     distance, index = tree.query(points[rows], k=many.max() + 1)
     weight = fading_weights(np.minimum(distance, distance[np.arange(len(many)), many, None]))

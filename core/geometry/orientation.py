@@ -1,15 +1,19 @@
 """Which side is outside: signs of normals, by propagation, by where they were seen from, or by winding numbers."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
-from ..arguments import as_array, as_doubles
+from ..arguments import as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError
 from ..options import LaplacianOptions
+from ..types import Array, Bools, Floats, Ints
 from .cloud import read_surface
-from .nearest import find_nearest
+from .nearest import Nearest, find_nearest
 from .normals import NEIGHBORS, orient_outwards, outer_signs, propagate_signs, unit_normals
 from .points import check_points
 
@@ -25,7 +29,14 @@ _SPHERE = 30.0  # radius that points are mirrored in to see which are hidden, ov
 _COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
 
 
-def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=None):
+def orient_normals(
+    points: ArrayLike,
+    normals: ArrayLike,
+    *,
+    method: str = "winding",
+    viewpoint: ArrayLike | None = None,
+    areas: ArrayLike | None = None,
+) -> Floats:
     """Choose the signs of normals.
 
     Parameters
@@ -91,9 +102,7 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> given = points * np.random.default_rng(0).choice([-1, 1], (800, 1))
     >>> print(np.abs(core.orient_normals(points, given) - points).max().round(6))
     0.0
@@ -102,13 +111,14 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
     0.0
     """
     points = check_points(points)
-    normals = unit_normals(normals, len(points))
+    given_normals = unit_normals(normals, len(points))
     if not isinstance(method, str) or method not in METHODS:
         raise InvalidPointsError(f"Orientation {method!r} is unknown. Choose one of {', '.join(METHODS)}.")
-    towards = _directions(points, viewpoint) if method == "viewpoint" else None
+    seen_from = as_array(() if viewpoint is None else viewpoint, "Viewpoints")
+    towards = _directions(points, seen_from) if method == "viewpoint" else None
     sample = read_surface(points, LaplacianOptions(), lambda stage, fraction: None)[1].sample
     scaled, nearest = sample.scaled, sample.nearest
-    chosen = normals[scaled.first]
+    chosen = given_normals[scaled.first]
     if method == "outside":
         oriented = orient_outwards(nearest, chosen)
     else:
@@ -119,52 +129,42 @@ def orient_normals(points, normals, *, method="winding", viewpoint=None, areas=N
         if areas is not None:
             given = _checked_areas(areas, len(points))[scaled.first]
             weight = given * (weight.sum() / max(given.sum(), np.finfo(float).tiny))
-        if method == "viewpoint":
+        if towards is not None:
             votes = np.einsum("ij,ij->i", oriented, towards[scaled.first])
-            if np.ndim(viewpoint) == 1:
-                votes = np.where(_seen(points[scaled.first] - viewpoint), votes, 0.0)
+            if seen_from.ndim == 1:
+                votes = np.where(_seen(points[scaled.first] - seen_from), votes, 0.0)
             sign = _elected(votes, patch, sample.component)
         else:
             sign = _winding_signs(place, oriented, weight, patch, sample.component)
         oriented = oriented * sign[patch][:, None]
         oriented *= _settled(_near_energies(place, nearest, oriented, weight))[:, None]
-    return toward(normals, scaled.scatter(oriented, 0.0))
+    return toward(given_normals, scaled.scatter(oriented, 0.0))
 
 
-def toward(normals, directions):
+def toward(normals: Floats, directions: Floats) -> Floats:
     """Return unit normals, (n, 3), reversed where they point against directions, (n, 3); zero ones change nothing."""
     against = np.einsum("ij,ij->i", normals, directions) < 0.0
     return np.where(against[:, None], -normals, normals)
 
 
-def _directions(points, viewpoint):
+def _directions(points: Floats, given: Array) -> Floats:
     """Return the unit vectors from points to where they were seen from; zero where that is the point itself."""
-    given = as_array(() if viewpoint is None else viewpoint, "Viewpoints")
-    if given.dtype.kind not in "iuf" or given.shape not in ((3,), points.shape):
-        raise InvalidPointsError(
-            f"Viewpoints of shape {given.shape} do not fit {len(points)} points. Give one place of three numbers, or"
-            " one for each point."
-        )
-    if not np.isfinite(given).all():
-        bad = np.count_nonzero(~np.isfinite(given).reshape(-1, 3).all(axis=1))
-        raise InvalidPointsError(f"{bad} viewpoints are not finite (NaN or infinity). Give three finite numbers each.")
+    advice = f"Give one place of three numbers, or one for each of {len(points)} points."
+    check_finite(check_array(given, "Viewpoints", [(3,), points.shape], advice).reshape(-1, 3), "viewpoints", advice)
     directions = as_doubles(given) - points
     directions /= np.maximum(np.abs(directions).max(axis=1, keepdims=True), np.finfo(float).tiny)
     return directions / np.maximum(np.linalg.norm(directions, axis=1)[:, None], np.finfo(float).tiny)
 
 
-def _checked_areas(areas, count):
-    given = as_array(areas, "Areas")
-    if given.shape != (count,) or given.dtype.kind not in "iuf":
-        raise InvalidPointsError(f"Areas of shape {given.shape} do not fit {count} points. Give a number for each.")
-    given = as_doubles(given)
+def _checked_areas(areas: ArrayLike, count: int) -> Floats:
+    given = as_doubles(check_array(areas, "Areas", [(count,)], f"Give a number for each of {count} points."))
     if not (np.isfinite(given).all() and given.min() >= 0.0 and given.max() > 0.0):
         bad = np.count_nonzero(~(np.isfinite(given) & (given > 0.0)))
         raise InvalidPointsError(f"{bad} of {count} areas are not above zero. Leave the areas out to have them found.")
     return given / given.max()
 
 
-def _seen(offset):
+def _seen(offset: Floats) -> Bools:
     """Tell which points are not hidden by others, (m,) bool, by their places as seen from the viewpoint, (m, 3).
 
     Points mirrored in a large sphere about the viewpoint lie on the convex hull where they are seen (Katz, Tal, Basri
@@ -180,7 +180,7 @@ def _seen(offset):
     return seen[:-1]
 
 
-def _elected(votes, patch, component):
+def _elected(votes: Floats, patch: Ints, component: Ints) -> Floats:
     """Return the sign of each patch for which its points vote, (m,); where none does, those of its component."""
     of_patch = np.empty(patch.max() + 1, dtype=int)
     of_patch[patch] = component
@@ -188,7 +188,7 @@ def _elected(votes, patch, component):
     return np.where(np.where(total == 0.0, np.bincount(component, votes)[of_patch], total) < 0.0, -1.0, 1.0)
 
 
-def _patches(points, normals, tree):
+def _patches(points: Floats, normals: Floats, tree: sparse.csr_array) -> Ints:
     """Number patches of points, (m,), joined by links of the tree over which the sign is beyond doubt.
 
     Small patches are joined to their surest neighbour, round by round, until none is left.
@@ -215,7 +215,7 @@ def _patches(points, normals, tree):
             joined[links[links >= 0]] = True
 
 
-def _certainty(points, normals, first, second):
+def _certainty(points: Floats, normals: Floats, first: Ints, second: Ints) -> Floats:
     """Return how surely two points lie on one smooth sheet: the cosine of normals, less the chord's slope over both."""
     chord = points[second] - points[first]
     chord /= np.linalg.norm(chord, axis=1)[:, None]
@@ -224,7 +224,7 @@ def _certainty(points, normals, first, second):
     return np.abs(np.einsum("ij,ij->i", left, right)) - 2.0 * slope**2
 
 
-def _winding_signs(points, normals, weight, patch, part):
+def _winding_signs(points: Floats, normals: Floats, weight: Floats, patch: Ints, part: Ints) -> Floats:
     """Return the sign of each patch by which the winding number changes least off the surface, outside 0.
 
     Parameters
@@ -249,7 +249,7 @@ def _winding_signs(points, normals, weight, patch, part):
     return sign * outside[group_of_patch]
 
 
-def _patch_energies(points, normals, weight, patch):
+def _patch_energies(points: Floats, normals: Floats, weight: Floats, patch: Ints) -> Floats:
     """Return the mutual energy of each two patches: of clumps of points, and of finer ones where those are near."""
     count = patch.max() + 1
     fine, _ = _clumps(points, weight[:, None] * normals, weight, patch, _FINE)
@@ -258,7 +258,9 @@ def _patch_energies(points, normals, weight, patch):
     return energy if len(coarse[0]) == len(fine[0]) else energy + _corrections(fine, coarse, clump, count)
 
 
-def _clumps(points, moments, weight, patch, most):
+def _clumps(
+    points: Floats, moments: Floats, weight: Floats, patch: Ints, most: int
+) -> tuple[tuple[Array, Array, Array, Ints, float], Ints]:
     """Gather dipoles of one patch and place, until there are at most so many.
 
     Returns
@@ -287,15 +289,15 @@ def _clumps(points, moments, weight, patch, most):
     moment = np.column_stack([np.bincount(clump, moments[:, axis], count) for axis in range(3)])
     owner = np.empty(count, dtype=int)
     owner[clump] = patch
-    return (place, moment, total, owner, max(size, np.median(spacing_to_next(points)))), clump
+    return (place, moment, total, owner, max(size, float(np.median(spacing_to_next(points))))), clump
 
 
-def spacing_to_next(points):
+def spacing_to_next(points: Floats) -> Floats:
     """Return the spacing around each point."""
     return find_nearest(points).spacing
 
 
-def _energies(place, moment, _, owner, width, count):
+def _energies(place: Floats, moment: Floats, _: Floats, owner: Ints, width: float, count: int) -> Floats:
     """Return the mutual energy of each two patches, (count, count), by dipoles smoothed over a width."""
     result = np.zeros((count, count))
     patches = sparse.csr_array((np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), count))
@@ -309,7 +311,7 @@ def _energies(place, moment, _, owner, width, count):
     return result
 
 
-def _corrections(fine, coarse, clump, count):
+def _corrections(fine: Any, coarse: Any, clump: Any, count: Any) -> Any:
     """Return by how much the energy of each two patches is more, (count, count), where near clumps are taken finely.
 
     Within a clump there is one patch, whose energy with itself does not matter.
@@ -333,7 +335,7 @@ def _corrections(fine, coarse, clump, count):
     return result + result.T
 
 
-def _pair_energies(dipoles, first, second):
+def _pair_energies(dipoles: Any, first: Any, second: Any) -> Any:
     """Return the energy of pairs of dipoles."""
     place, moment, _, _, width = dipoles
     offset = place[second] - place[first]
@@ -342,12 +344,12 @@ def _pair_energies(dipoles, first, second):
     return _coupling(np.einsum("ij,ij->i", left, right), along, np.einsum("ij,ij->i", offset, offset) + width**2)
 
 
-def _coupling(alike, along, square):
+def _coupling(alike: Floats, along: Floats, square: Floats) -> Floats:
     """Return the energy of dipoles by the product of their moments, of those along their distance, and its square."""
     return (alike - 3.0 * along / square) / (4.0 * np.pi * square**1.5)
 
 
-def _near_energies(place, nearest, normals, weight):
+def _near_energies(place: Floats, nearest: Nearest, normals: Floats, weight: Floats) -> sparse.csr_array:
     """Return the mutual energy of each two near points, (m, m) CSR, by dipoles smoothed over their spacing."""
     count, width = nearest.index.shape
     first, second = np.repeat(np.arange(count), width - 1), nearest.index[:, 1:].ravel()
@@ -361,7 +363,7 @@ def _near_energies(place, nearest, normals, weight):
     return (0.5 * (energy + energy.T)).tocsr()
 
 
-def _settled(energy):
+def _settled(energy: sparse.csr_array) -> Floats:
     """Return signs, (m,), from which no flip of one point improves the energy of pairs, (m, m) CSR without empty rows.
 
     In each round those points flip that gain most among their neighbours, no two of which are neighbours.
@@ -380,13 +382,13 @@ def _settled(energy):
         sign[rank > rival] *= -1.0
 
 
-def _least(energy):
+def _least(energy: Floats) -> Floats:
     """Return signs, (m,), that no flip of one patch improves, the best of two beginnings."""
     mutual = energy - np.diag(np.diag(energy))
     mutual = 0.5 * (mutual + mutual.T)
     scale = np.sqrt(np.maximum(np.abs(np.diag(energy)), np.finfo(float).tiny))
     leading = np.linalg.eigh(mutual / scale / scale[:, None])[1][:, -1]
-    best, most = None, -np.inf
+    best, most = np.ones(len(mutual)), -np.inf
     for sign in np.ones(len(mutual)), np.where(leading < 0.0, -1.0, 1.0):
         field = mutual @ sign
         for _ in range(20 * len(sign)):
@@ -395,13 +397,13 @@ def _least(energy):
                 break
             sign[worst] = -sign[worst]
             field += 2.0 * sign[worst] * mutual[worst]
-        total = sign @ field
+        total = float(sign @ field)
         if total > most * (1.0 + 1e-9):  # the propagated signs, where both are alike
             best, most = sign, total
     return best
 
 
-def _grouped(energy, area):
+def _grouped(energy: Floats, area: Floats) -> Ints:
     """Number groups of parts of the surface that have one outside, (m,).
 
     Parts, and then groups of them, are joined one by one as long as the energy that two have in common, which is a

@@ -1,11 +1,14 @@
 """Outliers: points that do not lie on the surface of their neighbours."""
 
+from typing import Any
+
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
-from .nearest import ON
+from ..types import Bools, Floats, Ints
+from .nearest import ON, Nearest
 from .noise import FILLING
-from .quadrics import fit_quadrics, heights_over
+from .quadrics import Quadrics, fit_quadrics, heights_over
 
 # Neighbours asked: near ones, and some further away, where the density may be another.
 _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
@@ -15,7 +18,7 @@ _SPARSE = 2.5  # median spacings between points whose witnesses must show a surf
 _BLOCK = 1 << 13  # points looked at at one time
 
 
-def find_outliers(nearest):
+def find_outliers(nearest: Nearest) -> Bools:
     """Find points that lie off the surfaces of nearly all of their neighbours.
 
     Twelve neighbours are the witnesses of a point. Each of them describes the surface by a quadric through its own
@@ -49,15 +52,15 @@ def find_outliers(nearest):
 class _Alone:
     """The quadrics of points without the neighbours off them, fitted where they are asked for, and kept."""
 
-    def __init__(self, nearest, surface):
+    def __init__(self, nearest: Nearest, surface: Quadrics) -> None:
         count = len(nearest.points)
         self.surface, self.scatter, self._known = surface, np.zeros(count), np.zeros(count, dtype=bool)
 
-    def forget(self, rows):
+    def forget(self, rows: Ints) -> None:
         """Fit those of some points, whose neighbours are others now, anew when they are asked for."""
         self._known[rows] = False
 
-    def fit(self, nearest, surface, rows):
+    def fit(self, nearest: Nearest, surface: Quadrics, rows: Ints) -> None:
         """Fit those of some points, (k,) int, that are not known, from quadrics through all their neighbours."""
         rows = rows[~self._known[rows]]
         fitted, self.scatter[rows] = _let_go(nearest, surface, rows)
@@ -65,7 +68,7 @@ class _Alone:
         self._known[rows] = True
 
 
-def _off_surface(nearest, surface, alone, known):
+def _off_surface(nearest: Nearest, surface: Quadrics, alone: _Alone, known: Bools) -> Bools:
     """Tell which points lie off the surface, those that are known to among them, (m,) bool."""
     spacing, result = nearest.spacing, known.copy()
     off = _third(_heights(nearest, surface, np.arange(len(spacing))))
@@ -81,24 +84,24 @@ def _off_surface(nearest, surface, alone, known):
     height[sparse[suspects, None] & (scatter > FILLING * spacing[witnesses])] = np.inf
     found = -1
     while np.count_nonzero(result) > found:
-        found = np.count_nonzero(result)
+        found = int(np.count_nonzero(result))
         result[suspects] = _third(np.where(result[witnesses], np.inf, height)) > 1.0
     return result
 
 
-def _witnesses(nearest, rows):
+def _witnesses(nearest: Nearest, rows: Ints) -> Ints:
     return nearest.index[rows[:, None], np.minimum(_WITNESSES, nearest.index.shape[1] - 1)]
 
 
-def _third(values):
+def _third(values: Floats) -> Floats:
     return np.partition(values, _AGREEING - 1, axis=1)[:, _AGREEING - 1]
 
 
-def _heights(nearest, surface, rows):
+def _heights(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:
     """Return how far some points are off the quadrics of their witnesses, (k, 12)."""
     result = np.empty((len(rows), len(_WITNESSES)))
 
-    def measure(part):
+    def measure(part: Any) -> None:
         block = rows[part]
         witnesses = _witnesses(nearest, block)
         result[part] = np.abs(heights_over(surface, nearest.points, witnesses, block[:, None]))
@@ -107,7 +110,7 @@ def _heights(nearest, surface, rows):
     return result
 
 
-def _let_go(nearest, surface, rows):
+def _let_go(nearest: Nearest, surface: Quadrics, rows: Ints) -> tuple[Quadrics, Floats]:
     """Fit the quadrics of some points, (k,) int, again without the neighbours off them, and tell how these scatter.
 
     Returns
@@ -120,7 +123,7 @@ def _let_go(nearest, surface, rows):
     points, spacing = nearest.points, nearest.spacing
     weight = np.empty((len(rows), nearest.index.shape[1]))
 
-    def weigh(part):
+    def weigh(part: Any) -> None:
         block = rows[part]
         height, scatter = _scatter(surface, points, block, nearest.index[block])
         far = height / np.maximum(_SCATTERS * scatter, ON * spacing[block])[:, None]
@@ -132,13 +135,13 @@ def _let_go(nearest, surface, rows):
     fitted = fit_quadrics(points, index, weight, rows)
     surface = surface.put(rows, fitted)
 
-    def measure(part):
+    def measure(part: Any) -> None:
         result[part] = _scatter(surface, points, rows[part], index[part])[1]
 
     on_all_cores(measure, parts)
     return fitted, result
 
 
-def _scatter(surface, points, rows, index):
+def _scatter(surface: Quadrics, points: Floats, rows: Ints, index: Ints) -> tuple[Floats, Floats]:
     height = np.abs(heights_over(surface, points, rows[:, None], index))
     return height, np.median(height, axis=1) / 0.6745

@@ -1,14 +1,18 @@
 """The neighbour pairs inside the kernel's support."""
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from ..algebra import on_all_cores
 from ..kernel import SUPPORT
-from .patches import divide_pairs
+from ..types import Array, Bools, Floats, Ints
+from .patches import Patch, divide_pairs
 
 _BLOCK = 1 << 22  # neighbour candidates held at one time while the pairs are collected
 
@@ -29,25 +33,25 @@ class Pairs:
         Their distance in space.
     """
 
-    points: np.ndarray
-    lengths: np.ndarray
-    first: np.ndarray
-    second: np.ndarray
-    distance: np.ndarray
+    points: Floats
+    lengths: Floats
+    first: Ints
+    second: Ints
+    distance: Floats
 
-    def keep(self, kept):
+    def keep(self, kept: Bools) -> Self:
         """Return the same points with some of the pairs, (pairs,) bool."""
         return replace(self, first=self.first[kept], second=self.second[kept], distance=self.distance[kept])
 
-    def mean(self, values):
+    def mean(self, values: Floats) -> Floats:
         """Return the mean of a point quantity over both ends of every pair."""
         return 0.5 * (values[self.first] + values[self.second])
 
-    def half(self, values):
+    def half(self, values: Floats) -> sparse.csr_array:
         """Return a pair quantity as the (m, m) CSR matrix U that holds each pair once; the whole is U + U.T."""
         return sparse.csr_array((values, self.second, self.start), shape=(len(self.points),) * 2)
 
-    def over_ends(self, values, count, report=lambda: None):
+    def over_ends(self, values: Callable[..., Any], count: int, report: Callable[..., Any] = lambda: None) -> Floats:
         """Return the sums over the pairs of each point of what they have at that end, (count, m).
 
         Parameters
@@ -61,7 +65,7 @@ class Pairs:
             Called after each patch; may raise `Cancelled`.
         """
 
-        def sums(patch):
+        def sums(patch: Patch) -> tuple[Floats, Floats]:
             first, second = values(patch)
             return patch.over_first(*first), patch.over_second(*second)
 
@@ -72,19 +76,19 @@ class Pairs:
         return total
 
     @functools.cached_property
-    def patches(self):
+    def patches(self) -> list[Patch]:
         """The pairs by blocks that fit the cache: a list of `Patch`."""
         return divide_pairs(self.start, self.second)
 
     @functools.cached_property
-    def start(self):
+    def start(self) -> Ints:
         """Where the pairs of each first point start, (m + 1,)."""
-        start = np.zeros(len(self.points) + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
+        start: Ints = np.zeros(len(self.points) + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
         np.cumsum(np.bincount(self.first, minlength=len(self.points)), out=start[1:])
         return start
 
 
-def find_pairs(tree, lengths, report=lambda: None):
+def find_pairs(tree: cKDTree, lengths: Floats, report: Callable[..., Any] = lambda: None) -> list[Array]:
     """Find all pairs nearer than 3 h_ij, with h_ij = (h_i + h_j) / 2.
 
     Parameters
@@ -109,7 +113,7 @@ def find_pairs(tree, lengths, report=lambda: None):
     spacing = tree.query(tree.data[sample], k=[min(31, n)], workers=-1)[0][:, 0]
     count = int(min(max(40.0 * np.median(radii[sample] / spacing) ** 2, 16), n))
     pending = np.arange(n)
-    found = [], [], []
+    found: tuple[list[Array], ...] = [], [], []
     while len(pending):
         unfinished = []
         for rows in np.array_split(pending, len(pending) * count // _BLOCK + 1):

@@ -6,6 +6,8 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 
+from ..types import Array, Floats, Ints
+
 _PAIRS = 1 << 16  # of a patch, about: of fewer, and Python's share of the work grows
 
 
@@ -28,28 +30,28 @@ class Patch:
     """
 
     pairs: slice
-    rows: np.ndarray
-    columns: np.ndarray
-    counts: np.ndarray
+    rows: Ints
+    columns: Ints
+    counts: Ints
     ends: sparse.csc_array
 
-    def first(self, values):
+    def first(self, values: Array) -> Array:
         """Return quantities of points, (..., m), at the first point of each pair, (..., pairs)."""
         return np.repeat(values[..., self.rows], self.counts, axis=-1)
 
-    def second(self, values):
+    def second(self, values: Array) -> Array:
         """Return quantities of points, (..., m), at the second point of each pair, (..., pairs)."""
         return np.take(values[..., self.columns], self.ends.indices, axis=-1)
 
-    def mean(self, values):
+    def mean(self, values: Floats) -> Floats:
         """Return the mean of a point quantity over both ends of each pair."""
         return 0.5 * (self.first(values) + self.second(values))
 
-    def over_first(self, *values):
+    def over_first(self, *values: Floats) -> Floats:
         """Return the sums of quantities of pairs, (pairs,) each, over the pairs of each first point, (q, k)."""
         return np.stack([np.add.reduceat(row, self.ends.indptr[:-1]) for row in values])
 
-    def over_second(self, *values):
+    def over_second(self, *values: Floats) -> Floats:
         """Return the sums of quantities of pairs, (pairs,) each, over the pairs of each second point, (q, l)."""
         result, ones, none = np.empty((len(values), len(self.columns))), np.ones(len(self.rows)), self.ends.data
         for row, total in zip(values, result, strict=True):
@@ -59,7 +61,7 @@ class Patch:
         return result
 
 
-def divide_pairs(start, second):
+def divide_pairs(start: Ints, second: Ints) -> list[Patch]:
     """Divide pairs into patches.
 
     Parameters
@@ -77,7 +79,7 @@ def divide_pairs(start, second):
     return [_patch(start[low : high + 1], second, low) for low, high in pairwise(cuts)]
 
 
-def _patch(start, second, low):
+def _patch(start: Ints, second: Ints, low: int) -> Patch:
     pairs = slice(start[0], start[-1])
     second = second[pairs]
     known = np.flatnonzero(np.diff(start))

@@ -1,21 +1,24 @@
 """Checks and preparation of the input coordinates."""
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..arguments import as_array, as_doubles
+from ..arguments import Shape, as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
+from ..types import Array, Bools, Floats, Ints
 
 FEWEST = 5  # points of a boundary that is given
 _SAME = 1e-9  # of the scale: no closer points are told apart, as areas between them would drown in rounding
 _LARGEST = 1e60  # coordinates [L], and its inverse the least extent: further powers of lengths must be numbers, too
 
 
-def check_points(points):
+def check_points(points: ArrayLike) -> Floats:
     """Check coordinates and return them in double precision.
 
     Parameters
@@ -43,13 +46,7 @@ def check_points(points):
     if len(given) == 0:
         raise TooFewPointsError("There are no points. Add points, or choose another object.")
     result = as_doubles(given, copy=False)
-    finite = np.isfinite(result)
-    if not finite.all():
-        bad = np.count_nonzero(~finite.all(axis=1))
-        raise InvalidPointsError(
-            f"{bad} of {len(result)} points have coordinates that are not finite (NaN or infinity). Delete these"
-            " points."
-        )
+    check_finite(result, "points", "Delete these points.")
     largest = np.abs(result).max()
     if largest > _LARGEST:
         raise InvalidPointsError(
@@ -89,24 +86,24 @@ class ScaledPoints:
         The caller's point that each row was first seen at.
     """
 
-    points: np.ndarray
+    points: Floats
     scale: float
-    inverse: np.ndarray
-    copies: np.ndarray
-    first: np.ndarray
+    inverse: Ints
+    copies: Ints
+    first: Ints
 
     @property
-    def shared(self):
+    def shared(self) -> bool:
         """Whether some of the caller's points are at one place."""
         return self.copies.max() > 1
 
-    def scatter(self, quantity, neutral):
+    def scatter(self, quantity: Array, neutral: bool | float | tuple[float, float, float]) -> Array:
         """Return a quantity of the distinct points for the caller's; those left out get the neutral value."""
         result = quantity[self.inverse]
         result[self.inverse < 0] = neutral
         return result
 
-    def leave_out(self, dropped):
+    def leave_out(self, dropped: Bools) -> Self:
         """Return the same without some of the distinct points, (m,) bool."""
         kept = ~dropped
         row = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)  # what was left out before stays so
@@ -114,14 +111,14 @@ class ScaledPoints:
             self, points=self.points[kept], inverse=row[self.inverse], copies=self.copies[kept], first=self.first[kept]
         )
 
-    def among(self, rows, count):
+    def among(self, rows: Ints, count: int) -> Self:
         """Return the same as some rows, (k,), of a caller's points, so many in all; the others were left out."""
         inverse = np.full(count, -1)
         inverse[rows] = self.inverse
         return replace(self, inverse=inverse, first=rows[self.first])
 
 
-def scale_points(points, needed):
+def scale_points(points: Floats, needed: int) -> ScaledPoints:
     """Centre, scale and merge duplicates, so that all that follows is free of units.
 
     Parameters
@@ -161,7 +158,7 @@ def scale_points(points, needed):
     return ScaledPoints(distinct[order], scale, rank[inverse], copies[order], first[order])
 
 
-def _merge(points):
+def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
     """Take points at one place, in scaled coordinates, as one.
 
     Returns
@@ -190,7 +187,7 @@ def _merge(points):
     return distinct, first, inverse
 
 
-def as_mask(chosen, count):
+def as_mask(chosen: ArrayLike, count: int) -> Bools:
     """Return a set of points, (k,) indices or an (n,) bool mask, as a mask.
 
     Raises
@@ -213,7 +210,7 @@ def as_mask(chosen, count):
     return mask
 
 
-def as_indices(chosen, count, name):
+def as_indices(chosen: ArrayLike, count: int, name: str) -> Ints:
     """Return a set of points, (k,) indices or an (n,) bool mask, as indices in the order given.
 
     Raises
@@ -234,7 +231,7 @@ def as_indices(chosen, count, name):
     return index
 
 
-def check_boundary(chosen, count, first):
+def check_boundary(chosen: ArrayLike, count: int, first: Ints) -> Bools:
     """Check a set of points at the boundary, (k,) indices or a (count,) mask, and return the mask of some, (m,).
 
     Raises
@@ -249,7 +246,7 @@ def check_boundary(chosen, count, first):
     return mask
 
 
-def check_distances(distances, count):
+def check_distances(distances: ArrayLike, count: int) -> Floats:
     """Check distances to a boundary, (count,), infinite where there is none near.
 
     Raises
@@ -257,16 +254,15 @@ def check_distances(distances, count):
     InvalidPointsError
         Another shape, negative, or NaN.
     """
-    given = as_array(distances, "Distances to the boundary")
-    if given.shape != (count,) or given.dtype.kind not in "iuf" or not np.all(given >= 0.0):
-        raise InvalidPointsError(
-            f"Distances to the boundary have the shape {given.shape} and type {given.dtype}. Give {count} numbers"
-            " that are not negative, infinity where there is no boundary near."
-        )
+    advice = f"Give {count} numbers that are not negative, infinity where there is no boundary near."
+    given = check_array(distances, "Distances to the boundary", [(count,)], advice)
+    bad = int(np.count_nonzero(~(given >= 0.0)))
+    if bad:
+        raise InvalidPointsError(f"{bad} of {count} distances to the boundary are negative or NaN. {advice}")
     return as_doubles(given)
 
 
-def check_values(values, count, columns=True):
+def check_values(values: ArrayLike, count: int, columns: bool = True) -> Floats:
     """Check functions on the points and return them, (count,) or with columns (count, k), in double precision.
 
     Raises
@@ -274,18 +270,8 @@ def check_values(values, count, columns=True):
     InvalidPointsError
         Another shape, no real numbers, or not finite.
     """
-    given = as_array(values, "Values")
-    shapes = (1, 2) if columns else (1,)
-    if given.ndim not in shapes or len(given) != count or given.dtype.kind not in "iufb":
-        row = "row of real numbers" if columns else "real number"
-        raise InvalidPointsError(
-            f"Values have the shape {given.shape} and type {given.dtype}, and there are {count} points. Give one {row}"
-            " per point."
-        )
-    given = as_doubles(given)
-    bad = int(np.count_nonzero(~np.isfinite(given.reshape(count, -1)).all(axis=1)))
-    if bad:
-        raise InvalidPointsError(
-            f"{bad} of {count} points have values that are not finite (NaN or infinity). Replace them."
-        )
+    shapes: list[Shape] = [(count,), (count, None)] if columns else [(count,)]
+    row = "row of real numbers" if columns else "real number"
+    given = as_doubles(check_array(values, "Values", shapes, f"Give one {row} for each of {count} points.", "iufb"))
+    check_finite(given, "values", "Replace them.")
     return given

@@ -1,12 +1,17 @@
 """From some points to all: what was computed on a subset is carried to the points between."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, eliminate, on_all_cores
 from ..arguments import as_array
 from ..errors import InvalidPointsError
+from ..types import Array, Floats, Ints
 from .nearest import SMOOTH
 from .points import as_mask, check_points, check_values
 from .quadrics import frames
@@ -60,9 +65,7 @@ class Prolongation:
     --------
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> subset = core.blue_noise_subset(points, 300)
     >>> laplacian = core.build_laplacian(points[subset])
     >>> every = core.Prolongation(points, subset, laplacian.normals)
@@ -72,7 +75,14 @@ class Prolongation:
     True
     """
 
-    def __init__(self, points, subset, normals, component=None, progress=None):
+    def __init__(
+        self,
+        points: ArrayLike,
+        subset: ArrayLike,
+        normals: ArrayLike,
+        component: ArrayLike | None = None,
+        progress: Callable[[], Any] | None = None,
+    ) -> None:
         points = check_points(points)
         count = len(points)
         subset = _rows(subset, count)
@@ -83,7 +93,7 @@ class Prolongation:
                 f"Normals have the shape {normals.shape}, components {component.shape}, and there are {len(chosen)}"
                 " points in the subset. Give one row per point of it."
             )
-        unit = np.ldexp(1.0, np.frexp(np.ptp(points, axis=0).max())[1])  # squares in huge units are no numbers
+        unit = float(np.ldexp(1.0, np.frexp(np.ptp(points, axis=0).max())[1]))  # squares in huge units are no numbers
         points, chosen = points / unit, chosen / unit
         tree, width = cKDTree(chosen), min(_NEIGHBORS, len(chosen))
         low, extent = points.min(axis=0), np.ptp(points, axis=0).max()
@@ -92,7 +102,7 @@ class Prolongation:
         self._weight = np.empty((count, width), dtype=np.float32)
         self.nearest = np.empty(count, dtype=np.int32)
 
-        def carry(block):
+        def carry(block: slice) -> None:
             rows = self._order[block]
             index = tree.query(points[rows], k=width)[1].reshape(-1, width)
             self.nearest[rows], self._weight[block] = _weights(points[rows], chosen, normals, component, index)
@@ -100,7 +110,7 @@ class Prolongation:
 
         on_all_cores(carry, blocks(count, _BLOCK), progress or (lambda: None))
 
-    def interpolate(self, values):
+    def interpolate(self, values: ArrayLike) -> Array:
         """Interpolate functions.
 
         Parameters
@@ -117,7 +127,7 @@ class Prolongation:
         result = np.empty((len(self.nearest), *values.shape[1:]), dtype=np.float32)
         width = self._index.shape[1]
 
-        def carry(block):
+        def carry(block: slice) -> None:
             index, weight = self._index[block], self._weight[block]
             start = np.arange(0, index.size + 1, width, dtype=np.int32)
             matrix = sparse.csr_array((weight.ravel(), index.ravel(), start), shape=(len(index), len(values)))
@@ -126,7 +136,7 @@ class Prolongation:
         on_all_cores(carry, blocks(len(result), _BLOCK))
         return result
 
-    def shares(self, areas, left_out=()):
+    def shares(self, areas: ArrayLike, left_out: ArrayLike = ()) -> Floats:
         """Share areas, or masses, evenly over the points that belong to each point of the subset: sums are kept.
 
         Parameters
@@ -140,10 +150,10 @@ class Prolongation:
         ndarray, (n,)
         """
         takes = ~as_mask(left_out, len(self.nearest))
-        owned = np.bincount(self.nearest[takes], minlength=len(areas))
+        owned = np.bincount(self.nearest[takes], minlength=np.size(areas))
         return np.where(takes, (np.asarray(areas) / np.maximum(owned, 1))[self.nearest], 0.0)
 
-    def labels(self, values):
+    def labels(self, values: ArrayLike) -> Floats:
         """Give each point what the point of the subset has that it belongs to: truth values, numbers of components.
 
         Parameters
@@ -157,7 +167,7 @@ class Prolongation:
         return np.asarray(values)[self.nearest]
 
 
-def _rows(subset, count):
+def _rows(subset: ArrayLike, count: int) -> Ints:
     """Return the rows of a subset, indices in their order or a mask."""
     given = as_array(subset, "Subsets")
     if given.dtype == bool and given.shape == (count,):
@@ -170,7 +180,7 @@ def _rows(subset, count):
     return given
 
 
-def _weights(points, chosen, normals, component, index):
+def _weights(points: Floats, chosen: Floats, normals: Floats, component: Ints, index: Ints) -> tuple[Ints, Floats]:
     """Return the rows of the subset that some points belong to, (b,), and the weights of their neighbours, (b, 9)."""
     step = chosen[index] - points[:, None]
     height = np.einsum("ijk,ijk->ij", normals[index], step)

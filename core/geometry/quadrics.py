@@ -1,11 +1,13 @@
 """What the cloud tells about the surface around each point: normal and curvature, from local quadrics."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
 from ..algebra import blocks, eliminate, on_all_cores
 from ..errors import NotASurfaceError
+from ..types import Bools, Floats, Ints
 
 _BLOCK = 1 << 13  # points fitted at one time
 _CURVE = 5e-3  # variance across over that along, of neighbours on a curve
@@ -34,18 +36,18 @@ class Quadrics:
         The neighbours lie along a curve, so that they tell no normal.
     """
 
-    normals: np.ndarray
-    gaussian_curvature: np.ndarray
-    height: np.ndarray
-    shape_operator: np.ndarray
-    misfit: np.ndarray
-    curved: np.ndarray
+    normals: Floats
+    gaussian_curvature: Floats
+    height: Floats
+    shape_operator: Floats
+    misfit: Floats
+    curved: Bools
 
-    def take(self, rows):
+    def take(self, rows: Ints) -> "Quadrics":
         """Return those of some rows, (k,) int."""
         return Quadrics(**{quantity.name: getattr(self, quantity.name)[rows] for quantity in fields(self)})
 
-    def put(self, rows, others):
+    def put(self, rows: Ints, others: "Quadrics") -> "Quadrics":
         """Return the same but for some rows, (k,) int, with the quadrics of others, of k points, in their place."""
         result = {quantity.name: getattr(self, quantity.name).copy() for quantity in fields(self)}
         for name, values in result.items():
@@ -53,7 +55,9 @@ class Quadrics:
         return Quadrics(**result)
 
 
-def fit_quadrics(points, index, weight, rows=None, normals=None):
+def fit_quadrics(
+    points: Floats, index: Ints, weight: Floats, rows: Ints | None = None, normals: Floats | None = None
+) -> Quadrics:
     """Fit ``z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2`` around points.
 
     Parameters
@@ -77,11 +81,15 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
     rows = np.arange(len(points)) if rows is None else rows
     count = len(rows)
     fitted = Quadrics(
-        *(np.empty(shape) for shape in ((count, 3), count, (count, 3), (count, 3, 3), count)),
+        normals=np.empty((count, 3)),
+        gaussian_curvature=np.empty(count),
+        height=np.empty((count, 3)),
+        shape_operator=np.empty((count, 3, 3)),
+        misfit=np.empty(count),
         curved=np.zeros(count, dtype=bool),
     )
 
-    def fit_block(block):
+    def fit_block(block: Any) -> None:
         places, here = points[index[block]], points[rows[block]]
         offset = [places[:, :, axis] - here[:, axis, None] for axis in range(3)]
         share = weight[block] / weight[block].sum(axis=1, keepdims=True)
@@ -121,7 +129,7 @@ def fit_quadrics(points, index, weight, rows=None, normals=None):
     return fitted
 
 
-def _covariance(offset, share):
+def _covariance(offset: list[Floats], share: Floats) -> Floats:
     """Return the covariance of offsets, three of (k, neighbors), whose shares sum to one, (k, 3, 3)."""
     result = np.empty((len(share), 3, 3))
     centered = [way - _sums(share, way)[:, None] for way in offset]
@@ -131,11 +139,11 @@ def _covariance(offset, share):
     return result
 
 
-def _sums(left, right):
+def _sums(left: Floats, right: Floats) -> Floats:
     return np.einsum("ik,ik->i", left, right)
 
 
-def check_surface(quadrics):
+def check_surface(quadrics: Quadrics) -> None:
     """Check that the points are those of a surface, for all that is known of it rests on their quadrics.
 
     Raises
@@ -151,7 +159,7 @@ def check_surface(quadrics):
         )
 
 
-def heights_over(quadrics, points, rows, other):
+def heights_over(quadrics: Quadrics, points: Floats, rows: Ints, other: Ints) -> Floats:
     """Return how far other points are from the quadrics of some, with a sign, along their normals.
 
     Parameters
@@ -175,7 +183,7 @@ def heights_over(quadrics, points, rows, other):
     return a * x + b * y + c * z + bend
 
 
-def frames(normals):
+def frames(normals: Floats) -> Floats:
     """Return orthonormal frames as columns (normal, and two tangents), (k, 3, 3)."""
     axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     tangent = np.cross(normals, axis)

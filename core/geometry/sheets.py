@@ -1,16 +1,20 @@
 """Keep close sheets of a surface apart: which points lie on the same sheet, told by normals and by ways along it."""
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
+from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
+from ..types import Array, Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import pair_heights
 from .nearest import ON, SMOOTH, Nearest, changed_rows
+from .pairs import Pairs
+from .patches import Patch
 from .quadrics import Quadrics, check_surface, fit_quadrics, frames
 
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
@@ -21,7 +25,9 @@ _AROUND = 1.5  # way along a sheet over the chord, at most: across a right angle
 _SOURCES = 1 << 7  # points from which ways are followed at one time
 
 
-def same_sheet(left, right, dot, distance, spacing, close=2.0):
+def same_sheet(
+    left: Floats, right: Floats, dot: Floats, distance: Floats, spacing: Floats, close: float = 2.0
+) -> Bools:
     """Tell which pairs lie on one sheet: their chord is orthogonal to their mean normal, within what may be off.
 
     Parameters
@@ -42,7 +48,9 @@ def same_sheet(left, right, dot, distance, spacing, close=2.0):
     return np.abs(left + np.where(dot < 0.0, -right, right)) <= 2.0 * (close * ON * spacing + _LEANING * distance)
 
 
-def on_sheet(nearest, normals, rows, other, distance, close=2.0):
+def on_sheet(
+    nearest: Nearest, normals: Floats, rows: Ints, other: Ints, distance: Floats, close: float = 2.0
+) -> tuple[Bools, Floats]:
     """Tell which of other points lie on the sheet of some points.
 
     Parameters
@@ -90,10 +98,10 @@ class Sheets(NamedTuple):
     quadrics: Quadrics
     nearest: Nearest
     mixed: Quadrics
-    planes: np.ndarray
+    planes: Floats
 
 
-def fit_sheets(nearest, before=None) -> Sheets:
+def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
     """Fit a quadric around every point to the neighbours of its own sheet.
 
     Where the quadric of all neighbours misses them, a plane is looked for among those through the point and two of its
@@ -109,7 +117,8 @@ def fit_sheets(nearest, before=None) -> Sheets:
     """
     points, index, whole = nearest.points, nearest.index, nearest.weight
     if before is None:
-        rows, mixed = np.arange(len(points)), nearest.quadrics
+        rows: Ints = np.arange(len(points))
+        mixed = nearest.quadrics
     else:
         rows = changed_rows(nearest, before.nearest)
         mixed = before.mixed.put(rows, fit_quadrics(points, index[rows], whole[rows], rows))
@@ -121,7 +130,7 @@ def fit_sheets(nearest, before=None) -> Sheets:
         planes[missed] = before.planes[missed]
     looked = rows[missed[rows]]
 
-    def find(part):
+    def find(part: Any) -> None:
         block = looked[part]
         offset = points[index[block]] - points[block, None]
         planes[block] = _own_plane(offset, whole[block], spacing[block])
@@ -146,7 +155,7 @@ def fit_sheets(nearest, before=None) -> Sheets:
     return Sheets(quadrics, nearest, mixed, planes)
 
 
-def _own_plane(offset, weight, spacing):
+def _own_plane(offset: Floats, weight: Floats, spacing: Floats) -> Array:
     first, second = np.triu_indices(min(_SEEDS, offset.shape[1] - 1), 1)
     nearby = offset[:, 1:21]
     a, b = offset[:, 1 + first], offset[:, 1 + second]
@@ -164,7 +173,7 @@ def _own_plane(offset, weight, spacing):
     return normal
 
 
-def label_sheets(nearest, normals, component):
+def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
     """Divide components into sheets that are close to each other but nowhere meet.
 
     Parameters
@@ -197,14 +206,14 @@ def label_sheets(nearest, normals, component):
     return result
 
 
-def sheet_neighbors(nearest, normals, oriented):
+def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
     """Tell which neighbours of every point are the nearest ones on its sheet in one of eight directions, (m, 41) bool.
 
     Unlike a number of nearest neighbours, they lie all around a point where points crowd along lines, too.
     """
     result = np.zeros(nearest.index.shape, dtype=bool)
 
-    def find(part):
+    def find(part: Any) -> None:
         block = np.arange(part.start, part.stop)
         index = nearest.index[block]
         flat = (nearest.points[index] - nearest.points[block, None]) @ frames(normals[block])[:, :, 1:]
@@ -227,7 +236,7 @@ def sheet_neighbors(nearest, normals, oriented):
     return result
 
 
-def separate_sheets(pairs, nearest, oriented):
+def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
     """Leave out the pairs whose ends lie on different sheets, which face each other across a gap.
 
     Normals tell it of most pairs. Where they leave a doubt, two points lie on one sheet if a way of short steps leads
@@ -258,12 +267,12 @@ def separate_sheets(pairs, nearest, oriented):
     return pairs.keep(kept) if apart.any() else pairs
 
 
-def _plainly_on_one_sheet(pairs, oriented, spacing):
+def _plainly_on_one_sheet(pairs: Pairs, oriented: Floats, spacing: Floats) -> Bools:
     """Tell of which pairs the normals say that they lie on one sheet, (p,) bool."""
     result = np.empty(len(pairs.first), dtype=bool)
     points, normals = pairs.points.T.copy(), oriented.T.copy()
 
-    def judge(patch):
+    def judge(patch: Patch) -> None:
         _, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
         same = same_sheet(left, right, cosine, pairs.distance[patch.pairs], patch.mean(spacing))
         result[patch.pairs] = same & (cosine > SMOOTH)
@@ -272,7 +281,7 @@ def _plainly_on_one_sheet(pairs, oriented, spacing):
     return result
 
 
-def step_lengths(nearest, oriented):
+def step_lengths(nearest: Nearest, oriented: Floats) -> sparse.csr_array:
     """Return the lengths of the steps along sheets between next neighbours.
 
     Sharp folds, whose normals join them to nothing, are joined to what is nearest to them.
@@ -310,7 +319,7 @@ def step_lengths(nearest, oriented):
     return steps.maximum(steps.T).tocsr()
 
 
-def ways_along(steps, tree, first, second, longest):
+def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints, longest: Floats) -> Floats:
     """Return the length of the shortest way along steps between the ends of pairs, (k,); infinite if it is longer.
 
     Parameters

@@ -1,10 +1,15 @@
 """Fewer points that stand for many: a blue-noise subset, evenly spread over the surface whatever the density was."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..arguments import whole
 from ..errors import InvalidPointsError
+from ..types import Array, Bools, Floats, Ints
 from .points import check_points
 
 _CANDIDATES = 3.0  # voxels for each point wanted: enough to choose from, few enough for their pairs
@@ -16,7 +21,7 @@ _SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that tell
 _TRIALS = 8  # of voxels, or of radii
 
 
-def blue_noise_subset(points, count, *, progress=None):
+def blue_noise_subset(points: ArrayLike, count: int, *, progress: Callable[[], Any] | None = None) -> Ints:
     """Choose points that are evenly spread over the surface, none close to another: a Poisson-disc subset.
 
     Of each voxel of a fine grid the point next to its centre is a candidate. Of candidates closer than a radius one
@@ -52,9 +57,7 @@ def blue_noise_subset(points, count, *, progress=None):
     --------
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> print(180 <= len(core.blue_noise_subset(points, 200)) <= 200)
     True
     """
@@ -72,7 +75,9 @@ def blue_noise_subset(points, count, *, progress=None):
     return np.sort(chosen)
 
 
-def _candidates(points, low, extent, count, report):
+def _candidates(
+    points: Floats, low: Floats, extent: float, count: int, report: Callable[..., Any]
+) -> tuple[Ints, Ints]:
     """Return a point of each voxel, and the numbers of these voxels, few more than are needed."""
     finest = extent / _FINEST
     wanted = _CANDIDATES * count
@@ -90,7 +95,7 @@ def _candidates(points, low, extent, count, report):
     return _central(points, order, first, low, edge), ordered[first]
 
 
-def voxel_numbers(points, low, edge):
+def voxel_numbers(points: Floats, low: Floats, edge: float) -> Ints:
     """Return the numbers of the voxels that points lie in, from the lowest corner on; near ones are mostly near."""
     keys = np.zeros(len(points), dtype=np.int64)
     for axis in range(3):
@@ -99,7 +104,7 @@ def voxel_numbers(points, low, edge):
     return keys
 
 
-def _central(points, order, first, low, edge):
+def _central(points: Floats, order: Ints, first: Ints, low: Floats, edge: float) -> Ints:
     """Return of each voxel the point next to the centre; of several equally near the one with the least coordinates."""
     distance = np.zeros(len(order))
     for axis in range(3):
@@ -113,7 +118,7 @@ def _central(points, order, first, low, edge):
     return order[nearest[np.diff(voxel[nearest], prepend=-1) > 0]]
 
 
-def _thin(points, keys, count, report):
+def _thin(points: Floats, keys: Ints, count: int, report: Callable[..., Any]) -> Bools:
     """Return which of the candidates stay when discs of one radius must not hold another, at most a count of them."""
     rank = _shuffled(keys)
     tree = cKDTree(points)
@@ -143,7 +148,7 @@ def _thin(points, keys, count, report):
     return best
 
 
-def _shuffled(keys):
+def _shuffled(keys: Ints) -> Ints:
     """Return numbers in an order that looks random, for a voxel always the same (the mixing of SplitMix64)."""
     mixed = keys.astype(np.uint64)
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
@@ -154,12 +159,12 @@ def _shuffled(keys):
     return rank
 
 
-def _discs(tree, rank, radius):
+def _discs(tree: cKDTree, rank: Ints, radius: float) -> Bools:
     """Return which points stay, (m,) bool, when each, in the order of their ranks, takes all others within a radius."""
     return independent(*tree.query_pairs(radius, output_type="ndarray").T, rank)
 
 
-def independent(first, second, rank, report=lambda: None):
+def independent(first: Ints, second: Ints, rank: Array, report: Callable[[], None] = lambda: None) -> Bools:
     """Return which points stay, (m,) bool: no two of a pair, and of each left out one that comes before it.
 
     Parameters

@@ -1,9 +1,13 @@
 """Fewer points for the same surface, spread as evenly as the given ones let them."""
 
+from collections.abc import Callable, Iterator
+from typing import Any
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks
+from ..types import Bools, Floats, Ints
 from .subset import independent
 
 _STEP = 2.0  # each pass leaves a quarter of the points
@@ -13,7 +17,14 @@ _SEED = 0
 _BLOCK = 1 << 15
 
 
-def thin(points, areas, spacing, count, rank=None, report=lambda: None):
+def thin(
+    points: Floats,
+    areas: Floats,
+    spacing: Floats,
+    count: int,
+    rank: Ints | None = None,
+    report: Callable[..., Any] = lambda: None,
+) -> Ints:
     """Choose some of the points so that no two are close to each other, and none of the others is far from all.
 
     Parameters
@@ -58,14 +69,14 @@ def thin(points, areas, spacing, count, rank=None, report=lambda: None):
     return chosen
 
 
-def _independent(points, reach, priority, rank, report):
+def _independent(points: Floats, reach: Floats, priority: Ints, rank: Ints, report: Callable[..., Any]) -> Bools:
     """Return which points have none of a higher priority within reach that stays, (m,) bool."""
     pairs = [_close_pairs(*found, reach, rank) for found in nearest_in_blocks(points, points, _NEIGHBORS, report)]
     first, second = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
     return independent(first, second, -priority, report)
 
 
-def _close_pairs(start, distance, index, reach, rank):
+def _close_pairs(start: int, distance: Floats, index: Ints, reach: Floats, rank: Ints) -> tuple[Ints, Ints]:
     """Return the pairs of some points and their neighbours of which only one may stay, as two arrays."""
     row = np.repeat(np.arange(start, start + len(index)), index.shape[1])
     other = index.ravel()
@@ -74,7 +85,9 @@ def _close_pairs(start, distance, index, reach, rank):
     return row[close], other[close]
 
 
-def nearest_in_blocks(sources, points, count, report=lambda: None):
+def nearest_in_blocks(
+    sources: Floats, points: Floats, count: int, report: Callable[..., Any] = lambda: None
+) -> Iterator[tuple[int, Floats, Ints]]:
     """Find the nearest sources of points; yield the first row of each block, distances and indices, (b, count)."""
     tree = cKDTree(sources)
     count = min(count, len(sources))

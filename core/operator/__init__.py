@@ -3,7 +3,7 @@
 from .areas import KernelMatrix, estimate_areas
 from .connection import connection_laplacian, tangent_frames
 from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
-from .implicit import ImplicitSurface
+from .implicit import Heights, ImplicitSurface
 from .laplacian import LaplaceBeltrami, build_laplacian, laplacian_of, narrow_laplacian
 from .spectrum import Spectrum, symmetric_form
 from .stiffness import Stiffness, stiffness_matrix

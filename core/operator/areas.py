@@ -51,9 +51,7 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> areas = core.estimate_areas(points)
     >>> print(areas.shape, areas.sum().round(1))
     (800,) 12.6

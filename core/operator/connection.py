@@ -1,14 +1,18 @@
 """The connection Laplacian: the operator on tangent vectors, each a complex number in the frame of its point."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from scipy import sparse
 
 from ..algebra import blocks, on_all_cores
+from ..types import Array, Floats
 
 _BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
 
 
-def tangent_frames(normals):
+def tangent_frames(normals: Floats) -> Array:
     """Give each tangent plane a frame, so that a complex number is a tangent vector.
 
     Parameters
@@ -29,7 +33,13 @@ def tangent_frames(normals):
     return first + 1j * np.cross(normals, first)
 
 
-def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: None):
+def connection_laplacian(
+    stiffness: sparse.csr_array,
+    normals: Floats,
+    frames: Array,
+    mass: Floats | float = 0.0,
+    report: Callable[..., Any] = lambda: None,
+) -> sparse.csr_array:
     """Build the operator on tangent vectors from the one on functions.
 
     Parameters
@@ -64,7 +74,7 @@ def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: No
     entries = np.empty(len(first), dtype=complex)
     normal, real, imaginary = (np.ascontiguousarray(values.T) for values in (normals, frames.real, frames.imag))
 
-    def measure(block):
+    def measure(block: Any) -> None:
         i, j = first[block], second[block]
         left, right, axis = normal.take(i, axis=1), normal.take(j, axis=1), real.take(j, axis=1)
         cosine = _dot(left, right)
@@ -81,8 +91,8 @@ def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: No
     start = np.concatenate([[0], np.cumsum(np.bincount(first, minlength=count))]).astype(np.int32)
     half = sparse.csr_array((entries, second, start), shape=(count, count))
     report()
-    weight = np.abs(entries)
-    diagonal = mass + np.bincount(first, weight, count) + np.bincount(second, weight, count)
+    size = np.abs(entries)
+    diagonal = mass + np.bincount(first, size, count) + np.bincount(second, size, count)
     half = (half + sparse.diags_array(0.5 * diagonal.astype(complex), format="csr")).tocsr()
     report()
     other = half.conj().T.tocsr()
@@ -90,6 +100,6 @@ def connection_laplacian(stiffness, normals, frames, mass=0.0, report=lambda: No
     return half + other
 
 
-def _dot(left, right):
+def _dot(left: Floats, right: Floats) -> Floats:
     """Return the dot products of vectors, both (3, k)."""
     return np.einsum("ak,ak->k", left, right)

@@ -1,17 +1,24 @@
 """Curvature: its effect on the kernel, the mean one from the operator applied to the coordinates, principal ones."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..geometry import frames
 from ..kernel import SECOND_MOMENT
+from ..types import Floats
+
+if TYPE_CHECKING:
+    from .laplacian import LaplaceBeltrami
 
 _UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which it is known
 _LARGEST = 0.3  # most that curvature may change an area or a weight, where the fit is poor
 
 
-def kernel_integral(lengths, gaussian):
+def kernel_integral(lengths: Floats, gaussian: Floats) -> Floats:
     """Return the integral of the kernel over the surface around each point, (m,): ``1 - mu2 h^2 K / 6``.
 
     Clipped, as all terms of curvature here.
@@ -19,7 +26,7 @@ def kernel_integral(lengths, gaussian):
     return _bent(lengths, gaussian, -SECOND_MOMENT / 6.0)
 
 
-def weight_factor(lengths, gaussian):
+def weight_factor(lengths: Floats, gaussian: Floats) -> Floats:
     """Return the factor of the pair weights, (m,): ``1 + mu2 h^2 K / 4``.
 
     With it slow functions have the right Laplacian. A pair takes its ends' mean.
@@ -27,7 +34,7 @@ def weight_factor(lengths, gaussian):
     return _bent(lengths, gaussian, SECOND_MOMENT / 4.0)
 
 
-def second_moment(lengths, gaussian):
+def second_moment(lengths: Floats, gaussian: Floats) -> Floats:
     """Return the trace of the second moment of weights with that factor over 4 areas, (m,).
 
     The factor times ``1 - mu2 h^2 K / 3``.
@@ -35,16 +42,16 @@ def second_moment(lengths, gaussian):
     return weight_factor(lengths, gaussian) * _bent(lengths, gaussian, -SECOND_MOMENT / 3.0)
 
 
-def _bent(lengths, gaussian, factor):
+def _bent(lengths: Floats, gaussian: Floats, factor: float) -> Floats:
     return 1.0 + np.clip(factor * lengths**2 * gaussian, -_LARGEST, _LARGEST)
 
 
-def uneven(excess):
+def uneven(excess: Floats) -> Floats:
     """Return what an integral of the kernel gains where h varies, next to nothing where it varies too fast to tell."""
     return excess / (1.0 + (excess / _UNEVEN) ** 2)
 
 
-def mean_curvature(laplacian):
+def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     """Compute the mean curvature from ``Laplacian x = -2 H n``.
 
     Parameters
@@ -69,9 +76,7 @@ def mean_curvature(laplacian):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> curvature = core.mean_curvature(laplacian)
     >>> print(curvature.min().round(2), curvature.max().round(2))
@@ -97,22 +102,22 @@ class PrincipalCurvatures:
         and its sign is so everywhere.
     """
 
-    first: np.ndarray
-    second: np.ndarray
-    direction: np.ndarray
+    first: Floats
+    second: Floats
+    direction: Floats
 
     @property
-    def shape_index(self):
+    def shape_index(self) -> Floats:
         """The kind of shape, (n,): 1 a cap, 1/2 a ridge, 0 a saddle, -1/2 a valley, -1 a cup; 0 where it is flat."""
         return np.arctan2(self.first + self.second, self.first - self.second) * (2.0 / np.pi)
 
     @property
-    def curvedness(self):
+    def curvedness(self) -> Floats:
         """How strongly the surface is curved, whatever its shape, (n,) [1 / L]: root mean square of both."""
         return np.hypot(self.first, self.second) / np.sqrt(2.0)
 
 
-def principal_curvatures(laplacian):
+def principal_curvatures(laplacian: LaplaceBeltrami) -> PrincipalCurvatures:
     """Compute the principal curvatures: their mean by the operator, their difference and direction by local quadrics.
 
     Parameters
@@ -139,9 +144,7 @@ def principal_curvatures(laplacian):
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> curvatures = core.principal_curvatures(core.build_laplacian(points))
     >>> print(curvatures.first.mean().round(1), curvatures.second.mean().round(1))
     1.0 1.0

@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from ..geometry import SMOOTH
+from ..geometry import SMOOTH, Boundary, Pairs
 from ..kernel import SUPPORT
+from ..types import Bools, Floats, Ints
 
 _BEND = 0.5  # most that the curvature of a boundary may change an image
 
 
-def mirror(pairs, distance, boundary):
+def mirror(pairs: Pairs, distance: Floats, boundary: Boundary) -> list[tuple[Ints, Floats, Floats]]:
     """Find the pairs that the mirror image of one end in the boundary still reaches.
 
     Parameters
@@ -54,14 +55,16 @@ def mirror(pairs, distance, boundary):
     return _images(seen, distance[rows], d, e, curvature, 0.5 * (lengths[first] + lengths[second]), rows)
 
 
-def own_images(pairs, boundary):
+def own_images(pairs: Pairs, boundary: Boundary) -> list[tuple[Ints, Floats, Floats]]:
     """Return the images that points have within their own reach, as `mirror` does for pairs."""
     rows = np.flatnonzero(boundary.reached(pairs.lengths))
     d = boundary.distance[rows]
     return _images(np.isfinite(d), np.zeros(len(rows)), d, d, boundary.curvature[rows], pairs.lengths[rows], rows)
 
 
-def _images(seen, distance, d, e, curvature, lengths, rows):
+def _images(
+    seen: Bools, distance: Floats, d: Floats, e: Floats, curvature: Floats, lengths: Floats, rows: Ints
+) -> list[tuple[Ints, Floats, Floats]]:
     result = []
     squared = distance**2
     further = squared.copy()

@@ -1,11 +1,18 @@
 """The surface that points lie on, as the zero of a function around them: the mean of what near quadrics tell."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
 from ..geometry import SMOOTH, find_nearest
+from ..types import Array, Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from .laplacian import LaplaceBeltrami
 
 _NEIGHBORS = 12  # of a place, whose quadrics are averaged
 _BLOCK = 1 << 13  # places looked at at one time
@@ -33,21 +40,21 @@ class Heights(NamedTuple):
         Unit vector across that boundary; zero where none is near.
     """
 
-    height: np.ndarray
-    normal: np.ndarray
-    nearest: np.ndarray
-    spacing: np.ndarray
-    distance: np.ndarray
-    beyond: np.ndarray
-    outward: np.ndarray
+    height: Floats
+    normal: Floats
+    nearest: Ints
+    spacing: Floats
+    distance: Floats
+    beyond: Floats
+    outward: Floats
 
     @property
-    def support(self):
+    def support(self) -> Floats:
         """How near the foot of each place is to a point, from 1 at one to 0 far from all, (k,)."""
         return np.exp(-np.maximum(self.distance**2 - (self.height / self.spacing) ** 2, 0.0))
 
     @property
-    def belongs(self):
+    def belongs(self) -> Bools:
         """Whether the surface next to the place is that of the points, (k,) bool: no gap between them, nor outside."""
         return (self.distance < _BELONGS) & (self.beyond <= 0.0)
 
@@ -73,7 +80,7 @@ class ImplicitSurface:
         Distance between neighbouring points in these units; next to a change of density the larger one.
     """
 
-    def __init__(self, laplacian, unit):
+    def __init__(self, laplacian: LaplaceBeltrami, unit: float) -> None:
         kept = laplacian.component >= 0
         self._middle, self._unit = laplacian.surface_points[kept].mean(axis=0), unit
         points = self.scaled(laplacian.surface_points[kept])
@@ -89,35 +96,35 @@ class ImplicitSurface:
         self._inside = np.where(known, inside, np.inf)
         self._outward = np.where(known[:, None], outward, 0.0)
 
-    def scaled(self, points):
+    def scaled(self, points: Floats) -> Floats:
         """Return points [L], (k, 3), in the units and from the middle that all else is measured in."""
         return (points - self._middle) / self._unit
 
-    def placed(self, points):
+    def placed(self, points: Floats) -> Floats:
         """Return points in these units, (k, 3), as they are [L]."""
         return self._middle + self._unit * points
 
-    def nearest(self, places):
+    def nearest(self, places: Floats) -> Ints:
         """Return the number of the point that is nearest to each place, (k,) int."""
         return self._tree.query(places, workers=-1)[1]
 
-    def bend(self, rows):
+    def bend(self, rows: Ints) -> Floats:
         """Return half a curvature of some points, (k,): how fast the surface leaves their tangent planes."""
         forms = self._shape_operator[rows]
         return 0.5 * np.sqrt(np.einsum("iab,iab->i", forms, forms))
 
-    def over(self, rows, places):
+    def over(self, rows: Ints, places: Floats) -> Floats:
         """Return how far places, (k, 3), are above the quadrics of some points, (k,) int; no others are asked."""
         offset = places - self.points[rows]
         bent = np.einsum("icd,id->ic", self._shape_operator[rows], offset)
         return np.einsum("ic,ic->i", offset, self.normals[rows] + 0.5 * bent)
 
-    def turn(self, rows):
+    def turn(self, rows: Bools) -> None:
         """Turn the normals of some points, (k,) int or (m,) bool, around."""
         self.normals[rows] *= -1.0
         self._shape_operator[rows] *= -1.0
 
-    def heights(self, places, report=lambda: None):
+    def heights(self, places: Floats, report: Callable[..., Any] = lambda: None) -> Heights:
         """Measure places near the surface.
 
         Parameters
@@ -135,14 +142,14 @@ class ImplicitSurface:
         normal, outward = np.empty((2, count, 3))
         result = Heights(height, normal, np.empty(count, dtype=np.int64), spacing, distance, beyond, outward)
 
-        def measure(block):
+        def measure(block: Any) -> None:
             for known, found in zip(result, self._measure(places[block]), strict=True):
                 known[block] = found
 
         on_all_cores(measure, blocks(count, _BLOCK), report)
         return result
 
-    def _measure(self, places):
+    def _measure(self, places: Floats) -> tuple[Array, ...]:
         many = min(_NEIGHBORS, len(self.points))
         distance, index = self._tree.query(places, k=many)
         first, normals = index[:, 0], self.normals[index]
@@ -167,5 +174,5 @@ class ImplicitSurface:
         return height, normal, first, spacing, distance[:, 0] / spacing, beyond, outward
 
 
-def _units(vectors):
+def _units(vectors: Floats) -> Floats:
     return vectors / np.maximum(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), 1e-300)[:, None]

@@ -145,9 +145,7 @@ class LaplaceBeltrami:
 
         >>> import numpy as np
         >>> import core
-        >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-        >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-        >>> points = np.column_stack([ring.real, ring.imag, z])
+        >>> points = core.example_sphere()
         >>> inner = core.build_laplacian(points).toward(-points)
         >>> print(core.mean_curvature(inner).mean().round(2))
         -1.0
@@ -196,9 +194,8 @@ class LaplaceBeltrami:
 
         >>> import numpy as np
         >>> import core
-        >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-        >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-        >>> points = np.column_stack([ring.real, ring.imag, z])
+        >>> points = core.example_sphere()
+        >>> z = points[:, 2]
         >>> laplacian = core.build_laplacian(points)
         >>> print(np.abs(laplacian.apply(z) + 2 * z).max().round(1))
         0.0
@@ -258,9 +255,7 @@ class LaplaceBeltrami:
 
         >>> import numpy as np
         >>> import core
-        >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-        >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-        >>> points = np.column_stack([ring.real, ring.imag, z])
+        >>> points = core.example_sphere()
         >>> laplacian = core.build_laplacian(points)
         >>> print(laplacian.eigenpairs(9).eigenvalues.round(1))
         [0. 2. 2. 2. 6. 6. 6. 6. 6.]
@@ -352,9 +347,7 @@ def build_laplacian(
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> print(laplacian.areas.sum().round(1), laplacian.boundary.any(), laplacian.notices)
     12.6 False []

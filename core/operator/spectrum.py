@@ -1,8 +1,13 @@
 """Eigenpairs of the operator, eq. (12) of the paper."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
@@ -11,6 +16,10 @@ from ..arguments import real, whole
 from ..errors import PointCloudError, SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
+from ..types import Floats, Ints, Progress
+
+if TYPE_CHECKING:
+    from .laplacian import LaplaceBeltrami
 
 TOLERANCE = 2e-7  # leaves eigenvalues right to ten digits and more, for their errors go by its square
 
@@ -35,12 +44,18 @@ class Spectrum:
         of it, ``4 pi count / area``, where that is more.
     """
 
-    eigenvalues: np.ndarray
-    eigenvectors: np.ndarray
-    residuals: np.ndarray | None = None
+    eigenvalues: Floats
+    eigenvectors: Floats
+    residuals: Floats | None = None
 
 
-def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=None):
+def solve_spectrum(
+    laplacian: LaplaceBeltrami,
+    stiffness: sparse.csr_array,
+    count: int,
+    tolerance: float = TOLERANCE,
+    progress: Progress | None = None,
+) -> Spectrum:
     """Compute raw eigenpairs; see `LaplaceBeltrami.eigenpairs`."""
     areas = laplacian.areas
     n = len(areas)
@@ -53,7 +68,7 @@ def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=No
     check_mode_memory(n, int(count))
     count, done = int(count), 0.0
 
-    def report(fraction=0.0):
+    def report(fraction: float = 0.0) -> None:
         nonlocal done
         done = max(done, fraction)
         if progress is not None:
@@ -88,14 +103,16 @@ def solve_spectrum(laplacian, stiffness, count, tolerance=TOLERANCE, progress=No
     return Spectrum(unit * np.maximum(values, 0.0), result, residuals)
 
 
-def _cut(laplacian, count):
+def _cut(laplacian: LaplaceBeltrami, count: int) -> float:
     """Return what the wide kernel makes of twice Weyl's estimate 4 pi count / area of the highest eigenvalue wanted."""
     squared = np.mean(laplacian.smoothing_lengths**2)
     frequency = 8.0 * np.pi * count / laplacian.areas.sum() * squared
     return symbol(np.sqrt(min(frequency, _FLAT**2))) / squared
 
 
-def symmetric_form(laplacian, stiffness, report=lambda: None):
+def symmetric_form(
+    laplacian: LaplaceBeltrami, stiffness: sparse.csr_array, report: Callable[..., Any] = lambda: None
+) -> tuple[Ints, Floats, sparse.csr_array]:
     """Return a matrix with the eigenvalues of the negated operator whose eigenvectors are orthonormal.
 
     Parameters
@@ -130,7 +147,7 @@ def symmetric_form(laplacian, stiffness, report=lambda: None):
     return order, root, matrix
 
 
-def correct_eigenvalues(laplacian, values, vectors):
+def correct_eigenvalues(laplacian: LaplaceBeltrami, values: Floats, vectors: Floats) -> Floats:
     """Recover k^2 from ``lambda = s(k h) / h^2`` mode by mode, with the h^2 that the mode sees on average.
 
     A mode's own mean, ``sum areas h^2 phi^2``, is the one by which a slowly varying h enters the eigenvalue to first

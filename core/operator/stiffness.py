@@ -1,12 +1,15 @@
 """Assemble the stiffness matrix, eq. (10) of the paper."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
 from ..algebra import on_all_cores
+from ..geometry import Cloud, Pairs, Patch, ScaledPoints
 from ..kernel import SECOND_MOMENT, pair_kernel
+from ..types import Array, Bools, Floats, Ints
 from .curvature import weight_factor
 from .images import mirror, own_images
 from .weights import balance_weights
@@ -31,8 +34,8 @@ class Stiffness:
 
     matrix: sparse.csr_array
     images: sparse.csr_array
-    residual: np.ndarray
-    widths: np.ndarray
+    residual: Floats
+    widths: Floats
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,15 @@ class _Images:
         Those in one boundary; others are images of images.
     """
 
-    rows: np.ndarray
-    weights: np.ndarray
-    fourth: np.ndarray
-    once: np.ndarray
+    rows: Ints
+    weights: Floats
+    fourth: Floats
+    once: Bools
 
 
-def assemble_stiffness(cloud, distance, areas, report=lambda: None):
+def assemble_stiffness(
+    cloud: Cloud, distance: Floats, areas: Floats, report: Callable[[], None] = lambda: None
+) -> Stiffness:
     """Assemble K = -D G D of eq. (10) for the caller's points, with weights of the moments that the kernel has.
 
     Points at the same place take equal parts of its area and couple as neighbours at distance zero. The image of a
@@ -92,7 +97,7 @@ def assemble_stiffness(cloud, distance, areas, report=lambda: None):
     return Stiffness(stiffness, images, residual, widths)
 
 
-def stiffness_matrix(scaled, pairs, weights, own):
+def stiffness_matrix(scaled: ScaledPoints, pairs: Pairs, weights: Floats, own: Floats) -> sparse.csr_array:
     """Return the matrix of a function's energy, half the sum of ``weights (f_i - f_j)^2`` over ordered pairs, (n, n).
 
     Parameters
@@ -114,7 +119,7 @@ def stiffness_matrix(scaled, pairs, weights, own):
     return _symmetric(scaled, pairs.first, pairs.second, np.negative(weights, out=weights), total)
 
 
-def _kernel_weights(cloud, distance, areas):
+def _kernel_weights(cloud: Cloud, distance: Floats, areas: Floats) -> tuple[Floats, Floats, _Images, _Images]:
     """Return what the kernel makes of pairs, and of points with themselves.
 
     Returns
@@ -130,14 +135,16 @@ def _kernel_weights(cloud, distance, areas):
     factor = weight_factor(lengths, cloud.gaussian_curvature)
     weights = np.empty(len(distance))
 
-    def weigh(patch):
+    def weigh(patch: Patch) -> None:
         first, second, h = patch.first(areas), patch.second(areas), patch.mean(lengths)
         weights[patch.pairs] = pair_kernel(distance[patch.pairs] / h) * (patch.mean(factor) / h**4) * first * second
 
     on_all_cores(weigh, pairs.patches)
     own = pair_kernel(0.0) * factor / lengths**4 * areas**2
 
-    def weigh_images(weights, found, distance, first, second):
+    def weigh_images(
+        weights: Floats, found: list[tuple[Ints, Floats, Floats]], distance: Floats, first: Ints, second: Ints
+    ) -> _Images:
         parts = []
         for number, (rows, image, _) in enumerate(found):
             i, j = first[rows], second[rows]
@@ -153,13 +160,13 @@ def _kernel_weights(cloud, distance, areas):
     return weights, own, images, alone
 
 
-def _widths(pairs, distance, areas, weights, images, alone):
+def _widths(pairs: Pairs, distance: Floats, areas: Floats, weights: Floats, images: _Images, alone: _Images) -> Floats:
     """Return the smoothing length of the kernel whose fourth moment, 8 mu2 h^2 of the area, the weights have, (m,).
 
     It is a mean over the neighbours, as the operator would make much of what differs from point to point by chance.
     """
 
-    def moments(patch):
+    def moments(patch: Patch) -> list[list[Floats]]:
         own = weights[patch.pairs]
         return [[own, own * distance[patch.pairs] ** 4]] * 2
 
@@ -176,7 +183,7 @@ def _widths(pairs, distance, areas, weights, images, alone):
     return np.where(unit > 0.0, np.sqrt(moment / np.where(unit > 0.0, unit, 1.0)), pairs.lengths)
 
 
-def _symmetric(scaled, first, second, values, own):
+def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, own: Array) -> sparse.csr_array:
     """Return the symmetric matrix, (n, n), of quantities of pairs and of points with themselves, columns sorted.
 
     Points at the same place share what theirs has.

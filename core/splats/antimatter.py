@@ -1,6 +1,7 @@
 """Files .splat, as the viewer antimatter15/splat reads them: 32 bytes a splat, without any header."""
 
 import os
+from pathlib import Path
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from .harmonics import CONSTANT
 _RECORD = np.dtype([("place", "<f4", 3), ("scale", "<f4", 3), ("color", "u1", 4), ("rotation", "u1", 4)])
 
 
-def read_antimatter(path) -> PlyVertices:
+def read_antimatter(path: Path) -> PlyVertices:
     """Read a .splat file as the columns that trainers write.
 
     Raises

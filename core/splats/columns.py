@@ -1,6 +1,11 @@
 """The columns that files of Gaussian splats have as trainers write them: their names, and how numbers are coded."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
+
+from ..types import Array, Floats
 
 PLACES = ("x", "y", "z")
 COLORS = tuple(f"f_dc_{channel}" for channel in range(3))
@@ -15,7 +20,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 _NEAR = 2.0**-25  # half a step of single precision below one
 
 
-def stack(columns, names, dtype=np.float64):
+def stack(columns: dict[str, Array], names: list[str] | tuple[str, ...], dtype: type[Any] = np.float64) -> Array:
     """Return columns by their names as one array, (n, k)."""
     count = len(next(iter(columns.values())))
     result = np.empty((count, len(names)), dtype)
@@ -24,46 +29,46 @@ def stack(columns, names, dtype=np.float64):
     return result
 
 
-def split(names, values) -> dict:
+def split(names: list[str] | tuple[str, ...], values: Array) -> dict[str, Array]:
     """Return an array (n, k) as columns of single precision by their names; the reverse of `stack`."""
     return {name: np.ascontiguousarray(part, np.float32) for name, part in zip(names, values.T, strict=True)}
 
 
-def rest_names(per_channel, used):
+def rest_names(per_channel: int, used: int) -> list[str]:
     """Return the names of the first harmonics of each channel, of which a file has so many."""
     return [f"{REST}{channel * per_channel + number}" for channel in range(3) for number in range(used)]
 
 
-def decode_scales(logarithms):
+def decode_scales(logarithms: Floats) -> Floats:
     """Return half axes of their logarithms; zero for what is no number."""
     with np.errstate(over="ignore"):
         return np.nan_to_num(np.exp(logarithms), nan=0.0, posinf=_LARGEST)
 
 
-def encode_scales(scales):
+def encode_scales(scales: Floats) -> Floats:
     """Return the logarithms of half axes, of those without a length that of the smallest number."""
     return np.log(np.maximum(scales, _SMALLEST))
 
 
-def decode_opacities(logits):
+def decode_opacities(logits: Floats) -> Floats:
     """Return opacities from 0 to 1 of their logits; zero for what is no number."""
     with np.errstate(over="ignore"):
         return np.nan_to_num(1.0 / (1.0 + np.exp(-logits)), nan=0.0)
 
 
-def encode_opacities(opacities):
+def encode_opacities(opacities: ArrayLike) -> Array:
     """Return the logits of opacities, finite ones of 0 and 1, too."""
     inside = np.clip(opacities, _SMALLEST, 1.0 - _NEAR)
     return np.log(inside) - np.log1p(-inside)
 
 
-def decode_rotations(quaternions):
+def decode_rotations(quaternions: Floats) -> Floats:
     """Return unit quaternions; no turn for those without a length."""
     length = np.sqrt(np.einsum("nk,nk->n", quaternions, quaternions))[:, None]
     sound = np.isfinite(length) & (length > 0.0)
     return np.where(sound, quaternions / np.where(sound, length, 1.0), [1.0, 0.0, 0.0, 0.0])
 
 
-def encode_rotations(rotations):
+def encode_rotations(rotations: Floats) -> Floats:
     """Return unit quaternions as they are."""
     return rotations

@@ -1,8 +1,11 @@
 """Ellipsoids R S^2 R^T: unit quaternions R, half axes S, and what a linear map makes of them."""
 
+from typing import Any
+
 import numpy as np
 
 from ..algebra import blocks, nearest_rotations, on_all_cores
+from ..types import Floats, Ints
 
 _BLOCK = 1 << 13  # ellipsoids worked on at one time
 _SWEEPS = 12  # of Jacobi's method; six reach full precision even for axes of a millionth
@@ -12,7 +15,7 @@ _LOST = 1e-14  # of the longest axis
 _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # numbers of a quaternion beside one
 
 
-def matrices_of(quaternions):
+def matrices_of(quaternions: Floats) -> Floats:
     """Return the rotations of unit quaternions w x y z, (n, 4), as matrices, (3, 3, n)."""
     w, x, y, z = np.asarray(quaternions, dtype=np.float64).T
     return np.array(
@@ -24,7 +27,7 @@ def matrices_of(quaternions):
     )
 
 
-def quaternions_of(matrices):
+def quaternions_of(matrices: Floats) -> Floats:
     """Return the unit quaternions w x y z, (n, 4), of rotations, (3, 3, n)."""
     (a, b, c), (d, e, f), (g, h, i) = matrices
     # Four times the products of the quaternion's numbers: each row is a multiple of it, the longest one the best.
@@ -41,7 +44,7 @@ def quaternions_of(matrices):
     return rows / np.sqrt(np.einsum("nk,nk->n", rows, rows))[:, None]
 
 
-def completed_quaternions(missing, others):
+def completed_quaternions(missing: Ints, others: Floats) -> Floats:
     """Return unit quaternions, (n, 4), of three of their numbers, (n, 3), and which one above zero is missing, (n,)."""
     left = 1.0 - np.einsum("nk,nk->n", others, others)
     result = np.empty((len(others), 4))
@@ -51,7 +54,7 @@ def completed_quaternions(missing, others):
     return result
 
 
-def mapped(scales, rotations, gradients):
+def mapped(scales: Floats, rotations: Floats, gradients: Floats) -> tuple[Floats, Floats]:
     """Map ellipsoids linearly: F R S^2 R^T F^T, split into half axes and rotations again.
 
     Parameters
@@ -80,14 +83,14 @@ def mapped(scales, rotations, gradients):
     """
     lengths, turns = np.empty(scales.shape), np.empty(rotations.shape)
 
-    def split(rows):
+    def split(rows: Any) -> None:
         lengths[rows], turns[rows] = _split(scales[rows], rotations[rows], gradients[rows])
 
     on_all_cores(split, blocks(len(scales), _BLOCK))
     return lengths, turns
 
 
-def _split(scales, rotations, gradients):
+def _split(scales: Floats, rotations: Floats, gradients: Floats) -> tuple[Floats, Floats]:
     maps = np.ascontiguousarray(np.moveaxis(gradients, 0, 2), dtype=np.float64)  # a tenth of the time of strided ones
     axes = np.einsum("abn,bcn->acn", maps, matrices_of(rotations)) * np.asarray(scales, dtype=np.float64).T
     size = np.sqrt(np.einsum("acn,acn->n", axes, axes))
@@ -114,7 +117,7 @@ def _split(scales, rotations, gradients):
     return (lengths * size).T, turns * sides[:, None]
 
 
-def _orthogonalize(axes, p, q):
+def _orthogonalize(axes: Floats, p: int, q: int) -> Floats:
     """Turn two columns of each matrix until they are orthogonal; return the cosines between them before, (n,)."""
     one, other = axes[:, p], axes[:, q]
     product = np.einsum("an,an->n", one, other)

@@ -1,7 +1,8 @@
 """Files of Gaussian splats: PLY as trainers write it, and the layouts that hold as much."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, NoReturn, Self
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from ..files import (
     FARTHEST,
     SPLATS,
     PlyVertices,
+    PointTable,
     check_places,
     is_coarse,
     read_points,
@@ -20,6 +22,7 @@ from ..files import (
     told_steps,
     write_vertex_columns,
 )
+from ..types import Array, FilePath, Floats
 from . import packed
 from .antimatter import read_antimatter
 from .columns import (
@@ -61,18 +64,18 @@ class SplatFile(NamedTuple):
         Lines of the header.
     """
 
-    columns: dict
+    columns: dict[str, Array]
     order: str = "<"
-    comments: tuple = ()
+    comments: Sequence[str] = ()
 
-    def scaled(self, factors):
+    def scaled(self, factors: Floats) -> Self:
         """Return this with those columns that are lengths multiplied by a factor for each splat, (n,)."""
         lengths = {name: self.columns[name] for name in LENGTHS if name in self.columns}
         scaled = {name: (values * factors).astype(values.dtype) for name, values in lengths.items()}
         return self._replace(columns={**self.columns, **scaled})
 
 
-def holds_splats(path) -> bool:
+def holds_splats(path: FilePath) -> bool:
     """Tell whether a file is one of splats, by how it begins, or by its name; PLY files that are broken are none."""
     path = _path(path)
     try:
@@ -82,7 +85,7 @@ def holds_splats(path) -> bool:
         return False
 
 
-def read_file(path, read=read_points):
+def read_file(path: FilePath, read: Callable[..., Any] = read_points) -> PointTable | Splats:
     """Read the splats of a file; of one that holds none its points.
 
     Parameters
@@ -106,11 +109,11 @@ def read_file(path, read=read_points):
     table = read(path)
     missing = near_miss((*PLACES, *table.attributes))
     if missing:
-        table.notices.append(f"{path.name} looks like Gaussian splats, but has {missing}: read as plain points.")
+        table.notices.append(f"{Path(path).name} looks like Gaussian splats, but has {missing}: read as plain points.")
     return table
 
 
-def read_splats(path) -> Splats:
+def read_splats(path: FilePath) -> Splats:
     """Read Gaussian splats from a file of one of these kinds, whatever it is called.
 
     Parameters
@@ -137,7 +140,7 @@ def read_splats(path) -> Splats:
         return _from_vertices((_reader(path) or _refuse)(path), path)
 
 
-def _reader(path):
+def _reader(path: Path) -> Callable[..., Any] | None:
     """Return what reads the vertices of a file as columns that trainers write; None if it holds no splats."""
     suffix = path.suffix.lower()
     with open(path, "rb") as file:
@@ -152,7 +155,7 @@ def _reader(path):
     return read_antimatter if suffix == ".splat" else None
 
 
-def _refuse(path):
+def _refuse(path: Path) -> NoReturn:
     """Say what a file lacks."""
     missing = [name for name in NEEDED if name not in read_vertex_names(path)]
     raise InvalidPointsError(
@@ -161,14 +164,14 @@ def _refuse(path):
     )
 
 
-def _read_ply(path):
+def _read_ply(path: Path) -> PlyVertices:
     vertices = read_vertex_columns(path)
     columns, guesses = completed(vertices.columns)
     told = [f"{path.name}: {'; '.join(guesses)}. Export Splats writes the common layout."] if guesses else []
     return vertices._replace(columns=columns, notices=[*vertices.notices, *told])
 
 
-def _from_vertices(vertices: PlyVertices, path) -> Splats:
+def _from_vertices(vertices: PlyVertices, path: Path) -> Splats:
     """Make splats of the vertices of a file that has all properties they need, but those that are not finite."""
     columns, left_out = _without_broken(vertices.columns, path)
     positions = stack(columns, PLACES)
@@ -188,7 +191,7 @@ def _from_vertices(vertices: PlyVertices, path) -> Splats:
     )
 
 
-def _without_broken(columns, path):
+def _without_broken(columns: dict[str, Array], path: Path) -> tuple[dict[str, Array], list[Any]]:
     """Leave out splats with numbers that are not finite, or too far away, as training leaves them; tell how many.
 
     Logarithms of sizes may be minus infinity, of sizes zero, and logits of opacities infinite, of 0 and 1.
@@ -211,11 +214,11 @@ def _without_broken(columns, path):
     return {name: values[sound] for name, values in columns.items()}, [told]
 
 
-def _any_far(values):
+def _any_far(values: Array) -> bool:
     return bool((np.isfinite(values) & (np.abs(values) > FARTHEST)).any())
 
 
-def write_splats(path, splats):
+def write_splats(path: FilePath, splats: Splats) -> None:
     """Write Gaussian splats to a PLY file, in the layout of the file that they came from.
 
     What was read and not changed is written bit for bit as it was.
@@ -252,20 +255,20 @@ def write_splats(path, splats):
         write_vertex_columns(part, columns, file.order, file.comments)
 
 
-def _needs_double(positions) -> bool:
+def _needs_double(positions: Floats) -> bool:
     """Whether single precision would hurt places, other than such as came from there."""
     lost = np.abs(positions.astype(np.float32) - positions).max()
     return is_coarse(positions) and lost > _LOST * np.ptp(positions, axis=0).max()
 
 
-def _path(given):
+def _path(given: FilePath) -> Path:
     try:
         return Path(given)
     except TypeError as error:
         raise PointCloudError(f"{given!r} is no name of a file. Give a text or a path.") from error
 
 
-def encoded(splats, columns):
+def encoded(splats: Splats, columns: dict[str, Array]) -> dict[str, Floats]:
     """Return the columns of a file with these splats; numbers that did not change are those of the columns before."""
     result = dict(zip(PLACES, splats.positions.T, strict=True)) | dict(zip(COLORS, splats.colors.T, strict=True))
     rest = splats.harmonics.swapaxes(1, 2).reshape(len(splats), -1)
@@ -287,7 +290,7 @@ def encoded(splats, columns):
     return result
 
 
-def _harmonic_columns(columns, path):
+def _harmonic_columns(columns: dict[str, Array], path: Path) -> tuple[list[Any], list[Any]]:
     """Return the names of the harmonics that can be used, channel by channel, and what to tell about the others."""
     count = sum(name.startswith(REST) for name in columns)
     whole = count % 3 == 0 and count // 3 <= COUNTS[-1] and all(f"{REST}{number}" in columns for number in range(count))

@@ -1,10 +1,14 @@
 """Floaters: splats that show no surface, which training leaves in the air and where few pictures look."""
 
+from typing import Any
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..errors import InvalidPointsError
+from ..types import Bools, Floats
+from .splats import Splats
 
 _SEEN = 0.05  # opacity in the middle: nobody sees that less of what lies behind comes through
 _HUGE = 10.0  # times the median length: the middle of such a splat tells nothing of the shape
@@ -14,7 +18,7 @@ _NEIGHBORS = 12  # nearest middles, of which these are chosen
 _BLOCK = 1 << 13  # splats looked at at one time
 
 
-def floaters(splats):
+def floaters(splats: Splats) -> Bools:
     """Find splats that show no surface: hardly seen ones, huge ones, and such as float alone.
 
     Splats cover a surface without gaps, so that each of them touches others. How far two are apart is measured by the
@@ -60,17 +64,17 @@ def floaters(splats):
     rows = np.flatnonzero(kept)
     if len(rows) > _NEIGHBORS:
         apart = _gaps(positions[rows], splats.covariances[rows])
-        kept[rows] = apart <= _APART * max(1.0, np.median(apart))
+        kept[rows] = apart <= _APART * max(1.0, float(np.median(apart)))
     return ~kept
 
 
-def floating_rows(splats):
+def floating_rows(splats: Any) -> Any:
     """Return the floaters that operators leave out, as indices: all, or none where these are the larger part."""
     rows = np.flatnonzero(floaters(splats))
     return rows if 2 * len(rows) < len(splats) else rows[:0]
 
 
-def _gaps(positions, covariances):
+def _gaps(positions: Floats, covariances: Floats) -> Floats:
     """Return the third of the Mahalanobis distances from each splat to its neighbors, (m,)."""
     result = np.empty(len(positions))
     index = cKDTree(positions).query(positions, k=_NEIGHBORS + 1, workers=-1)[1][:, 1:]
@@ -80,7 +84,7 @@ def _gaps(positions, covariances):
     )
     covariances = covariances + ridge
 
-    def measure(part):
+    def measure(part: Any) -> None:
         near = index[part]
         steps = positions[near] - positions[part][:, None]
         both = covariances[near] + covariances[part][:, None]

@@ -5,9 +5,12 @@ those of the files of Kerbl, Kopanas, Leimkuehler, Drettakis: 3D Gaussian Splatt
 Rendering. ACM Trans. Graph. 42, 2023.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
+from ..types import Array, Floats
 
 COUNTS = (0, 3, 8, 15, 24)  # of harmonics up to the degrees 0 to 4
 CONSTANT = 0.5 / np.sqrt(np.pi)  # the harmonic of degree 0
@@ -15,7 +18,7 @@ _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 _BLOCK = 1 << 13  # functions worked on at one time
 
 
-def harmonics(directions, count):
+def harmonics(directions: Floats, count: int) -> Floats:
     """Evaluate spherical harmonics.
 
     Parameters
@@ -34,7 +37,7 @@ def harmonics(directions, count):
     return np.concatenate([np.empty((*np.shape(directions)[:-1], 0)), *parts], axis=-1)
 
 
-def turned(coefficients, turns):
+def turned(coefficients: Array, turns: Floats) -> Array:
     """Turn functions on the sphere that are given by their coefficients.
 
     Parameters
@@ -56,7 +59,7 @@ def turned(coefficients, turns):
     """
     result = np.empty_like(coefficients)
 
-    def turn(rows):
+    def turn(rows: Any) -> None:
         for degree, (directions, fit) in enumerate(_FITS[: COUNTS.index(coefficients.shape[1])], 1):
             own = slice(COUNTS[degree - 1], COUNTS[degree])
             back = np.einsum("kd,nde->nke", directions, turns[rows])
@@ -66,7 +69,7 @@ def turned(coefficients, turns):
     return result
 
 
-def _of_degree(degree, directions):
+def _of_degree(degree: int, directions: Floats) -> Floats:
     """Evaluate the harmonics of a degree, in the order of m from -degree to degree."""
     x, y, z = np.moveaxis(np.asarray(directions, dtype=np.float64), -1, 0)
     result = _DEGREES[degree - 1](x, y, z, x * x, y * y, z * z)
@@ -109,7 +112,7 @@ _DEGREES = (
 )
 
 
-def _fit(degree):
+def _fit(degree: int) -> tuple[Floats, Array]:
     """Return 2 degree + 1 directions, and the matrix from values there to coefficients."""
     # Of one half of the sphere, for on the other one the values are the same, or the opposite.
     z = 1.0 - (np.arange(2 * degree + 1) + 0.5) / (2 * degree + 1)

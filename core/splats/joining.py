@@ -1,7 +1,10 @@
 """Several sets of Gaussian splats as one."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ..types import Floats
 from .columns import REST
 from .file import SplatFile, encoded
 from .splats import Splats
@@ -9,7 +12,7 @@ from .splats import Splats
 _ARRAYS = ("positions", "scales", "rotations", "opacities", "colors")
 
 
-def joined(parts) -> Splats:
+def joined(parts: Sequence[Splats]) -> Splats:
     """Join splats one after another.
 
     Parameters
@@ -22,22 +25,22 @@ def joined(parts) -> Splats:
     Splats
         With all columns of all files, zeros where a file has none, in the layout of the first.
     """
-    arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS]
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
     count = max(part.harmonics.shape[1] for part in parts)
     return Splats(
-        *arrays,
+        **arrays,
         harmonics=np.concatenate([with_harmonics(part.harmonics, count) for part in parts]),
         notices=[notice for part in parts for notice in part.notices],
         file=_joined_files(parts),
     )
 
 
-def with_harmonics(harmonics, count):
+def with_harmonics(harmonics: Floats, count: int) -> Floats:
     """Return harmonics, (n, k, 3), with zeros for those that are missing of so many, (n, count, 3)."""
     return np.pad(harmonics, ((0, 0), (0, count - harmonics.shape[1]), (0, 0)))
 
 
-def _joined_files(parts):
+def _joined_files(parts: Sequence[Splats]) -> SplatFile | None:
     files = [part.file for part in parts if part.file is not None]
     if not files:
         return None
@@ -52,5 +55,5 @@ def _joined_files(parts):
     return SplatFile(columns, files[0].order, files[0].comments)
 
 
-def _new_columns(splats):
+def _new_columns(splats: Splats) -> dict[str, Floats]:
     return {name: values.astype(np.float32) for name, values in encoded(splats, {}).items()}

@@ -1,8 +1,11 @@
 """Layouts of vertices that are nearly those of trainers: which hold enough for Gaussian splats, and what they lack."""
 
+from typing import Any
+
 import numpy as np
 
 from ..files import unit_colors
+from ..types import Array
 from .columns import COLORS, NEEDED, OPACITY, PLACES, ROTATIONS, SCALES, encode_opacities, split, stack
 from .harmonics import CONSTANT
 
@@ -10,7 +13,7 @@ _RGB = (("red", "green", "blue"), ("r", "g", "b"))
 _THIN = 1e-3  # of the shorter axis in the plane: how thick a splat without a third axis becomes
 
 
-def hold_enough(names) -> bool:
+def hold_enough(names: list[str] | tuple[str, ...]) -> bool:
     """Whether properties of these names hold enough for splats: sizes, and at least one thing more that splats have.
 
     Colours and rotations are there or not, but not by halves. Of sizes one or two do: balls, and flat ones.
@@ -22,14 +25,14 @@ def hold_enough(names) -> bool:
     return there.issuperset(PLACES) and sizes[0] and sizes[2] <= sizes[1] and not halves and bool(marks)
 
 
-def near_miss(names) -> str:
+def near_miss(names: tuple[str, ...]) -> str:
     """Return what is missing in a file that seems to hold splats but not enough of them; empty for other files."""
     if hold_enough(names) or not {COLORS[0], SCALES[0], ROTATIONS[0]}.intersection(names):
         return ""
     return f"no {', '.join(name for name in NEEDED if name not in names)}"
 
 
-def completed(columns):
+def completed(columns: dict[str, Array]) -> tuple[dict[str, Array], list[Any]]:
     """Return the columns as trainers write them, for columns that `hold_enough`, and what was taken for missing ones.
 
     Returns
@@ -42,7 +45,7 @@ def completed(columns):
     return columns, [told for add in (_add_colors, _add_opacity, _add_sizes, _add_rotations) if (told := add(columns))]
 
 
-def _add_colors(columns):
+def _add_colors(columns: dict[str, Array]) -> str:
     if COLORS[0] in columns:
         return ""
     named = next((names for names in _RGB if columns.keys() >= set(names)), None)
@@ -56,14 +59,14 @@ def _add_colors(columns):
     return f"colors by {' '.join(named)}: the same from all sides"
 
 
-def _add_opacity(columns):
+def _add_opacity(columns: dict[str, Array]) -> str:
     if OPACITY in columns:
         return ""
     columns[OPACITY] = np.full(len(columns["x"]), encode_opacities(1.0), np.float32)
     return "no opacity: splats are opaque"
 
 
-def _add_sizes(columns):
+def _add_sizes(columns: dict[str, Array]) -> str:
     if SCALES[2] in columns:
         return ""
     if SCALES[1] not in columns:
@@ -73,7 +76,7 @@ def _add_sizes(columns):
     return "no scale_2 (2D splats): their third axis is a thousandth of the shorter one"
 
 
-def _add_rotations(columns):
+def _add_rotations(columns: dict[str, Array]) -> str:
     if ROTATIONS[0] in columns:
         return ""
     columns.update(split(ROTATIONS, np.tile([1.0, 0.0, 0.0, 0.0], (len(columns["x"]), 1))))

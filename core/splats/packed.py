@@ -4,10 +4,14 @@ Each element "chunk" holds the least and greatest places, logarithms of sizes, a
 the numbers of these lie. An element "sh", if it is there, holds the harmonics by bytes.
 """
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
 from ..errors import InvalidPointsError
 from ..files import PlyVertices, brief, read_elements
+from ..types import Array, Floats, Ints
 from .columns import COLORS, OPACITY, PLACES, ROTATIONS, SCALES, encode_opacities, split, stack
 from .ellipsoids import completed_quaternions
 from .harmonics import CONSTANT
@@ -20,7 +24,7 @@ _HARMONICS = 8.0  # between the least and the greatest one
 _SINGLE = np.float32
 
 
-def read_packed(path) -> PlyVertices:
+def read_packed(path: Path) -> PlyVertices:
     """Read the splats of a packed PLY file as the columns that trainers write.
 
     Raises
@@ -46,18 +50,15 @@ def read_packed(path) -> PlyVertices:
     return PlyVertices(columns, order, comments, [])
 
 
-def _unpack(packed, chunks):
+def _unpack(packed: dict[str, Ints], chunks: dict[str, Array]) -> dict[str, Array]:
     """Return places, sizes, rotations, colours and opacities."""
     rows = np.arange(len(packed[MARK])) // _CHUNK
     places = _between(chunks, _PLACES, rows, _shares(packed[MARK], (11, 10, 11)))
     sizes = _between(chunks, _SIZES, rows, _shares(packed["packed_scale"], (11, 10, 11)))
-    *colors, opacities = _shares(packed["packed_color"], (8, 8, 8, 8))
-    if "min_r" in chunks:
-        colors = _between(chunks, _COLORS, rows, colors)
-    else:
-        colors = np.stack(colors, axis=1)
-    largest, *others = _shares(packed["packed_rotation"], (2, 10, 10, 10))
-    others = (np.stack(others, axis=1) - 0.5) * np.sqrt(2.0)
+    *shares, opacities = _shares(packed["packed_color"], (8, 8, 8, 8))
+    colors = _between(chunks, _COLORS, rows, shares) if "min_r" in chunks else np.stack(shares, axis=1)
+    largest, *rest = _shares(packed["packed_rotation"], (2, 10, 10, 10))
+    others = (np.stack(rest, axis=1) - 0.5) * np.sqrt(2.0)
     return {
         **split(PLACES, places),
         **split(COLORS, (colors - 0.5) / CONSTANT),
@@ -67,7 +68,7 @@ def _unpack(packed, chunks):
     }
 
 
-def _shares(packed, widths):
+def _shares(packed: Ints, widths: tuple[int, ...]) -> list[Floats]:
     """Return the numbers of so many bits each, from the highest bit on, as shares from 0 to 1, (n,) each."""
     ends = np.cumsum(widths)
     return [
@@ -76,14 +77,14 @@ def _shares(packed, widths):
     ]
 
 
-def _between(chunks, axes, rows, shares):
+def _between(chunks: dict[str, Array], axes: tuple[str, str, str], rows: Ints, shares: Sequence[Floats]) -> Floats:
     """Return what lies at some shares between the bounds of chunks, (n, 3)."""
     low, high = (stack(chunks, [f"{end}_{axis}" for axis in axes])[rows] for end in ("min", "max"))
     share = np.stack(shares, axis=1)
     return low * (1.0 - share) + high * share
 
 
-def _decode_harmonics(values):
+def _decode_harmonics(values: Ints) -> Array:
     """Return harmonics of bytes: the middles of 256 equal steps, and both ends as they are."""
     values = values.astype(_SINGLE)
     share = np.where(values == 0.0, 0.0, np.where(values == 255.0, 1.0, (values + 0.5) / 256.0))

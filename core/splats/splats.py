@@ -1,14 +1,22 @@
 """Gaussian splats as arrays."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..algebra import nearest_rotations
-from ..arguments import as_array
+from ..arguments import as_array, check_array
 from ..errors import InvalidPointsError
+from ..types import Array, Floats
 from .ellipsoids import mapped, matrices_of
 from .harmonics import COUNTS, turned
+
+if TYPE_CHECKING:
+    from .file import SplatFile
 
 
 @dataclass(frozen=True)
@@ -50,16 +58,16 @@ class Splats:
     Graph. 42, 2023.
     """
 
-    positions: np.ndarray
-    scales: np.ndarray
-    rotations: np.ndarray
-    opacities: np.ndarray
-    colors: np.ndarray
-    harmonics: np.ndarray
-    notices: list = field(default_factory=list)
-    file: object = None
+    positions: Floats
+    scales: Floats
+    rotations: Floats
+    opacities: Floats
+    colors: Floats
+    harmonics: Floats
+    notices: list[str] = field(default_factory=list)
+    file: SplatFile | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         count = len(as_array(self.positions, "Positions")) if np.ndim(self.positions) else -1
         rest = np.shape(as_array(self.harmonics, "Harmonics"))
         shapes = {
@@ -73,16 +81,16 @@ class Splats:
         for name, shape in shapes.items():
             object.__setattr__(self, name, _numbers(getattr(self, name), shape, name))
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.positions)
 
     @property
-    def covariances(self):
+    def covariances(self) -> Floats:
         """R S^2 R^T of each splat, (n, 3, 3) [L^2]."""
         axes = matrices_of(self.rotations) * self.scales.T
         return np.einsum("abn,cbn->nac", axes, axes)
 
-    def deformed(self, positions, gradients):
+    def deformed(self, positions: ArrayLike, gradients: ArrayLike) -> Self:
         """Return these splats carried along by a deformation.
 
         Parameters
@@ -116,8 +124,8 @@ class Splats:
         if len(rows) == len(self):
             shapes = _mapped(*shapes, maps)
         elif len(rows):  # the others keep every bit
-            moved = _mapped(*(part[rows] for part in shapes), maps[rows])
-            shapes = [part.copy() for part in shapes]
+            moved = _mapped(self.scales[rows], self.rotations[rows], self.harmonics[rows], maps[rows])
+            shapes = (shapes[0].copy(), shapes[1].copy(), shapes[2].copy())
             for part, new in zip(shapes, moved, strict=True):
                 part[rows] = new
         scales, rotations, harmonics = shapes
@@ -125,26 +133,22 @@ class Splats:
         return replace(self, positions=places, scales=scales, rotations=rotations, harmonics=harmonics, file=file)
 
 
-def _mapped(scales, rotations, harmonics, maps):
+def _mapped(scales: Floats, rotations: Floats, harmonics: Array, maps: Floats) -> tuple[Floats, Floats, Array]:
     """Return half axes, rotations and harmonics after linear maps, (n, 3, 3)."""
     if harmonics.shape[1]:
         harmonics = turned(harmonics, orthogonal_parts(maps))
     return *mapped(scales, rotations, maps), harmonics
 
 
-def orthogonal_parts(gradients):
+def orthogonal_parts(gradients: Floats) -> Floats:
     """Return the orthogonal matrices nearest to maps, (n, 3, 3): rotations, mirrored where the maps mirror."""
     sign = np.where(np.linalg.det(gradients) < 0.0, -1.0, 1.0)
     parts = nearest_rotations(np.ascontiguousarray(np.moveaxis(gradients * sign[:, None, None], 0, 2)))
     return np.moveaxis(parts * sign, 2, 0)
 
 
-def _numbers(given, shape, name):
+def _numbers(given: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """Return an argument as an array of floating-point numbers of a shape."""
-    array = as_array(given, name.capitalize())
-    if array.shape != shape or array.dtype.kind not in "iuf":
-        raise InvalidPointsError(
-            f"The {name} have the shape {array.shape} and type {array.dtype}, not {shape} real numbers. Give one row"
-            " per splat, and 0, 3, 8, 15 or 24 harmonics."
-        )
+    wanted = f"Give {shape} real numbers: one row per splat, and 0, 3, 8, 15 or 24 harmonics."
+    array = check_array(given, name.capitalize(), [shape], wanted)
     return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)

@@ -3,12 +3,14 @@
 import os
 import struct
 import zlib
-from typing import NamedTuple
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidPointsError
 from ..files import PlyVertices
+from ..types import Array, Floats, Ints
 from .columns import COLORS, OPACITY, PLACES, ROTATIONS, SCALES, encode_opacities, rest_names, split
 from .ellipsoids import completed_quaternions
 from .harmonics import COUNTS
@@ -28,20 +30,20 @@ _BLOCK = 1 << 16  # bytes that are unpacked at one time
 class _Header(NamedTuple):
     magic: bytes
     version: int
-    count: int
+    count: int  # type: ignore[assignment]  # in place of the method of tuples
     degree: int
     fraction: int  # bits of a coordinate behind the point
     flags: int
     reserved: int
 
     @property
-    def widths(self):
+    def widths(self) -> tuple[int, int, int, int, int, int]:
         """How many bytes each splat has of places, opacities, colours, sizes, rotations and harmonics."""
         places = 6 if self.version == 1 else 9
         return places, 1, 3, 3, 3 if self.version <= _BEFORE_SMALLEST_THREE else 4, 3 * COUNTS[self.degree]
 
 
-def is_spz(path) -> bool:
+def is_spz(path: Path) -> bool:
     """Whether a file is one of .spz, of any version, by how it begins, packed or not."""
     with open(path, "rb") as file:
         try:
@@ -50,7 +52,7 @@ def is_spz(path) -> bool:
             return False
 
 
-def read_spz(path) -> PlyVertices:
+def read_spz(path: Path) -> PlyVertices:
     """Read an .spz file as the columns that trainers write, in the file's own axes, of which y points upwards.
 
     Raises
@@ -86,12 +88,12 @@ def read_spz(path) -> PlyVertices:
 class _Unpacked:
     """What is in a file, out of gzip if it is packed, as far as it is asked for."""
 
-    def __init__(self, file):
+    def __init__(self, file: BinaryIO) -> None:
         packed = file.read(len(GZIP)) == GZIP
         file.seek(0)
         self._file, self._unpacker = file, zlib.decompressobj(wbits=zlib.MAX_WBITS | 16) if packed else None
 
-    def read(self, count):
+    def read(self, count: int) -> bytearray | bytes:
         """Return the next bytes, fewer if there are not so many; memory is taken for what is there."""
         if self._unpacker is None:
             return self._file.read(min(count, os.fstat(self._file.fileno()).st_size))
@@ -104,7 +106,7 @@ class _Unpacked:
         return result
 
 
-def _read_header(data, path):
+def _read_header(data: bytearray | bytes, path: Path) -> _Header:
     header = _Header(*_HEADER.unpack(data)) if len(data) == _HEADER.size else None
     if header is None or header.magic != MAGIC:
         raise InvalidPointsError(f"{path} is no .spz file: it does not begin with NGSP. Copy or export it again.")
@@ -123,7 +125,9 @@ def _read_header(data, path):
     return header
 
 
-def _decode(header, places, opacities, colors, sizes, rotations, harmonics):
+def _decode(
+    header: _Header, places: Ints, opacities: Ints, colors: Ints, sizes: Ints, rotations: Ints, harmonics: Ints
+) -> dict[str, Array]:
     """Return the columns of bytes, (n, k) each."""
     return {
         **split(PLACES, _decode_places(header, places)),
@@ -135,7 +139,7 @@ def _decode(header, places, opacities, colors, sizes, rotations, harmonics):
     }
 
 
-def _decode_places(header, data):
+def _decode_places(header: _Header, data: Ints) -> Floats:
     """Return coordinates of numbers of 24 bits with a fixed point, or of 16 with a floating one in version 1."""
     if header.version == 1:
         return np.ascontiguousarray(data).view("<f2").astype(np.float64)
@@ -144,7 +148,7 @@ def _decode_places(header, data):
     return (padded.view("<i4")[:, :, 0] >> 8) / 2.0**header.fraction
 
 
-def _decode_rotations(header, data):
+def _decode_rotations(header: _Header, data: Ints) -> Floats:
     """Return unit quaternions w x y z of x y z, or from version 3 on of all but the largest number."""
     if header.version <= _BEFORE_SMALLEST_THREE:
         vector = data / 127.5 - 1.0
@@ -157,7 +161,7 @@ def _decode_rotations(header, data):
     return found[:, [3, 0, 1, 2]]
 
 
-def _decode_harmonics(header, data):
+def _decode_harmonics(header: _Header, data: Ints) -> Array:
     """Return harmonics channel by channel, of bytes with the channels of each after one another."""
     values = (data.astype(np.float32) - 128.0) / 128.0
     return values.reshape(header.count, COUNTS[header.degree], 3).swapaxes(1, 2).reshape(header.count, -1)

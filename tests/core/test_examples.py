@@ -27,6 +27,7 @@ SHOWN = [
     "displace_by_mode",
     "estimate_areas",
     "estimate_normals",
+    "example_sphere",
     "fair_points",
     "front_point",
     "geodesic_distance",

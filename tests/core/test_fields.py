@@ -210,12 +210,12 @@ def test_all_points_fixed(strip):
     ("fixed", "values", "text"),
     [
         ([], [], "No points are fixed"),
-        ([0, 1], [1.0], "for 2 fixed points"),
-        ([0, 1, 2], [1.0, 2.0], "for 3 fixed points"),
+        ([0, 1], [1.0], "each of 2 fixed points"),
+        ([0, 1, 2], [1.0, 2.0], "each of 3 fixed points"),
         ([0, 1], [np.nan, 1.0], "1 of 2 fixed values are not finite"),
         ([4, 4], [0.0, 1.0], "two different values"),
         ([99_999], [1.0], "Give whole numbers below 2821"),
-        ([0], ["a"], "for 1 fixed points"),
+        ([0], ["a"], "each of 1 fixed points"),
     ],
 )
 def test_bad_fixed_points(strip, fixed, values, text):
@@ -225,7 +225,7 @@ def test_bad_fixed_points(strip, fixed, values, text):
 
 @pytest.mark.parametrize(
     ("source", "text"),
-    [(np.zeros(3), "one number for each of the 2821"), (np.full(2821, np.inf), "2821 of 2821 values")],
+    [(np.zeros(3), "one number for each of 2821"), (np.full(2821, np.inf), "2821 of 2821 values")],
 )
 def test_bad_sources(strip, source, text):
     with pytest.raises(core.InvalidPointsError, match=text):

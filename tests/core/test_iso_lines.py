@@ -94,7 +94,7 @@ def test_where_three_sheets_meet_lines_end():
     [
         ([[0, 1]], [0.0, 1.0, 2.0], [0.5], "three or four"),
         ([[0, 1, 3]], [0.0, 1.0, 2.0], [0.5], "there are 3"),
-        ([[0, 1, 2]], [0.0, 1.0], [0.5], "there are 3 vertices"),
+        ([[0, 1, 2]], [0.0, 1.0], [0.5], "each of 3 vertices"),
         ([[0, 1, 2]], [0.0, 1.0, 2.0], [np.nan], "finite"),
     ],
 )

@@ -220,9 +220,9 @@ class TestNodalDomains:
     @pytest.mark.parametrize(
         ("values", "match"),
         [
-            (np.ones(7), "2500 points. Give one real number per point"),
-            (np.ones((2500, 2)), "2500 points. Give one real number per point"),
-            (np.full(2500, "a"), "2500 points. Give one real number per point"),
+            (np.ones(7), "Give one real number for each of 2500 points"),
+            (np.ones((2500, 2)), "Give one real number for each of 2500 points"),
+            (np.full(2500, "a"), "Give one real number for each of 2500 points"),
             (np.where(np.arange(2500) < 3, np.nan, 1.0), "3 of 2500 points have values"),
         ],
     )

@@ -104,5 +104,5 @@ def test_points_that_are_no_surface_have_finite_slopes(points):
 
 @pytest.mark.parametrize("values", [np.zeros(3), np.zeros((4000, 2)), ["a"] * 4000], ids=["few", "pairs", "texts"])
 def test_values_of_another_shape_are_refused(sphere, values):
-    with pytest.raises(core.InvalidPointsError, match="there are 4000 points"):
+    with pytest.raises(core.InvalidPointsError, match="each of 4000 points"):
         core.Slopes(*sphere).of(values)

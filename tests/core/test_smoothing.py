@@ -336,7 +336,7 @@ class TestMode:
         [
             (np.zeros(1500), 1.0, "zero at all 1500"),
             (np.ones(3), 1.0, "1500 points"),
-            (np.ones((1500, 2)), 1.0, "one real number per point"),
+            (np.ones((1500, 2)), 1.0, "one real number for each of 1500 points"),
             (np.full(1500, np.inf), 1.0, "not finite"),
             (np.ones(1500), np.nan, "finite numbers"),
         ],
