@@ -201,7 +201,7 @@ def _weights(points: Floats, chosen: Floats, normals: Floats, component: Ints, i
     return first, balanced_weights(weight, offset, _LEVEL, _BEYOND)
 
 
-def balanced_weights(weight, offset, least, beyond=np.inf):
+def balanced_weights(weight: Floats, offset: Floats, least: float, beyond: float = np.inf) -> Floats:
     """Balance weights, so that they carry linear functions as they are: moving least squares of first order.
 
     The value at zero of the linear function that fits the values at some offsets best is a sum of these values with

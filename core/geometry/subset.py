@@ -161,7 +161,8 @@ def _shuffled(keys: Ints) -> Ints:
 
 def _discs(tree: cKDTree, rank: Ints, radius: float) -> Bools:
     """Return which points stay, (m,) bool, when each, in the order of their ranks, takes all others within a radius."""
-    return independent(*tree.query_pairs(radius, output_type="ndarray").T, rank)
+    first, second = tree.query_pairs(radius, output_type="ndarray").T
+    return independent(first, second, rank)
 
 
 def independent(first: Ints, second: Ints, rank: Array, report: Callable[[], None] = lambda: None) -> Bools:
