@@ -230,7 +230,7 @@ class Settings:
         row.operator("meshfree.add_preset", text="", icon="REMOVE").remove_active = True
         split_properties(layout, context)
         obj = context.object
-        for group in (("method",), *_SETTINGS[obj.meshfree.method], _BUDGET):
+        for group in (("laplacian",), *_SETTINGS[obj.meshfree.laplacian], _BUDGET):
             column = layout.column(align=True)
             for name in group:
                 row = column.row(align=True)

@@ -10,7 +10,7 @@ DEFAULTS, PAPER_DEFAULTS = LaplacianOptions(), PaperOptions()
 
 # The options of either method that are settings of an object by the same name.
 _DEFAULT, _PAPER = (tuple(option.name for option in fields(kind)) for kind in (LaplacianOptions, PaperOptions))
-NAMES = ("method", *dict.fromkeys(_DEFAULT + _PAPER))
+NAMES = ("laplacian", *dict.fromkeys(_DEFAULT + _PAPER))
 
 # Those, and the settings that say what of the object is read.
 ALL_NAMES = (*NAMES, "boundary_group", "use_modifiers", "leave_out_floaters", "point_budget", "most_points")
@@ -26,7 +26,7 @@ PRESETS = {
 
 def apply_preset(settings, options):
     """Give settings the values of options, and the defaults of the other method's."""
-    settings.method = "PAPER" if isinstance(options, PaperOptions) else "DEFAULT"
+    settings.laplacian = "PAPER" if isinstance(options, PaperOptions) else "DEFAULT"
     for given in (PAPER_DEFAULTS, DEFAULTS, options):
         for option in fields(given):
             value = getattr(given, option.name)
@@ -35,12 +35,12 @@ def apply_preset(settings, options):
 
 def settings_values(settings) -> dict:
     """Values of the settings that change results, as core writes them: the method, and its own."""
-    return _values(settings, ("method", *_names(settings)))
+    return _values(settings, ("laplacian", *_names(settings)))
 
 
 def laplacian_options(settings) -> LaplacianOptions | PaperOptions:
     """Options of the operator, by the method that the settings name."""
-    return (PaperOptions if settings.method == "PAPER" else LaplacianOptions)(**_values(settings, _names(settings)))
+    return (PaperOptions if settings.laplacian == "PAPER" else LaplacianOptions)(**_values(settings, _names(settings)))
 
 
 def default_options(settings) -> LaplacianOptions:
@@ -54,7 +54,7 @@ def point_budget(settings):
 
 
 def _names(settings):
-    return _PAPER if settings.method == "PAPER" else _DEFAULT
+    return _PAPER if settings.laplacian == "PAPER" else _DEFAULT
 
 
 def _values(settings, names):

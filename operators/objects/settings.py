@@ -54,7 +54,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     """Settings and results of the Mesh-Free Laplacian for one object"""
 
     # What results depend on. Names and defaults are those of core's options.
-    method: EnumProperty(
+    laplacian: EnumProperty(
         name="Method",
         description="How the Laplacian is built",
         items=(

@@ -204,7 +204,7 @@ def test_settings(core, run, tmp_path):
     options = core.LaplacianOptions(neighbors=60, bandwidth="global")
     spectrum = core.build_laplacian(POINTS, options=options).eigenpairs(3)
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
-    code, lines = run("analyze", tmp_path / "in.xyz", "--modes", 3, "--method", "paper", "--neighbors", 60)
+    code, lines = run("analyze", tmp_path / "in.xyz", "--modes", 3, "--laplacian", "paper", "--neighbors", 60)
     assert code == 0
     spectrum = core.paper.build_laplacian(POINTS, neighbors=60).eigenpairs(3)
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)

@@ -273,7 +273,7 @@ def test_panel_tells_of_parts_boundaries_and_points_left_out_where_there_are_any
 def test_panel_shows_every_setting_that_changes_results(extension, method):
     options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
     settings = add_object(sphere_points()).meshfree
-    settings.method, settings.boundary_group = method, "Missing"
+    settings.laplacian, settings.boundary_group = method, "Missing"
     texts, own = draw(), options.settings_values(settings)
     drawn = (*own, "point_budget", "most_points")
     assert [name for name in drawn if texts.count(name) != 1] == []
@@ -385,9 +385,9 @@ def test_panel_while_something_runs(extension, monkeypatch):
 def test_every_option_of_core_is_a_setting_with_its_default(extension, core, method, kind):
     options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
     settings, kind = add_object(sphere_points()).meshfree, getattr(core, kind)
-    settings.method = method
+    settings.laplacian = method
     assert options.laplacian_options(settings) == kind()
-    for name in set(options.settings_values(settings)) - {"method"}:
+    for name in set(options.settings_values(settings)) - {"laplacian"}:
         prop = settings.bl_rna.properties[name]
         for choice in prop.enum_items if prop.type == "ENUM" else ():
             kind(**{name: choice.identifier.lower()})
