@@ -12,7 +12,7 @@ BOUNDARY, COMPONENT, TRUST = "lb_boundary", "lb_component", "lb_trust"
 SEGMENT = "lb_segment"
 SHAPE_INDEX, CURVEDNESS = "lb_shape_index", "lb_curvedness"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"
-ROUGHNESS = "lb_roughness"
+ROUGHNESS, SURFACE_VARIATION = "lb_roughness", "lb_surface_variation"
 FIELD = "lb_field"
 DISTANCE, SIGNED_DISTANCE, DEVIATION = "lb_distance", "lb_signed_distance", "lb_deviation"
 CELL, DIRECTION, UV = "lb_cell", "lb_direction", "lb_uv"
@@ -179,6 +179,13 @@ QUANTITIES = (  # in the order of the panel
         along_surface=True,
     ),
     Quantity(ROUGHNESS, "Roughness", "Signed height of each point above the smoothed surface", "roughness", power=1),
+    Quantity(
+        SURFACE_VARIATION,
+        "Surface Variation",
+        "Smallest eigenvalue of the covariance of the neighborhood over the sum of all three",
+        "surface_variation",
+        bounds=(0.0, 1.0 / 3.0),
+    ),
     Quantity(FIELD, "Field", "The smoothest field between given values", "harmonic_field"),
     Quantity(
         DISTANCE,
