@@ -6,7 +6,8 @@ import pytest
 from mathutils import Matrix
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import RESULTS, add_object, attribute, local_points, result_names, sphere_points
+from tests.blender.clouds import add_object, attribute, local_points, result_names, sphere_points
+from tests.results import RESULTS
 
 
 def expected(core, obj):
