@@ -6,7 +6,6 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..core import PointCloudError
-from ..operators.objects.modifiers import add_node
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator
 from .canvas import PLATE_CORNERS
@@ -247,13 +246,8 @@ def _material(name, attribute):
         return material
     material = bpy.data.materials.new(name)
     tree = new_tree(material)
-    emission = add_node(tree, "ShaderNodeEmission", 1, 0)
-    emission.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    output = add_node(tree, "ShaderNodeOutputMaterial", 2, 0)
-    tree.links.new(emission.outputs[0], output.inputs["Surface"])
-    if attribute:
-        source = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=attribute)
-        tree.links.new(source.outputs["Color"], emission.inputs["Color"])
+    source = tree.node("ShaderNodeAttribute", attribute_name=attribute) if attribute else (1.0, 1.0, 1.0, 1.0)
+    tree.output("ShaderNodeOutputMaterial", tree.node("ShaderNodeEmission", source))
     return material
 
 

@@ -7,7 +7,8 @@ import bpy
 
 from ...core import PointCloudError
 from .attributes import own_positions, point_count
-from .modifiers import add_node, is_own
+from .modifiers import is_own
+from .node_trees import TreeBuilder
 
 POINTCLOUDS_SINCE = (4, 5)  # version of Blender in which meshes become point clouds
 _KINDS = ("MESH", "POINTCLOUD")
@@ -134,21 +135,12 @@ def _to_kind(kind, with_instances):
     group = bpy.data.node_groups.new("Points", "GeometryNodeTree")
     for direction in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    given = add_node(group, "NodeGroupInput", 0, 0).outputs[0]
+    tree = TreeBuilder(group)
+    given = tree.node("NodeGroupInput")
     if with_instances:
-        given = _through(group, "GeometryNodeRealizeInstances", 1, given)
-    parts = add_node(group, "GeometryNodeSeparateComponents", 2, 0)
-    group.links.new(given, parts.inputs[0])
-    turned = _through(group, node, 3, parts.outputs[other])
-    both = add_node(group, "GeometryNodeJoinGeometry", 4, 0)
-    for part in (turned, parts.outputs[own]):  # what is linked last comes first
-        group.links.new(part, both.inputs[0])
-    group.links.new(both.outputs[0], add_node(group, "NodeGroupOutput", 5, 0).inputs[0])
+        given = tree.node("GeometryNodeRealizeInstances", given)
+    parts = tree.node("GeometryNodeSeparateComponents", given).outputs
+    turned = tree.node(node, parts[other])
+    # What is linked last comes first.
+    tree.output("NodeGroupOutput", tree.node("GeometryNodeJoinGeometry", [turned, parts[own]]))
     return group
-
-
-def _through(group, kind, column, socket):
-    """Add a node that takes what a socket gives; return what it gives."""
-    node = add_node(group, kind, column, 0)
-    group.links.new(socket, node.inputs[0])
-    return node.outputs[0]
