@@ -100,7 +100,7 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
     bl_label = "Legend in Renders"
     works_in = ("OBJECT", "EDIT")
 
-    show: BoolProperty(name="Show", description="Put the legend there; otherwise take it away", default=True)
+    show: BoolProperty(name="Show", description="Add the legend; otherwise remove it", default=True)
     title: StringProperty(
         name="Title",
         description="Text above the colors, whatever is shown; empty for the name of the attribute",
@@ -113,13 +113,13 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
             if not self.show:
                 legend = find_legend(scene, obj)
                 if legend is None:
-                    raise PointCloudError(f'There is no legend of "{obj.name}" in this scene to take away.')
+                    raise PointCloudError(f'There is no legend of "{obj.name}" in this scene to remove.')
                 remove_legend(scene, legend)
                 return {"FINISHED"}
             if scene.camera is None:
                 raise PointCloudError("The scene has no camera to put a legend in front of. Add one with Add > Camera.")
             if shown_scale(obj, scene) is None:
-                what = "its own colors, which stand for no values" if shown_attribute(obj) else "no colors yet"
+                what = "its own colors, which are not values" if shown_attribute(obj) else "no colors yet"
                 raise PointCloudError(f'"{obj.name}" shows {what}. Choose what to see under Display first.')
         except PointCloudError as error:
             self.report({"ERROR"}, str(error))

@@ -86,7 +86,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         if reason and handled != obj:
             column = layout.column(align=True)
             draw_text(column, context, f'Handle of "{handled.name}"', "OUTLINER_OB_EMPTY")
-            draw_text(column, context, "G moves it, R turns it", "BLANK1")
+            draw_text(column, context, "G moves it, R rotates it", "BLANK1")
             return  # the panel of the deformation tells more
         if reason:
             column = layout.column(align=True)

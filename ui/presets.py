@@ -8,10 +8,10 @@ from ..operators.objects.options import NAMES, PRESETS, apply_preset
 from ..operators.running.ready import ReadyOperator
 
 _BUILT_IN = (
-    ("DEFAULT", "Default", "What serves most scans"),
+    ("DEFAULT", "Default", "Suited to most scans"),
     ("PAPER", "Paper", "The method of the paper, with its own settings"),
-    ("CLEAN", "Clean CAD", "For exact points with sharp edges: each point is taken where it is"),
-    ("NOISY", "Noisy Scan", "For rough scans: a wider reach gives calmer curvature and less detail"),
+    ("CLEAN", "Clean CAD", "For exact points with sharp edges: points are not moved"),
+    ("NOISY", "Noisy Scan", "For noisy scans: a wider kernel gives smoother curvature and less detail"),
 )
 
 
@@ -29,7 +29,7 @@ class MESHFREE_OT_apply_preset(ReadyOperator, bpy.types.Operator):
 
 
 class MESHFREE_OT_add_preset(ReadyOperator, AddPresetBase, bpy.types.Operator):
-    """Keep the settings that change results as a preset of your own, or remove that preset"""
+    """Save the settings as a user preset, or remove it"""
 
     bl_idname = "meshfree.add_preset"
     bl_label = "Add Settings Preset"

@@ -85,8 +85,8 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Axis of the file that points upwards",
         items=[
             ("Z", "Z", "Coordinates as they are in the file, as in Blender and in surveys"),
-            ("Y", "Y", "Turn the points upright that other programs store with Y upwards, as in .spz"),
-            ("-Y", "-Y", "Turn the points upright that are stored with Y downwards, as many Gaussian splats are"),
+            ("Y", "Y", "Rotate points stored with Y upwards, as in other programs and .spz"),
+            ("-Y", "-Y", "Rotate points stored with Y downwards, as many Gaussian splats are"),
         ],
         default="Z",
     )
@@ -104,7 +104,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     )
     surface: BoolProperty(
         name="Show as Surface",
-        description=f"Draw points as discs in the surface that they lie on, up to {_QUICK:,} of them; not a sequence",
+        description=f"Draw points as discs tangent to the surface, up to {_QUICK:,} of them; not a sequence",
         default=True,
     )
     sequence: BoolProperty(
@@ -127,7 +127,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     )
     withheld: BoolProperty(
         name="Withheld Points",
-        description="Import points of LAS files, too, that are flagged as withheld, which stands for deleted",
+        description="Import points of LAS files, too, that are flagged as withheld, which means deleted",
         default=False,
     )
     frame: BoolProperty(

@@ -8,20 +8,19 @@ _COLOR_MAPS = (
     (
         "AUTO",
         "Automatic",
-        "Cool to Warm for values on both sides of zero, a color each for few whole numbers and for true or"
-        " false, Viridis otherwise",
+        "Cool to Warm for signed values, a color each for few whole numbers and for true or false, Viridis otherwise",
     ),
     ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
     ("MAGMA", "Magma", "From black over red to light yellow, in even steps to the eye"),
     ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
-    ("CYCLIC", "Cyclic", "All around the hues back to the first one, for angles and phases"),
+    ("CYCLIC", "Cyclic", "Through all hues back to the first one, for angles and phases"),
     ("CATEGORICAL", "Categorical", "A color for each whole number; seven, which then repeat"),
 )
 _RANGE_MODES = (
     (
         "AUTO",
         "Automatic",
-        "Symmetric for Cool to Warm and values on both sides of zero, Data for Cyclic, Percentile otherwise",
+        "Symmetric for Cool to Warm and signed values, Data for Cyclic, Percentile otherwise",
     ),
     ("DATA", "Data", "From the least to the greatest value"),
     ("PERCENTILE", "Percentile", "The share of the values that Coverage says, without the outermost ones"),
@@ -36,9 +35,7 @@ _CHOICES = {
         items=_COLOR_MAPS,
         default="AUTO",
     ),
-    "reverse": partial(
-        BoolProperty, name="Reverse", description="Turn the colors round, from high to low values", default=False
-    ),
+    "reverse": partial(BoolProperty, name="Reverse", description="Reverse the color map", default=False),
     "range_mode": partial(
         EnumProperty,
         name="Range",

@@ -83,8 +83,8 @@ def _no_place(obj, shown, own):
     by_nodes = obj.type == "MESH" and (shown.points or shown.instances)
     ways = _ways(shown) if by_nodes else ["Apply these modifiers"]
     return (
-        f'The modifiers of "{obj.name}" turn its {point_count(obj.data)} points into {shown if by_nodes else own}, so'
-        f" results have no place. {', or '.join(ways)}, or turn off Use Modifiers."
+        f'The modifiers of "{obj.name}" change its {point_count(obj.data)} points to {shown if by_nodes else own}, so'
+        f" results cannot be written. {', or '.join(ways)}, or turn off Use Modifiers."
     )
 
 

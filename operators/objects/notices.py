@@ -7,16 +7,16 @@ from ..registration import Registration, Row
 
 
 class MESHFREE_PG_notice(bpy.types.PropertyGroup):
-    """What a tool had to tell of an object"""
+    """A notice of a tool about an object"""
 
-    tool: StringProperty(name="Tool", description="Label of the tool that told it")
-    text: StringProperty(name="Text", description="What it told")
+    tool: StringProperty(name="Tool", description="Label of the tool")
+    text: StringProperty(name="Text", description="Text of the notice")
     level: EnumProperty(
         name="Level",
-        description="How much it matters",
+        description="Importance of the notice",
         items=(
             ("WARNING", "Warning", "Something was guessed, left out or replaced"),
-            ("INFO", "Info", "Figures that one looks at again"),
+            ("INFO", "Info", "Figures to be read again"),
         ),
         default="WARNING",
     )
@@ -49,7 +49,7 @@ def _remove(notices, unwanted):
 
 
 class MESHFREE_OT_dismiss(bpy.types.Operator):
-    """Take away a notice that was read"""
+    """Remove a notice"""
 
     bl_idname = "meshfree.dismiss"
     bl_label = "Dismiss Notice"

@@ -20,7 +20,7 @@ def target_property():
     """Return the property of an operator that says where moved points go."""
     return EnumProperty(
         name="Result",
-        description="Where the moved points go; point clouds have no shape keys and are moved in place",
+        description="Where the result is written; point clouds have no shape keys and are moved in place",
         items=TARGETS,
         default="SHAPE_KEY",
     )
@@ -30,14 +30,14 @@ def check_movable(obj, target: str):
     """Refuse an object whose points cannot be moved to given places, before anything is computed."""
     if obj.meshfree.use_modifiers and any(not is_own(item) for item in obj.modifiers):
         raise PointCloudError(
-            f'The points of "{obj.name}" were read after its modifiers, and cannot be written back before'
-            " them. Turn off Use Modifiers, or apply the modifiers."
+            f'The points of "{obj.name}" were read after its modifiers, and cannot be written before them.'
+            " Turn off Use Modifiers, or apply the modifiers."
         )
     keys = shape_keys(obj)
     if keys is not None and target == "IN_PLACE":
         raise PointCloudError(
-            f'"{obj.name}" has shape keys, so that moving its points in place would not be seen. Choose Shape'
-            " Key as the result, or apply the shape keys."
+            f'"{obj.name}" has shape keys, so moving its points in place would have no visible effect. Choose'
+            " Shape Key as the result, or apply the shape keys."
         )
     if keys is not None and not keys.use_relative:
         raise PointCloudError(

@@ -147,7 +147,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         CURVEDNESS,
         "Curvedness",
-        "Root mean square of both curvatures",
+        "Root mean square of both principal curvatures",
         "principal_curvatures",
         "curvedness",
         power=-1,

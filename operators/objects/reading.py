@@ -141,7 +141,7 @@ def read_points(context, obj) -> Reading:
     notices = []
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
-        notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
+        notices.append(f"The mesh has {faces} faces: only its {point_count(obj.data)} vertices are used.")
     if are_left_behind(obj.data):
         notices.append(f"{obj.name}: {LEFT_BEHIND}.")
     judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)

@@ -24,7 +24,7 @@ from .quantities import DISPLACEMENT
 SCALE, ROTATION, BASE, HARMONIC = "scale", "rotation", "radiance:base", "radiance:sh_"
 PLACE = ".splat_place"  # attribute: where a splat was when its ellipsoid was written, but for a common step
 LEFT_BEHIND = (
-    "some of its splats were turned or scaled without their ellipsoids, as Blender's own Join and Apply do. Undo that,"
+    "some of its splats were rotated or scaled without their ellipsoids, as Blender's own Join and Apply do. Undo that,"
     " and use Join Splats or Apply Transform to Splats instead"
 )
 _MOST_STEPS = 32  # that splats take with their ellipsoids: those of parts that were moved, not turned or scaled

@@ -71,7 +71,7 @@ class ApplicationOperator(Tool, JobOperator):
 
     at_once: BoolProperty(
         name="At Once",
-        description="Do it with these settings, without asking",
+        description="Use these settings, without asking",
         default=False,
         options={"HIDDEN", "SKIP_SAVE"},
     )
@@ -132,8 +132,8 @@ class ShownOperator(ApplicationOperator):
                 _write_discs(context, obj)
             for obj in filter(shows_own_material, [*objects, *sharing]):
                 self.warn(
-                    f'{obj.name}: colors take the place of the material "{own_material(obj).name}". Own Material under'
-                    " Display brings it back.",
+                    f'{obj.name}: the display replaces the material "{own_material(obj).name}". Own Material under'
+                    " Display shows it again.",
                     obj,
                 )
             for obj in [*objects, *sharing]:

@@ -95,8 +95,8 @@ def floating_notices(out):
     if not len(out):
         return []
     return [
-        f"Floaters left out of the operator, splats that are hardly seen, huge or alone: {len(out):,}. Select Floaters"
-        " selects them. They move with the splats next to them."
+        f"Floaters left out of the operator (nearly transparent, huge or isolated splats): {len(out):,}. Select"
+        " Floaters selects them. They move with the nearest splats."
     ]
 
 

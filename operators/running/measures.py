@@ -46,7 +46,7 @@ class Measured(NamedTuple):
             return self.built.laplacian.notices
         told = (
             f"Analyzed {len(self.subset):,} of {len(self.prolongation.nearest):,} points, evenly spread over the"
-            " surface, and carried the results to all. The setting Point Budget decides how many."
+            " surface, and transferred the results to all. The setting Point Budget decides how many."
         )
         return [told, *cache.floating_notices(self.left_out), *self.built.laplacian.notices]
 

@@ -30,8 +30,8 @@ class NearestSource(Tool):
 
     group: StringProperty(
         name="Sources",
-        description="Vertex group with the points in the middle of cells; where there is none of that name, the points"
-        " selected in Edit Mode",
+        description="Vertex group with the points that are centers of cells; where there is none of that name, the"
+        " points selected in Edit Mode",
         default=SOURCE,
     )
 
@@ -59,7 +59,7 @@ class NearestSource(Tool):
 
 
 class MESHFREE_OT_nearest_source(NearestSource, ShownOperator, bpy.types.Operator):
-    """Divide the surface into cells: the points that are nearest, along the surface, to the same source"""
+    """Divide the surface into geodesic Voronoi cells of the sources"""
 
     bl_idname = "meshfree.nearest_source"
     bl_label = "Nearest Source"
@@ -74,20 +74,20 @@ class Unwrap(Tool):
     at_zero = {"radius": "All Points"}
 
     group: StringProperty(
-        name="Middle",
-        description="Vertex group around the middle of the texture, where the point nearest to the mean of its points"
-        " is; where there is none of that name, the points selected in Edit Mode",
+        name="Center",
+        description="Vertex group around the center of the texture, which is the point nearest to the mean of its"
+        " points; where there is none of that name, the points selected in Edit Mode",
         default=SOURCE,
     )
     radius: FloatProperty(
         name="Radius",
-        description="Distance along the surface from the middle of the texture to its border; 0 for all points",
+        description="Distance along the surface from the center of the texture to its border; 0 for all points",
         default=0.0,
         min=0.0,
         subtype="DISTANCE",
     )
     angle: FloatProperty(
-        name="Angle", description="Turn of the texture around its middle", default=0.0, subtype="ANGLE"
+        name="Angle", description="Rotation of the texture about its center", default=0.0, subtype="ANGLE"
     )
 
     def plan(self, context, obj):
@@ -101,8 +101,8 @@ class Unwrap(Tool):
             laplacian = operator(progress)
             if laplacian.component[middle] < 0:
                 raise PointCloudError(
-                    f'The middle is a point of "{obj.name}" that the operator left out, because it lies apart from the'
-                    " surface. Choose a point of the surface."
+                    f'The center is a point of "{obj.name}" that the operator left out, because it is an outlier.'
+                    " Choose a point of the surface."
                 )
             place = cache.result(
                 laplacian,
@@ -124,11 +124,11 @@ class Unwrap(Tool):
         texture, border = result
         write_attribute(obj.data, UV, texture)
         tag_changed(obj.data)
-        return [f"{obj.name}: texture coordinates up to {length_text(border)} from the middle"]
+        return [f"{obj.name}: texture coordinates up to {length_text(border)} from the center"]
 
 
 class MESHFREE_OT_unwrap(Unwrap, ShownOperator, bpy.types.Operator):
-    """Lay the surface around a point out flat as texture coordinates: a decal that follows the surface"""
+    """Map the surface around a point to texture coordinates, like a decal"""
 
     bl_idname = "meshfree.unwrap"
     bl_label = "Unwrap Around Point"
@@ -148,8 +148,7 @@ class ExtendDirection(Tool):
     )
     direction: FloatVectorProperty(
         name="Direction",
-        description="Direction at these points, along the axes of the world; what leads out of the surface does not"
-        " count",
+        description="Direction at these points, along the axes of the world; projected onto the surface",
         default=(0.0, 0.0, -1.0),
         min=-1e6,
         max=1e6,
@@ -186,7 +185,7 @@ class ExtendDirection(Tool):
 
 
 class MESHFREE_OT_extend_direction(ExtendDirection, ShownOperator, bpy.types.Operator):
-    """Carry a direction at some points along the surface to all others, for hair, scratches or brush strokes"""
+    """Extend directions at some points to the whole surface by parallel transport"""
 
     bl_idname = "meshfree.extend_direction"
     bl_label = "Extend Direction"
@@ -200,7 +199,7 @@ class SignedDistance(Tool):
 
     curve: StringProperty(
         name="Curve",
-        description="Curve object on the surface; each of its points stands for the nearest one of the cloud",
+        description="Curve object on the surface; each of its points is replaced by the nearest one of the cloud",
     )
 
     def plan(self, context, obj):
@@ -243,7 +242,7 @@ class SignedDistance(Tool):
 
 
 class MESHFREE_OT_signed_distance(SignedDistance, ShownOperator, bpy.types.Operator):
-    """Measure the distance along the surface from a curve on it: above zero on its left, below zero on its right"""
+    """Geodesic distance from a curve, positive on its left"""
 
     bl_idname = "meshfree.signed_distance"
     bl_label = "Signed Distance"

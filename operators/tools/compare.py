@@ -129,14 +129,14 @@ class CompareOperator(Compare, ShownOperator):
 
 
 class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):
-    """Measure how far the points of the active object are from the surface of the other selected one"""
+    """Measure the signed distance of the active object's points from the surface of the other selected one"""
 
     bl_idname = "meshfree.compare"
     bl_label = "Compare Points"
 
 
 class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
-    """Compare the other way round: show how far the points of the reference are from the active object's surface"""
+    """Exchange the compared objects"""
 
     bl_idname = "meshfree.compare_swap"
     bl_label = "Swap Comparison"

@@ -24,7 +24,7 @@ _SEGMENT = re.compile(r"Segment \d+")
 
 
 class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
-    """Turn a mesh into a point cloud or back, and keep groups, results and colors; modifiers are applied"""
+    """Convert a mesh to a point cloud or back, and keep groups, results and colors; modifiers are applied"""
 
     bl_idname = "meshfree.convert"
     bl_label = "Convert Points"

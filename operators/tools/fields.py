@@ -150,7 +150,7 @@ class HarmonicField(Tool):
 
 
 class MESHFREE_OT_harmonic_field(HarmonicField, ShownOperator, bpy.types.Operator):
-    """Fill in a smooth field between points with given values, or solve Poisson's equation"""
+    """Interpolate a harmonic field between given values, or solve Poisson's equation"""
 
     bl_idname = "meshfree.harmonic_field"
     bl_label = "Harmonic Field"
@@ -164,8 +164,7 @@ class GeodesicDistance(Tool):
 
     group: StringProperty(
         name="Sources",
-        description="Vertex group with the points to measure from; where there is none of that name, the points"
-        " selected in Edit Mode",
+        description="Vertex group of the sources; where there is none of that name, the points selected in Edit Mode",
         default=SOURCE,
     )
 
@@ -199,7 +198,7 @@ class GeodesicDistance(Tool):
 
 
 class MESHFREE_OT_geodesic_distance(GeodesicDistance, ShownOperator, bpy.types.Operator):
-    """Measure the distance along the surface from a group of points, or from the selected ones"""
+    """Geodesic distance from a group of points, or from the selected ones"""
 
     bl_idname = "meshfree.geodesic_distance"
     bl_label = "Geodesic Distance"

@@ -89,7 +89,7 @@ class MeshSurface(Tool):
 
 
 class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Operator):
-    """Make a mesh of the surface that the points lie on, with their results, colors and groups on its vertices"""
+    """Reconstruct a mesh from the points, with their results, colors and groups on its vertices"""
 
     bl_idname = "meshfree.mesh_surface"
     bl_label = "Surface from Points"

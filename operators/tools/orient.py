@@ -28,15 +28,16 @@ class OrientNormals(Tool):
         name="Method",
         description="How the side is found",
         items=[
-            ("WINDING", "Winding Number", "As closed as the surface can be, through gaps and in noise"),
+            ("WINDING", "Winding Number", "By the generalized winding number, through gaps and in noise"),
             (
                 "OUTSIDE",
                 "Outside",
-                "Neighbors agree, each component points away from its middle, terrain up: as analyzed at first",
+                "Consistent with neighbors, away from the center of each component, terrain up: the default of Analyze"
+                " Points",
             ),
-            ("VIEWPOINT", "Viewpoint", "To where an object is, such as the camera"),
-            ("ATTRIBUTE", "Attribute", "By a vector of each point, such as the place of the scanner"),
-            ("KEEP", "As They Are", "The side that they have, to flip it"),
+            ("VIEWPOINT", "Viewpoint", "Towards an object, such as the camera"),
+            ("ATTRIBUTE", "Attribute", "By a vector of each point, such as the scanner position"),
+            ("KEEP", "As They Are", "Keep the present side, to flip it"),
         ],
         default="WINDING",
     )
@@ -46,14 +47,14 @@ class OrientNormals(Tool):
     source: StringProperty(name="Attribute", description="Vector attribute, for Attribute")
     holds: EnumProperty(
         name="Attribute Holds",
-        description="What the vectors of the attribute are",
+        description="Meaning of the vectors of the attribute",
         items=[
-            ("POSITIONS", "Positions", "Places in the object's own coordinates that the points were seen from"),
+            ("POSITIONS", "Positions", "Positions in local coordinates from which the points were seen"),
             ("DIRECTIONS", "Directions", "Directions to the outer side, such as normals from a file"),
         ],
         default="POSITIONS",
     )
-    flip: BoolProperty(name="Flip", description="Take the other side of all of them", default=False)
+    flip: BoolProperty(name="Flip", description="Reverse all normals afterwards", default=False)
 
     def plan(self, context, obj):
         reading = read_points(context, obj)
@@ -92,7 +93,7 @@ class OrientNormals(Tool):
 
 
 class MESHFREE_OT_orient_normals(OrientNormals, ShownOperator, bpy.types.Operator):
-    """Choose the side that normals point to, for this object's results and all that is computed of it later"""
+    """Choose the sign of the normals, for this object's results and all that is computed from it later"""
 
     bl_idname = "meshfree.orient_normals"
     bl_label = "Orient Normals"

@@ -67,7 +67,7 @@ def continue_modes(analysis, points, earlier):
 
 
 class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
-    """Analyze all frames of a sequence, with modes that keep their order and signs, and show them in one range"""
+    """Analyze all frames of a sequence, with modes that keep their order and signs, and show them in one color range"""
 
     bl_idname = "meshfree.analyze_sequence"
     bl_label = "Analyze Sequence"

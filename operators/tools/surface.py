@@ -12,7 +12,7 @@ from ..running.application import ApplicationOperator
 
 
 class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
-    """Draw each point as a disc in the surface, as large as the gaps around it, lit as a surface is"""
+    """Draw each point as a disc tangent to the surface, sized by its Voronoi cell"""
 
     bl_idname = "meshfree.show_surface"
     bl_label = "Show as Surface"

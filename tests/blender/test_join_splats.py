@@ -102,7 +102,7 @@ class TestJoin:
         empty.select_set(True)
         assert bpy.ops.meshfree.join_splats() == {"FINISHED"}
         assert set(bpy.data.objects) == {one, empty}
-        assert "1 selected objects hold no splats" in capfd.readouterr().out
+        assert "1 selected objects have no splats" in capfd.readouterr().out
 
     def test_what_cannot_be_joined_is_refused(self, core):
         one, other, *_ = pair(core)

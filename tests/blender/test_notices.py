@@ -13,7 +13,7 @@ from tests.blender.clouds import add_object, grid_points, sphere_points
 from tests.blender.test_panel import Layout, draw
 
 ROOT = Path(__file__).parents[2]
-FACES = "The mesh has 1 faces: it is taken as its 1000 vertices."
+FACES = "The mesh has 1 faces: only its 1000 vertices are used."
 
 
 def kept(obj):

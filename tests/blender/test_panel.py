@@ -165,7 +165,7 @@ def test_panel_of_a_handle_says_what_to_do():
     obj = add_object(sphere_points())
     bpy.ops.meshfree.deform_bind(at_once=True)
     assert bpy.context.object != obj
-    assert draw()[:2] == ['Handle of "Cloud"', "G moves it, R turns it"]
+    assert draw()[:2] == ['Handle of "Cloud"', "G moves it, R rotates it"]
 
 
 def test_panel_of_a_new_object():
