@@ -130,7 +130,7 @@ def remember_places(data):
 
 
 def are_left_behind(data, glance=False) -> bool:
-    """Whether splats were turned or scaled without their ellipsoids, as Blender's own Join and Apply do.
+    """Whether splats were rotated or scaled without their ellipsoids, as Blender's own Join and Apply do.
 
     Where splats are only moved, they take one step, or few different ones. A glance, quick enough for a panel, looks at
     some of them.

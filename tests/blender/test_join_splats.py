@@ -15,7 +15,7 @@ from tests.blender.test_splats import close, turned
 
 PLACED = Matrix.Translation((5, 0, 1)) @ Euler((0.4, 0.9, -0.3)).to_matrix().to_4x4() @ Matrix.Scale(2.0, 4)
 FIRST = Matrix.Translation((-1, 2, 0)) @ Euler((0.0, 0.3, 0.5)).to_matrix().to_4x4()
-MESSAGE = "turned or scaled without their ellipsoids"
+MESSAGE = "rotated or scaled without their ellipsoids"
 
 
 def seen(splats, matrix):
