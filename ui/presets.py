@@ -41,7 +41,8 @@ class MESHFREE_OT_apply_preset(ReadyOperator, bpy.types.Operator):
         apply_preset(settings, PRESETS["DEFAULT"])
         unknown = [name for name, value in saved.items() if not _set(settings, name, value)]
         if unknown:
-            self.report({"WARNING"}, f"{path.stem} has settings or values that no longer exist: {', '.join(unknown)}")
+            missing = ", ".join(unknown)
+            self.warn(f"{path.stem} has settings or values that no longer exist: {missing}", context.object)
         bpy.types.MESHFREE_MT_presets.bl_label = bpy.path.display_name(path.name, title_case=False)  # for Remove Active
         return {"FINISHED"}
 

@@ -24,7 +24,7 @@ from ..objects.attributes import (
 from ..objects.carried import moved_names
 from ..objects.counting import members, weighted_checksum
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.options import laplacian_options, settings_values
 from ..objects.quantities import DISPLACEMENT
 from ..objects.reading import TYPES, boundary_points, fingerprint, sharing_objects
@@ -356,4 +356,4 @@ def forget(obj):
     modifier = find_deform(obj)
     if modifier is not None:
         obj.modifiers.remove(modifier)
-        tell("shape_changed", obj)
+        notify("shape_changed", obj)

@@ -1,4 +1,4 @@
-"""Deform objects by handles: bind once, then move the handles; take the result over, or take it back."""
+"""Deform objects by handles: bind once, then move the handles; apply the result, or reset it."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from ..objects.attributes import (
 )
 from ..objects.carried import carried, shown_moved
 from ..objects.groups import ANCHOR, HANDLE, assign, check_assignable, group_weights, handle_names, has_group
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.modifiers import get_input
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
@@ -148,7 +148,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
             empties.append(moved_by)
         record(obj, rest, binding.matrix, constraints, empties)
         add_deform(obj)
-        tell("shape_changed", obj)
+        notify("shape_changed", obj)
         # Blender crashes when it draws what a render's handlers change, and handles are there to be animated.
         context.scene.render.use_lock_interface = True
         live.keep(obj, follower)
@@ -157,8 +157,8 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         live.update(obj, wanted=State.SETTLED if bpy.app.background else State.PREPARING)
         moved, stay = len(constraints.moved), len(constraints.kept)
         press = "Press G or R to move" if self.at_once else "Move"
-        way = f'{press} "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
-        return [*follower.quick.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
+        advice = f'{press} "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
+        return [*follower.quick.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {advice}"]
 
     def conclude(self, context, objects):
         item = objects[0].meshfree.deform.handle_items[0]

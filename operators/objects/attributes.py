@@ -183,11 +183,11 @@ def check_size(name: str, values):
     largest = np.max(sizes, initial=0.0)
     if largest > kept.max:
         row = quantity(name)
-        way = f"Scale the object {'up' if row.power < 0 else 'down'}"
+        advice = f"Scale the object {'up' if row.power < 0 else 'down'}"
         if row.attribute and row.power == 0:
-            way = "Use smaller values"
+            advice = "Use smaller values"
         raise PointCloudError(
-            f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. {way}."
+            f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. {advice}."
         )
     if name == AREA and 0.0 < largest < kept.tiny:
         raise PointCloudError(

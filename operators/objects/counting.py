@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 
 from .attributes import point_count
 from .groups import group_weights, has_group
-from .handlers import add_handlers, remove_handlers, tell
+from .handlers import add_handlers, notify, remove_handlers
 
 _AT_ONCE = 5_000  # points of which all groups are read when a panel is drawn
 _PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
@@ -124,7 +124,7 @@ def renew_counts(obj):
     _passes.pop(obj.session_uid, None)
     if obj.session_uid in _known:
         _known[obj.session_uid].until.clear()
-    tell("panels_changed")
+    notify("panels_changed")
 
 
 def _recall(obj):
@@ -147,7 +147,7 @@ def _tick():
             _wanted.pop(uid), _passes.pop(uid, None)
     for uid, obj in objects.items():
         if uid in _wanted and _go_on(obj):
-            tell("panels_changed")
+            notify("panels_changed")
     return _PAUSE if _wanted else None
 
 

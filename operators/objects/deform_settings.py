@@ -12,15 +12,15 @@ from bpy.props import (
 )
 
 from .groups import ANCHOR, HANDLE
-from .handlers import tell
+from .handlers import notify
 
 
 def _follow(settings, context):
-    tell("deform_changed", settings.id_data)
+    notify("deform_changed", settings.id_data)
 
 
 def _find_bound(settings, context):
-    tell("bound_changed")
+    notify("bound_changed")
 
 
 class MESHFREE_PG_handle(bpy.types.PropertyGroup):

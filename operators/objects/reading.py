@@ -16,7 +16,7 @@ from .modifiers import is_own, is_sequence, modifier_settings
 from .splats import LEFT_BEHIND, are_left_behind, has_splats, read_splats
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
-_CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
+_CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # which Blender converts to meshes
 
 
 def shape_keys(obj):
@@ -36,8 +36,8 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
     if obj.type not in TYPES:
         kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
         article = "an" if kind[0] in "AE" else "a"
-        way = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
-        return f'"{obj.name}" is {article} {kind}, not a Mesh. {way} a mesh'
+        advice = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
+        return f'"{obj.name}" is {article} {kind}, not a Mesh. {advice} a mesh'
     if not obj.is_editable or not obj.data.is_editable:
         return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
     if obj.data.override_library is not None:
@@ -99,23 +99,23 @@ class Reading:
     splats: "core.Splats | None" = None
 
     def local(self, vectors):
-        """Turn points or shifts as they were read into local ones."""
+        """Transform points or displacements, as read, to local space."""
         return vectors @ np.linalg.inv(self.matrix).T
 
     def placed(self, vectors):
-        """Turn local points or shifts into such as were read."""
+        """Transform local points or displacements to those as read."""
         return vectors @ self.matrix.T
 
     def local_directions(self, directions):
-        """Turn directions along the surface, as they were read, into local unit vectors."""
+        """Transform tangent directions, as read, to local unit vectors."""
         return _units(self.local(directions))
 
     def local_normals(self, normals):
-        """Turn normals of the points into unit normals of the local positions: covectors, so by M^T, not M^-1."""
+        """Transform normals, as read, to local unit normals: covectors, so by M^T, not M^-1."""
         return _units(normals @ self.matrix)
 
     def placed_normals(self, normals):
-        """Turn normals of the local positions into such of the points as they were read, of any length."""
+        """Transform local normals to those of the points as read, of any length."""
         return normals @ np.linalg.inv(self.matrix)
 
 

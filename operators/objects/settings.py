@@ -14,34 +14,34 @@ from bpy.props import (
 
 from . import deform_settings, notices
 from .color_choices import color_choice
-from .handlers import tell
+from .handlers import notify
 from .options import DEFAULTS, PAPER_DEFAULTS
 
 
 def _recolor(settings, context):
-    tell("colors_changed", settings.id_data)
+    notify("colors_changed", settings.id_data)
 
 
 def _recolor_locked(settings, context):
     """Follow bounds that somebody sets; in other modes they only tell what the range came to."""
     if settings.range_mode == "LOCKED":
-        tell("colors_changed", settings.id_data)
+        notify("colors_changed", settings.id_data)
 
 
 def _resize(settings, context):
-    tell("size_changed", settings.id_data)
+    notify("size_changed", settings.id_data)
 
 
 def _reshape(settings, _context):
-    tell("shape_changed", settings.id_data)
+    notify("shape_changed", settings.id_data)
 
 
 def _show_groups(settings, context):
-    tell("groups_changed", settings.id_data)
+    notify("groups_changed", settings.id_data)
 
 
 def _redraw(settings, context):
-    tell("views_changed")
+    notify("views_changed")
 
 
 class MESHFREE_PG_stage(bpy.types.PropertyGroup):

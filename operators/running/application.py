@@ -8,7 +8,7 @@ from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, write_attribute
 from ..objects.colors import own_material, shows_own_material
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.options import laplacian_options
 from ..objects.reading import TYPES, discs, obstacle, read_points, sharing_objects
 from ..objects.result import check_writable
@@ -100,14 +100,14 @@ class ApplicationOperator(Tool, JobOperator):
             for reason in self._left_out:
                 self.warn(f"Left out: {reason}.", objects[0])
             for obj, (*notices, line) in zip(objects, texts, strict=True):
-                self.tell(obj, notices, line)
+                self.report_result(obj, notices, line)
         return {"FINISHED"}
 
     def conclude(self, context, objects):
         """Do what is left when all objects are written."""
 
-    def tell(self, obj, notices, line: str):
-        """Report what one should know of an object, and what was done with it."""
+    def report_result(self, obj, notices, line: str):
+        """Report notices about an object, and a summary."""
         for notice in notices:
             self.warn(notice, obj)
         if self.keeps_line:
@@ -137,7 +137,7 @@ class ShownOperator(ApplicationOperator):
                     obj,
                 )
             for obj in [*objects, *sharing]:
-                tell("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
+                notify("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
 
 
 def _write_discs(context, obj):

@@ -1,4 +1,4 @@
-"""Along the surface from some points or a curve: cells, a map, directions carried to all, distance with a side."""
+"""Along the surface from points or a curve: cells, a map, parallel transport, signed distance."""
 
 import bpy
 import numpy as np
@@ -15,7 +15,7 @@ from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
 from .select import read_sources
 
-OUTSIDE = -1.0  # place in the texture of points that the map does not reach: beyond its border
+OUTSIDE = -1.0  # texture coordinates of points that the map does not reach
 
 
 def _transport(laplacian, progress):
@@ -93,13 +93,13 @@ class Unwrap(Tool):
     def plan(self, context, obj):
         sources = np.flatnonzero(read_sources(obj, self.group))
         reading, operator = operator_reader(context, obj)
-        places = reading.points[sources]
-        middle = int(sources[np.linalg.norm(places - places.mean(axis=0), axis=1).argmin()])
-        radius, turn = self.radius, np.exp(1j * self.angle)
+        points = reading.points[sources]
+        center = int(sources[np.linalg.norm(points - points.mean(axis=0), axis=1).argmin()])
+        radius, rotation = self.radius, np.exp(1j * self.angle)
 
         def compute(progress):
             laplacian = operator(progress)
-            if laplacian.component[middle] < 0:
+            if laplacian.component[center] < 0:
                 raise PointCloudError(
                     f'The center is a point of "{obj.name}" that the operator left out, because it is an outlier.'
                     " Choose a point of the surface."
@@ -107,15 +107,15 @@ class Unwrap(Tool):
             place = cache.result(
                 laplacian,
                 "map",
-                middle,
+                center,
                 compute=lambda: _transport(laplacian, progress).logarithmic_map(
-                    middle, geodesics=cache.geodesics(laplacian, progress), progress=progress
+                    center, geodesics=cache.geodesics(laplacian, progress), progress=progress
                 ),
             )
             reached = np.isfinite(place[:, 0])
             place = place @ [1.0, 1.0j]
             border = radius or np.abs(place[reached]).max()
-            texture = 0.5 + 0.5j + 0.5 * turn * place / border
+            texture = 0.5 + 0.5j + 0.5 * rotation * place / border
             return np.where(reached[:, None], np.column_stack([texture.real, texture.imag]), OUTSIDE), border
 
         return compute
@@ -203,7 +203,7 @@ class SignedDistance(Tool):
     )
 
     def plan(self, context, obj):
-        places, closed = self.way(context, obj)
+        places, closed = self.read_curve(context, obj)
         reading, operator = operator_reader(context, obj)
 
         def compute(progress):
@@ -211,25 +211,25 @@ class SignedDistance(Tool):
             known = np.flatnonzero(laplacian.component >= 0)
             nearest = known[core.geometry.nearest_rows(reading.points[known], places)]
             _, first = np.unique(nearest, return_index=True)
-            way = nearest[np.sort(first)]
-            if len(way) < 2:
+            curve = nearest[np.sort(first)]
+            if len(curve) < 2:
                 raise PointCloudError("All of the curve lies at one point of the cloud. Draw it along the surface.")
             return cache.result(
                 laplacian,
                 "sides of a curve",
-                way,
+                curve,
                 closed,
                 compute=lambda: cache.geodesics(laplacian, progress).signed_distance(
-                    way, closed and len(way) > 2, progress=progress
+                    curve, closed and len(curve) > 2, progress=progress
                 ),
             )
 
         return compute
 
-    def way(self, context, obj):
-        """Return the places that the curve goes through, (k, 3), as points are read, and whether it is closed."""
+    def read_curve(self, context, obj):
+        """Return the points of the curve, (k, 3), relative to the object's location, and whether it is closed."""
         places, closed = _read_curve(context, self.curve)
-        return places - np.array(obj.matrix_world.translation), closed  # points are read without it
+        return places - np.array(obj.matrix_world.translation), closed  # as points are read
 
     def write(self, context, obj, result):
         reached = np.isfinite(result)

@@ -10,7 +10,7 @@ from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, wr
 from ..objects.color_choices import COLOR_CHOICES
 from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.place import copy_place, hide
 from ..objects.quantities import quantity
 from ..objects.splats import has_splats
@@ -78,7 +78,7 @@ class MeshSurface(Tool):
         made = {name: bpy.data.objects[other] for name, other, _ in self.made}
         self.made = ()
         for obj in objects:
-            tell("mesh_made", obj, made[obj.name])
+            notify("mesh_made", obj, made[obj.name])
         for other in context.selected_objects:
             other.select_set(False)
         for obj in objects:
@@ -138,10 +138,10 @@ class _Kept:
         return result
 
     def _carry(self, carrying, name, values):
-        way = quantity(name).carried if values.dtype.kind == "f" else "label"
-        if way == "share":  # areas stay those of the points: the area of a mesh is that of its faces
-            way = "smooth"
-        result = carry(carrying, way, values)
+        kind = quantity(name).carried if values.dtype.kind == "f" else "label"
+        if kind == "share":  # areas stay those of the points: the area of a mesh is that of its faces
+            kind = "smooth"
+        result = carry(carrying, kind, values)
         return np.clip(result, 0.0, None) if self._types[name] in COLORS else result
 
     def write(self, obj):

@@ -1,4 +1,4 @@
-"""Which side of the surface the normals point to, for this and all later analyses."""
+"""Orientation of the normals, for this and all later analyses."""
 
 import bpy
 import numpy as np
@@ -59,8 +59,8 @@ class OrientNormals(Tool):
     def plan(self, context, obj):
         reading = read_points(context, obj)
         method, sign = self.method, -1.0 if self.flip else 1.0
-        viewpoint = self.seen_from(context, obj, reading)
-        way = {"WINDING": "winding", "OUTSIDE": "outside"}.get(method, "viewpoint")
+        viewpoint = self.viewpoints(context, obj, reading)
+        core_method = {"WINDING": "winding", "OUTSIDE": "outside"}.get(method, "viewpoint")
 
         def orient(measured, progress):
             laplacian, normals, areas = measured.built.laplacian, measured.measures[NORMAL], measured.measures[AREA]
@@ -69,14 +69,16 @@ class OrientNormals(Tool):
             progress("Orientation", 0.9)
 
             def compute():
-                return core.orient_normals(reading.points, normals, method=way, viewpoint=viewpoint, areas=areas)
+                return core.orient_normals(
+                    reading.points, normals, method=core_method, viewpoint=viewpoint, areas=areas
+                )
 
-            return sign * cache.result(laplacian, "sides", reading.points, way, viewpoint, compute=compute)
+            return sign * cache.result(laplacian, "sides", reading.points, core_method, viewpoint, compute=compute)
 
         return plan_analysis(context, obj, orient=orient)
 
-    def seen_from(self, context, obj, reading):
-        """Return the places that points, as they are read, were seen from, (3,) or (n, 3); None if no method asks."""
+    def viewpoints(self, context, obj, reading):
+        """Return the positions from which points, as read, were seen, (3,) or (n, 3); None if the method has none."""
         if self.method == "VIEWPOINT":
             return _place(context, obj, self.viewpoint)
         if self.method != "ATTRIBUTE":
@@ -86,10 +88,10 @@ class OrientNormals(Tool):
 
     def write(self, context, obj, result):
         before = obj.data.attributes.get(NORMAL)
-        turned = None if before is None else _turned(read_attribute(obj.data, NORMAL), result.local_normals)
+        count = None if before is None else _count_reversed(read_attribute(obj.data, NORMAL), result.local_normals)
         write_result(obj, result, WRITE_LIMIT, oriented=True)
-        told = "normals oriented" if turned is None else f"{turned:,} of {len(result.local_normals):,} normals reversed"
-        return [*result.notices, f"{obj.name}: {told}"]
+        done = "normals oriented" if count is None else f"{count:,} of {len(result.local_normals):,} normals reversed"
+        return [*result.notices, f"{obj.name}: {done}"]
 
 
 class MESHFREE_OT_orient_normals(OrientNormals, ShownOperator, bpy.types.Operator):
@@ -99,13 +101,13 @@ class MESHFREE_OT_orient_normals(OrientNormals, ShownOperator, bpy.types.Operato
     bl_label = "Orient Normals"
 
 
-def _turned(before, after):
-    """Return how many normals point to the other side."""
+def _count_reversed(before, after):
+    """Count normals that have been reversed."""
     return int(np.count_nonzero(np.einsum("ij,ij->i", before, after) < 0.0))
 
 
 def _place(context, obj, name):
-    """Read where the named object is, or the scene's camera, in the coordinates that points are read in."""
+    """Read the position of the named object, or of the scene's camera, in the coordinates of points as read."""
     found = context.scene.objects.get(name) if name else context.scene.camera
     if found is None:
         missing = f'The scene has no object "{name}"' if name else "The scene has no camera"

@@ -32,7 +32,7 @@ from ..objects.groups import (
     is_chosen,
     rivals,
 )
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.splats import read_splats
 from ..registration import Registration, Row
@@ -175,7 +175,7 @@ def select(context, obj, chosen) -> str:
 def groups_changed(obj):
     """Let the panel count the groups of an object again, and the display color them, if it does."""
     renew_counts(obj)
-    tell("groups_changed", obj)
+    notify("groups_changed", obj)
 
 
 def analyzed(context, obj):

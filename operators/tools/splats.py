@@ -9,7 +9,7 @@ from ...core import PointCloudError
 from ...core.files import is_coarse
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import point_count, read_attribute, write_attribute
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.modifiers import is_deform
 from ..objects.place import OFFSET, offset_of
 from ..objects.positions import check_movable
@@ -57,7 +57,7 @@ class MESHFREE_OT_show_splats(SplatOperator, bpy.types.Operator):
     @reporting
     def execute(self, context):
         with all_or_nothing([context.object]):
-            tell("splats_found", context.object)
+            notify("splats_found", context.object)
         return {"FINISHED"}
 
 
