@@ -19,6 +19,7 @@ from ..objects.attributes import (
     in_edit_mesh,
     point_count,
     read_attribute,
+    remove_attributes,
     write_attribute,
 )
 from ..objects.carried import moved_names
@@ -349,9 +350,7 @@ def forget(obj):
     settings = obj.meshfree.deform
     settings.is_bound = False
     settings.handle_items.clear()
-    for name in (*WRITES, *moved_names(obj.data)):
-        if obj.data.attributes.get(name) is not None:
-            obj.data.attributes.remove(obj.data.attributes[name])
+    remove_attributes(obj.data, *WRITES, *moved_names(obj.data))
     obj.data.pop(POSE, None)
     modifier = find_deform(obj)
     if modifier is not None:

@@ -24,6 +24,7 @@ from ..objects.carried import carried, shown_moved
 from ..objects.groups import ANCHOR, HANDLE, assign, check_assignable, group_weights, handle_names, has_group
 from ..objects.handlers import notify
 from ..objects.modifiers import get_input
+from ..objects.place import activate
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
 from ..objects.result import length_text
@@ -163,10 +164,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
     def conclude(self, context, objects):
         item = objects[0].meshfree.deform.handle_items[0]
         if self.at_once and item.has_empty and item.empty.name in context.view_layer.objects:
-            for other in context.selected_objects:
-                other.select_set(False)
-            item.empty.select_set(True)
-            context.view_layer.objects.active = item.empty
+            activate(context, item.empty)
 
 
 def _plan_ends(context, obj):

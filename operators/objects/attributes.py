@@ -237,7 +237,19 @@ def _copied_values(edited, name, storage):
     return values
 
 
+def has_vectors(data, name: str) -> bool:
+    """Whether an attribute is there, with a vector for each point."""
+    attribute = data.attributes.get(name)
+    return attribute is not None and (attribute.data_type, attribute.domain) == ("FLOAT_VECTOR", "POINT")
+
+
+def remove_attributes(data, *names: str):
+    """Remove those of some attributes that are there."""
+    for name in names:
+        if name in data.attributes:
+            data.attributes.remove(data.attributes[name])
+
+
 def remove_numbered(data, prefix: str, beyond: int):
     """Remove the attributes of a kind that are numbered above `beyond`."""
-    for name in [attribute.name for attribute in data.attributes if _number(attribute.name, prefix) > beyond]:
-        data.attributes.remove(data.attributes[name])
+    remove_attributes(data, *(name for name in data.attributes.keys() if _number(name, prefix) > beyond))

@@ -12,7 +12,9 @@ from .attributes import (
     SPLAT_HARMONIC,
     SPLAT_ROTATION,
     SPLAT_SCALE,
+    has_vectors,
     read_attribute,
+    remove_attributes,
     write_attribute,
 )
 from .splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats, shown_splats
@@ -45,7 +47,7 @@ def carried(data) -> tuple:
             Carried(ROTATION, SPLAT_ROTATION, "QUATERNION"),
             *numbered,
         )
-    return (Carried(DISC, MOVED_DISC, "FLOAT_VECTOR"),) if _has_discs(data) else ()
+    return (Carried(DISC, MOVED_DISC, "FLOAT_VECTOR"),) if has_vectors(data, DISC) else ()
 
 
 def carries(obj) -> bool:
@@ -53,12 +55,7 @@ def carries(obj) -> bool:
     data = obj.data
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         return False
-    return has_splats(data) or (_has_discs(data) and obj.meshfree.point_shape == "DISCS")
-
-
-def _has_discs(data):
-    layer = data.attributes.get(DISC)
-    return layer is not None and (layer.data_type, layer.domain) == ("FLOAT_VECTOR", "POINT")
+    return has_splats(data) or (has_vectors(data, DISC) and obj.meshfree.point_shape == "DISCS")
 
 
 def discs_at_rest(obj):
@@ -103,8 +100,7 @@ def shown_moved(obj, strength) -> dict:
 def write_moved(data, moved):
     """Keep what was carried, by the names of the attributes; nothing for as it is at rest."""
     if not moved:
-        for name in moved_names(data):
-            data.attributes.remove(data.attributes[name])
+        remove_attributes(data, *moved_names(data))
     for name, values in moved.items():
         write_attribute(data, name, values)
 

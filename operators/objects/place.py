@@ -33,7 +33,16 @@ def known_offset(scene):
     return next((offset_of(obj) for obj in scene.objects if OFFSET in obj), None)
 
 
-def hide(obj):
-    """Hide an object in views and in renders."""
-    obj.hide_set(True)
-    obj.hide_render = True
+def hide(obj, hidden=True):
+    """Hide an object in views and in renders, or show it."""
+    obj.hide_set(hidden)
+    obj.hide_render = hidden
+
+
+def activate(context, *objects):
+    """Select objects and no others; the first one becomes active."""
+    for other in context.selected_objects:
+        other.select_set(False)
+    for obj in objects:
+        obj.select_set(True)
+    context.view_layer.objects.active = objects[0]

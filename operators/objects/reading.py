@@ -8,7 +8,7 @@ import numpy as np
 
 from ... import core
 from ...core import PointCloudError
-from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_attribute
+from .attributes import CORNER, ORIENTATION, has_vectors, own_positions, point_count, read_attribute
 from .counting import members
 from .evaluated import evaluated_positions
 from .groups import chosen_members
@@ -153,8 +153,7 @@ def read_points(context, obj) -> Reading:
 
 def chosen_sides(obj):
     """Read the local vectors whose side the normals of an object take, (n, 3) float64; None where nobody chose it."""
-    attribute = obj.data.attributes.get(ORIENTATION)
-    if attribute is None or (attribute.data_type, attribute.domain) != ("FLOAT_VECTOR", "POINT"):
+    if not has_vectors(obj.data, ORIENTATION):
         return None
     sides = read_attribute(obj.data, ORIENTATION).astype(np.float64)
     return np.where(np.isfinite(sides).all(axis=1)[:, None], sides, 0.0)

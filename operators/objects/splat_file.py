@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from .attributes import own_positions, read_attribute, write_attribute, write_own_positions
+from .attributes import own_positions, read_attribute, remove_attributes, write_attribute, write_own_positions
 from .place import OFFSET, offset_of
 
 FORMAT = "lb_splat_format"  # custom property of an object: how the file that it came from was laid out
@@ -66,8 +66,8 @@ def write_places(data, places):
     digits = (places - places.astype(np.float32)).astype(np.float32)
     if digits.any():
         write_attribute(data, DIGITS, digits, "FLOAT_VECTOR")
-    elif DIGITS in data.attributes:
-        data.attributes.remove(data.attributes[DIGITS])
+    else:
+        remove_attributes(data, DIGITS)
 
 
 def with_digits(data, positions):

@@ -13,7 +13,7 @@ from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from .select import read_sources
+from .select import read_sources, unreached
 
 OUTSIDE = -1.0  # texture coordinates of points that the map does not reach
 
@@ -53,9 +53,8 @@ class NearestSource(Tool):
     def write(self, context, obj, result):
         write_attribute(obj.data, CELL, result)
         tag_changed(obj.data)
-        missed, line = np.count_nonzero(result < 0), f"{obj.name}: {len(np.unique(result[result >= 0])):,} cells"
-        far = f"{missed:,} points of {obj.name} are reached by no source. Their cell is -1."
-        return [far, line] if missed else [line]
+        count = len(np.unique(result[result >= 0]))
+        return [*unreached(obj, result >= 0, "Their cell is -1."), f"{obj.name}: {count:,} cells"]
 
 
 class MESHFREE_OT_nearest_source(NearestSource, ShownOperator, bpy.types.Operator):
@@ -179,9 +178,8 @@ class ExtendDirection(Tool):
     def write(self, context, obj, result):
         write_attribute(obj.data, DIRECTION, result)
         tag_changed(obj.data)
-        missed, line = np.count_nonzero(~result.any(axis=1)), f"{obj.name}: directions on {len(result):,} points"
-        far = f"{missed:,} points of {obj.name} are reached by no source. They have no direction."
-        return [far, line] if missed else [line]
+        notices = unreached(obj, result.any(axis=1), "They have no direction.")
+        return [*notices, f"{obj.name}: directions on {len(result):,} points"]
 
 
 class MESHFREE_OT_extend_direction(ExtendDirection, ShownOperator, bpy.types.Operator):
@@ -236,9 +234,8 @@ class SignedDistance(Tool):
         write_attribute(obj.data, SIGNED_DISTANCE, np.where(reached, result, 0.0))
         tag_changed(obj.data)
         low, high = (length_text(value) for value in (result[reached].min(), result[reached].max()))
-        missed, line = np.count_nonzero(~reached), f"{obj.name}: {low} on the right to {high} on the left"
-        far = f"{missed:,} points of {obj.name} are not reached from the curve. Their distance is 0."
-        return [far, line] if missed else [line]
+        notices = unreached(obj, reached, "Their distance is 0.")
+        return [*notices, f"{obj.name}: {low} on the right to {high} on the left"]
 
 
 class MESHFREE_OT_signed_distance(SignedDistance, ShownOperator, bpy.types.Operator):

@@ -13,7 +13,7 @@ from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from .select import read_sources
+from .select import read_sources, unreached
 
 UNREACHED = -1.0  # distance of points that no source reaches
 
@@ -192,9 +192,8 @@ class GeodesicDistance(Tool):
         reached = np.isfinite(result)
         write_attribute(obj.data, DISTANCE, np.where(reached, result, UNREACHED))
         tag_changed(obj.data)
-        missed, line = np.count_nonzero(~reached), f"{obj.name}: distances up to {length_text(result[reached].max())}"
-        far = f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."
-        return [far, line] if missed else [line]
+        notices = unreached(obj, reached, f"Their distance is {UNREACHED:g}.")
+        return [*notices, f"{obj.name}: distances up to {length_text(result[reached].max())}"]
 
 
 class MESHFREE_OT_geodesic_distance(GeodesicDistance, ShownOperator, bpy.types.Operator):

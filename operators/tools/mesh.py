@@ -11,7 +11,7 @@ from ..objects.color_choices import COLOR_CHOICES
 from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
 from ..objects.handlers import notify
-from ..objects.place import copy_place, hide
+from ..objects.place import activate, copy_place, hide
 from ..objects.quantities import quantity
 from ..objects.splats import has_splats
 from ..registration import Registration, Row
@@ -79,11 +79,7 @@ class MeshSurface(Tool):
         self.made = ()
         for obj in objects:
             notify("mesh_made", obj, made[obj.name])
-        for other in context.selected_objects:
-            other.select_set(False)
-        for obj in objects:
-            made[obj.name].select_set(True)
-        context.view_layer.objects.active = made[objects[0].name]
+        activate(context, *(made[obj.name] for obj in objects))
         for obj in objects:
             hide(obj)
 

@@ -150,6 +150,12 @@ def selected(obj):
     return chosen
 
 
+def unreached(obj, reached, consequence: str) -> list:
+    """Return a notice of the points of an object that no source reaches, given those that one does, (n,) bool."""
+    missed = np.count_nonzero(~reached)
+    return [f"{missed:,} points of {obj.name} are reached by no source. {consequence}"] if missed else []
+
+
 def read_sources(obj, group):
     """Read the points of a group or, where there is none of the default's name, the selected ones, (n,) bool."""
     return chosen_members(obj, group, "Sources") if is_chosen(obj, group, SOURCE) else selected(obj)
