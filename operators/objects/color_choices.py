@@ -1,4 +1,4 @@
-"""What one can choose about colours, for the settings of objects and for the operator that shows them."""
+"""Choices of colours, for the settings of objects and for the operator that shows colors."""
 
 from functools import partial
 
@@ -23,8 +23,8 @@ _RANGE_MODES = (
         "Symmetric for Cool to Warm and signed values, Data for Cyclic, Percentile otherwise",
     ),
     ("DATA", "Data", "From the least to the greatest value"),
-    ("PERCENTILE", "Percentile", "The share of the values that Coverage says, without the outermost ones"),
-    ("SYMMETRIC", "Symmetric", "As far below zero as above, by the share of the values that Coverage says"),
+    ("PERCENTILE", "Percentile", "Between percentiles, so that the share Coverage of the values is inside"),
+    ("SYMMETRIC", "Symmetric", "As far below zero as above, so that the share Coverage of the values is inside"),
     ("LOCKED", "Locked", "The values below, whatever is shown"),
 )
 _CHOICES = {
@@ -39,14 +39,14 @@ _CHOICES = {
     "range_mode": partial(
         EnumProperty,
         name="Range",
-        description="Which values the colors stretch over",
+        description="Which values the colors cover",
         items=_RANGE_MODES,
         default="AUTO",
     ),
     "coverage": partial(
         FloatProperty,
         name="Coverage",
-        description="Share of the values inside the color range, so that a few outliers do not wash the rest out",
+        description="Share of the values inside the color range, so that a few outliers do not dominate",
         default=98.0,
         min=50.0,
         max=100.0,
@@ -57,5 +57,5 @@ COLOR_CHOICES = tuple(_CHOICES)
 
 
 def color_choice(name: str, **more):
-    """Return the property of a choice, to annotate a class with; more of its arguments may be given."""
+    """Return the property of a choice, to annotate a class, with further arguments."""
     return _CHOICES[name](**more)

@@ -39,7 +39,7 @@ def shown_points(context, obj):
 
 
 def _parts(depsgraph, obj):
-    """Yield the parts of an evaluated object, each with whether it is an instance; a part is invalid after its turn."""
+    """Yield the parts of an evaluated object, each with whether it is an instance; a part is invalid after the next."""
     for item in depsgraph.object_instances:
         part = item.object
         if part.type not in _KINDS:

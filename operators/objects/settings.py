@@ -23,7 +23,7 @@ def _recolor(settings, context):
 
 
 def _recolor_locked(settings, context):
-    """Follow bounds that somebody sets; in other modes they only tell what the range came to."""
+    """Follow bounds that are set; in other modes they only show the resulting range."""
     if settings.range_mode == "LOCKED":
         notify("colors_changed", settings.id_data)
 
@@ -335,12 +335,13 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     own_material: PointerProperty(
         type=bpy.types.Material,
         name="Own Material",
-        description="Material of the first slot that the display shows, and will follow",
+        description="Material of the first slot that the display shows and follows",
     )
     slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
     colors_behind: BoolProperty(
-        name="Colors Behind", description="Whether colors were changed in Edit Mode, where points get none for Solid"
+        name="Colors Behind",
+        description="Whether colors for Solid are outdated, since Edit Mode prevents writing them",
     )
 
     notices: CollectionProperty(
@@ -386,7 +387,7 @@ CLASSES = (MESHFREE_PG_stage, *notices.PROPERTY_GROUPS, *deform_settings.CLASSES
 
 
 def attach():
-    """Give every object its settings."""
+    """Add the settings to objects."""
     bpy.types.Object.meshfree = PointerProperty(
         type=MESHFREE_PG_settings,
         name="Mesh-Free Laplacian",
@@ -395,5 +396,5 @@ def attach():
 
 
 def detach():
-    """Take the settings away again."""
+    """Remove the settings from objects."""
     del bpy.types.Object.meshfree
