@@ -141,7 +141,7 @@ def test_another_object_can_be_named_by_a_script(core):
 def test_mesh_with_faces_is_taken_as_its_vertices_with_a_notice(core, capfd):
     obj = add_object(sphere_points(), faces=[(0, 1, 2)])
     bpy.ops.meshfree.analyze()
-    assert "has 1 faces: it is taken as its 1000 vertices" in capfd.readouterr().out
+    assert "has 1 faces: only its 1000 vertices are used" in capfd.readouterr().out
     assert_result(core, obj)
 
 
