@@ -10,7 +10,7 @@ from .bandwidth import depth, mean_gaps, smoothing_lengths
 from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
 from .cells import measure_cells
 from .components import label_components, move_apart
-from .distances import measure_roughness
+from .distances import measure_squared_slope
 from .nearest import Nearest, changed_rows, find_nearest
 from .noise import FILLING, LEFT, MOST, near_misfit, noise_level, project_points
 from .normals import orient_outwards, unit_normals
@@ -89,14 +89,14 @@ class Cloud:
         Of local quadrics.
     cell_areas : ndarray, (m,)
         Areas of the points' Voronoi cells.
-    reach : ndarray, (m,)
+    cell_radius : ndarray, (m,)
         Distance of the furthest corner of each cell.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
     misfit : ndarray, (m,)
         Root mean square distance of the neighbours from the quadric.
-    roughness : ndarray, (m,)
-        Mean squared slope of what is finer than the normals; zero where it is noise.
+    squared_slope : ndarray, (m,)
+        Mean squared slope of the roughness that is finer than the normals resolve; zero where it is noise.
     boundary : Boundary
     pairs : Pairs
         Where the operator takes the points to be, smoothing lengths and pairs.
@@ -111,10 +111,10 @@ class Cloud:
     shape_operator: np.ndarray
     gaussian_curvature: np.ndarray
     cell_areas: np.ndarray
-    reach: np.ndarray
+    cell_radius: np.ndarray
     spacing: np.ndarray
     misfit: np.ndarray
-    roughness: np.ndarray
+    squared_slope: np.ndarray
     boundary: Boundary
     pairs: Pairs
     notices: list
@@ -164,12 +164,12 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
     if options.boundary == "auto" and boundary is None and boundary_distance is None:
         cells = measure_cells(nearest, oriented, gaussian, no_boundary(len(oriented)), sample.component, looked)
-        gaps = mean_gaps(nearest, cells.reach, 1)
+        gaps = mean_gaps(nearest, cells.radius, 1)
     boundary = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
     if gaps is None or np.isfinite(boundary.distance).any():
         cells = measure_cells(nearest, oriented, gaussian, boundary, sample.component, looked)
     report("Neighbors", 0.25)
-    lengths = smoothing_lengths(nearest, options, sample.component, cells.reach)
+    lengths = smoothing_lengths(nearest, cells.radius, options, sample.component)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
     own = oriented if given is None else given
 
@@ -184,11 +184,11 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         shape_operator=side[:, None, None] * quadrics.shape_operator,
         gaussian_curvature=gaussian,
         cell_areas=cells.areas,
-        reach=cells.reach,
+        cell_radius=cells.radius,
         spacing=nearest.spacing,
         misfit=quadrics.misfit,
         # What sticks out is noise where there is any, and shape where not.
-        roughness=np.where(sample.noise > 0.0, 0.0, measure_roughness(nearest, quadrics.normals)),
+        squared_slope=np.where(sample.noise > 0.0, 0.0, measure_squared_slope(nearest, quadrics.normals)),
         boundary=boundary,
         pairs=pairs,
         notices=_notices(
@@ -552,6 +552,6 @@ def surface_discs(points, *, progress=None):
     cells = measure_cells(
         sample.nearest, oriented, curvature, everywhere, sample.component, lambda: report("Discs", 0.6)
     )
-    radii = cells.reach * scaled.scale
+    radii = cells.radius * scaled.scale
     kept = sample.scaled
     return Discs(kept.scatter(oriented, (0.0, 0.0, 1.0)), kept.scatter(radii, np.median(radii)))

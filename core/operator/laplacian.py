@@ -42,8 +42,8 @@ class LaplaceBeltrami:
         tangent t, positive where the surface bends away from the normal.
     gaussian_curvature : ndarray, (n,)
         Product of the two principal curvatures [1 / L^2], from local quadrics.
-    reach : ndarray, (n,)
-        Distance of the furthest corner of the Voronoi cell [L]: discs of this radius leave no hole.
+    cell_radius : ndarray, (n,)
+        Radius of the Voronoi cell [L], up to its furthest corner: discs of this radius leave no hole.
     boundary : ndarray, (n,) bool
         Points at a boundary of the surface.
     near_boundary : ndarray, (n,) bool
@@ -80,7 +80,7 @@ class LaplaceBeltrami:
     areas: np.ndarray
     shape_operator: np.ndarray
     gaussian_curvature: np.ndarray
-    reach: np.ndarray
+    cell_radius: np.ndarray
     boundary: np.ndarray
     near_boundary: np.ndarray
     boundary_distance: np.ndarray
@@ -95,8 +95,13 @@ class LaplaceBeltrami:
     notices: list
 
     @property
-    def mean_curvature(self):
-        """Mean of the two principal curvatures of local quadrics, (n,) [1 / L]."""
+    def quadric_mean_curvature(self):
+        """Mean curvature of local quadrics through the nearest points, (n,) [1 / L].
+
+        `mean_curvature`, from the operator, averages over the kernel and is smoother on noisy points. Without noise the
+        two differ by 3 % on 800 even points of a sphere and by 0.3 % on 8,000, in the root mean square; on 8,000 points
+        of an ellipsoid with the axes 1, 0.6 and 0.3 by 3 %.
+        """
         return 0.5 * np.trace(self.shape_operator, axis1=1, axis2=2)
 
     @property
@@ -409,7 +414,7 @@ def laplacian_of(points, cloud, areas, assembled, options):
         areas=scaled.scatter(areas * scaled.scale**2 / scaled.copies, NO_AREA),
         shape_operator=scaled.scatter(cloud.shape_operator / scaled.scale, 0.0),
         gaussian_curvature=scaled.scatter(cloud.gaussian_curvature / scaled.scale**2, 0.0),
-        reach=scaled.scatter(cloud.reach * scaled.scale, np.median(cloud.reach) * scaled.scale),
+        cell_radius=scaled.scatter(cloud.cell_radius * scaled.scale, np.median(cloud.cell_radius) * scaled.scale),
         boundary=scaled.scatter(cloud.boundary.at_boundary, False),
         near_boundary=scaled.scatter(cloud.boundary.reached(pairs.lengths), False),
         boundary_distance=scaled.scatter(cloud.boundary.distance[:, 0] * scaled.scale, np.inf),

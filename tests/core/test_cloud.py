@@ -29,7 +29,7 @@ def gaps_of(surface, oriented):
     """How wide the gaps between points are, before a boundary is known."""
     nearest, count = surface.sample.nearest, len(oriented)
     gaussian = surface.quadrics.gaussian_curvature
-    return mean_gaps(nearest, measure_cells(nearest, oriented, gaussian, no_boundary(count)).reach, 1)
+    return mean_gaps(nearest, measure_cells(nearest, oriented, gaussian, no_boundary(count)).radius, 1)
 
 
 def sample_of(points):
