@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
-from ..types import Bools, Floats, Ints
+from ..types import Bools, Floats, Ints, Report
 from .distances import arc_squared
 from .nearest import Nearest
 from .quadrics import frames
@@ -50,7 +49,7 @@ def measure_cells(
     gaussian_curvature: Floats,
     boundary: Boundary,
     component: Ints | None = None,
-    report: Callable[..., Any] = lambda: None,
+    report: Report = lambda: None,
 ) -> Cells:
     """Measure the cell of every point in geodesic polar coordinates around it.
 

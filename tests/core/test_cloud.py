@@ -59,7 +59,7 @@ def test_components_are_divided_and_lone_points_left_out():
 
 def test_too_few_points_left_are_an_error():
     clusters = [fibonacci_sphere(30) + [9.0 * number, 0.0, 0.0] for number in range(10)]
-    with pytest.raises(core.ComponentError, match="270 of 300 points lie apart from each other"):
+    with pytest.raises(core.ComponentError, match="270 of 300 points are in components of too few points"):
         sample_of(np.concatenate(clusters))
 
 
