@@ -103,10 +103,10 @@ def solve_spectrum(
 
 
 def _cut(laplacian: LaplaceBeltrami, count: int) -> float:
-    """Return what the wide kernel makes of twice Weyl's estimate 4 pi count / area of the highest eigenvalue wanted."""
+    """Return the raw eigenvalue for twice Weyl's estimate 4 pi count / area of the highest one wanted."""
     squared = np.mean(laplacian.smoothing_lengths**2)
     frequency = 8.0 * np.pi * count / laplacian.areas.sum() * squared
-    return symbol(np.sqrt(min(frequency, _FLAT**2))) / squared
+    return float(symbol(np.sqrt(min(frequency, _FLAT**2))) / squared)
 
 
 def symmetric_form(
