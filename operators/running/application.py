@@ -146,7 +146,9 @@ def _write_discs(context, obj):
     if DISC in obj.vertex_groups or not cache.holds(reading.points, options, reading.boundary, reading.splats):
         return
     laplacian = build_operator(reading, options, lambda *_: None).laplacian
-    write_attribute(obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.reach, reading.points))
+    write_attribute(
+        obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.cell_radius, reading.points)
+    )
 
 
 def compute_all(plans, progress):

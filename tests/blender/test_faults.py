@@ -309,9 +309,7 @@ def test_change_while_computing_beside_the_window(fresh, reports, attended, tmp_
     if change in HARMLESS:
         assert result == {"FINISHED"}, run.reports
         found = everything(obj)["attributes"]
-        if (
-            change is move
-        ):  # discs, which the display makes for the orientation that it sees, may be left to the next run
+        if change is move:  # the display makes discs for one orientation, and may leave them to the next run
             drawn = {"lb_disc", ".lb_slope", ".lb_slope_of"} - found.keys()
             undisturbed = {name: kept for name, kept in undisturbed.items() if name not in drawn}
         assert found == undisturbed
