@@ -7,13 +7,13 @@ from ..geometry import arc_squared
 from ..types import Floats, Ints
 
 _AROUND = 9  # nearest points of the boundary among which those before and after a point are sought
-_OPPOSITE = -0.3  # cosine between the ways to both, at most
-_ROUGH = 0.07  # height of typical points over the line between their neighbours, in units of its length
+_OPPOSITE = -0.3  # cosine between the directions to both, at most
+_ROUGH = 0.07  # median height of points over the line between their neighbours, in units of its length
 _ROUNDS = 3  # of Newton's iteration for the foot
 
 
 class BoundaryCurve:
-    """Parabolas through each point of a boundary, the one before and the one after.
+    """Parabolas through each point of a boundary and its two neighbours along it.
 
     Parameters
     ----------
@@ -34,25 +34,25 @@ class BoundaryCurve:
         self.points, self.first = np.unique(points, axis=0, return_index=True)
         self._tree = cKDTree(self.points)
         _, other = self._tree.query(self.points, k=min(_AROUND, len(self.points)))
-        way = self.points[other[:, 1:]] - self.points[:, None]
-        length = np.linalg.norm(way, axis=2)
-        every = np.arange(len(way))
-        cosine = np.einsum("ikc,ic->ik", way, way[:, 0]) / (length * length[:, :1])
+        step = self.points[other[:, 1:]] - self.points[:, None]
+        length = np.linalg.norm(step, axis=2)
+        every = np.arange(len(step))
+        cosine = np.einsum("ikc,ic->ik", step, step[:, 0]) / (length * length[:, :1])
         after = np.argmax(cosine < _OPPOSITE, axis=1)
         ends = cosine[every, after] >= _OPPOSITE
         p, q = length[:, 0, None], length[every, after, None]
-        back, forth = way[:, 0] / p, way[every, after] / q
-        bend = (back + forth) / (p + q)
-        chord = way[every, after] - way[:, 0]
-        height = np.linalg.norm(np.cross(way[:, 0], chord), axis=1)[~ends] / np.sum(chord**2, axis=1)[~ends]
+        back, forth = step[:, 0] / p, step[every, after] / q
+        second = (back + forth) / (p + q)  # half the second derivative
+        chord = step[every, after] - step[:, 0]
+        height = np.linalg.norm(np.cross(step[:, 0], chord), axis=1)[~ends] / np.sum(chord**2, axis=1)[~ends]
         self.rough = bool(ends.all() or np.median(height) > _ROUGH)
         # Where there is none after it, at the end of a wire or in a corner, the curve ends.
-        self._bend = np.where(ends[:, None], 0.0, bend)
-        self._slope = np.where(ends[:, None], -back, forth - q * bend)
+        self._second = np.where(ends[:, None], 0.0, second)
+        self._slope = np.where(ends[:, None], -back, forth - q * second)
         self._range = -p[:, 0], np.where(ends, 0.0, q[:, 0])
 
     def nearest(self, points: Floats) -> tuple[Floats, Ints]:
-        """Find the nearest places on the curve.
+        """Find the nearest positions on the curve.
 
         Parameters
         ----------
@@ -61,22 +61,22 @@ class BoundaryCurve:
         Returns
         -------
         foot : ndarray, (n, 3)
-            The nearest places.
+            The nearest positions.
         index : ndarray, (n,) int
             The nearest points of the boundary.
         """
         index = self._tree.query(points)[1]
-        slope, bend = self._slope[index], self._bend[index]
+        slope, second = self._slope[index], self._second[index]
         offset = points - self.points[index]
         t = np.zeros(len(points))
         for _ in range(_ROUNDS):
-            along = slope + 2.0 * t[:, None] * bend
-            left = t[:, None] * slope + t[:, None] ** 2 * bend - offset
+            along = slope + 2.0 * t[:, None] * second
+            left = t[:, None] * slope + t[:, None] ** 2 * second - offset
             squared = np.einsum("ic,ic->i", along, along)
-            curvature = squared + 2.0 * np.einsum("ic,ic->i", left, bend)
+            curvature = squared + 2.0 * np.einsum("ic,ic->i", left, second)
             t = t - np.einsum("ic,ic->i", left, along) / np.maximum(curvature, 0.3 * squared)
             t = np.clip(t, self._range[0][index], self._range[1][index])
-        return self.points[index] + t[:, None] * slope + t[:, None] ** 2 * bend, index
+        return self.points[index] + t[:, None] * slope + t[:, None] ** 2 * second, index
 
     def distance(self, points: Floats, normals: Floats, foot: Floats, index: Ints, boundary_normals: Floats) -> Floats:
         """Return the distances of points from their feet along a surface, to fourth order.
@@ -94,8 +94,8 @@ class BoundaryCurve:
         -------
         ndarray, (n,)
         """
-        way = points - foot
+        offset = points - foot
         other = boundary_normals[index]
         side = np.where(np.einsum("ic,ic->i", normals, other) < 0.0, -1.0, 1.0)
-        heights = np.einsum("ic,ic->i", way, other) * side, np.einsum("ic,ic->i", way, normals)
-        return np.sqrt(arc_squared(np.einsum("ic,ic->i", way, way), *heights))
+        heights = np.einsum("ic,ic->i", offset, other) * side, np.einsum("ic,ic->i", offset, normals)
+        return np.sqrt(arc_squared(np.einsum("ic,ic->i", offset, offset), *heights))

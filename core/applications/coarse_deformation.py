@@ -1,13 +1,18 @@
-"""Deformation that keeps up with a hand: solved on some of the points, whose motions carry all others."""
+"""Deformation in real time: solved on some of the points, whose motions are interpolated to all others."""
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..arguments import check_positions, check_switches, real
+from ..arguments import check_positions, check_switches, whole
 from ..errors import PointCloudError
 from ..geometry import balanced_weights, move_apart, nearest_in_blocks, thin
-from ..operator import narrow_laplacian
+from ..operator import LaplaceBeltrami, narrow_laplacian
+from ..types import Bools, Floats, Ints, Progress
 from .deformation import (
     NEIGHBORS,
     RTOL,
@@ -25,16 +30,16 @@ _FEWEST = 300  # of a component, as far as it has them
 _ALL = 1.5  # times the count: so few points are all solved on
 _NEAR, _CLOSER = 10.0, 0.5  # of where constraints begin, in distances of chosen points, these are up to so much closer
 _SOURCES = 10  # points that each other one follows
-_SHARP = 1e-10  # share of the squared reach within which a point is at a source
-_RIDGE = 1e-2  # of their spread: what weights need not balance, such as heights above the surface
+_SHARP = 1e-10  # share of the squared distance to the last source within which a point is at a source
+_RIDGE = 1e-2  # share of the spread of sources: weights need not balance less, such as heights above the surface
 
 
 class CoarseDeformer:
-    """Moves a surface by its handles as `Deformer` does, in a fraction of the time, for dragging.
+    """Deforms a surface by its handles as `Deformer` does, in a fraction of the time, for dragging.
 
-    Some of the points, spread as evenly as the given ones let them, are deformed by a `Deformer` of their own. Each of
-    the others is carried along by the motions x -> R_j (x - p_j) + x_j of a few of them, with weights that add up to
-    one. Handles and anchors are where they should be; a surface that is moved rigidly comes out rigid to round-off.
+    Some of the points, spread as evenly as the given ones permit, are deformed by a `Deformer` of their own. Each of
+    the others follows the motions x -> R_j (x - p_j) + x_j of a few of them, with weights that add up to one. Handles
+    and anchors are where they should be; a surface that is moved rigidly comes out rigid to round-off.
 
     Parameters
     ----------
@@ -80,16 +85,16 @@ class CoarseDeformer:
 
     def __init__(
         self,
-        laplacian,
-        handles,
-        anchors=(),
+        laplacian: LaplaceBeltrami,
+        handles: ArrayLike,
+        anchors: ArrayLike = (),
         *,
-        rotation_aware=True,
-        weights=None,
-        neighbors=NEIGHBORS,
-        count=_COUNT,
-        progress=None,
-    ):
+        rotation_aware: bool = True,
+        weights: ArrayLike | None = None,
+        neighbors: int = NEIGHBORS,
+        count: int = _COUNT,
+        progress: Progress | None = None,
+    ) -> None:
         report = progress or (lambda stage, fraction: None)
         n = len(laplacian.points)
         check_switches(rotation_aware=rotation_aware)
@@ -140,7 +145,7 @@ class CoarseDeformer:
             laplacian, followers(self.points, component, held), lambda share: report("Points", 0.8 + 0.2 * share)
         )
 
-    def _gathered(self, laplacian, coarse, own, weights):
+    def _gathered(self, laplacian: LaplaceBeltrami, coarse: LaplaceBeltrami, own: Ints, weights: Floats) -> Floats:
         """Return the weights of constrained coarse points, each with the pull of the soft constraints next to it.
 
         A weight counts in units of the resistance of one point, which grows as its area falls.
@@ -155,8 +160,8 @@ class CoarseDeformer:
             gathered = np.where(np.isinf(gathered), np.inf, pull)
         return gathered
 
-    def _carry(self, laplacian, followers, report):
-        """Prepare the weights with which the motions of coarse points carry the others, and points of no surface."""
+    def _carry(self, laplacian: LaplaceBeltrami, followers: tuple[Ints, Ints], report: Callable[[float], None]) -> None:
+        """Prepare the weights with which the motions of coarse points carry the others, and points on no surface."""
         sources = self._coarse.moving
         apart = move_apart(laplacian.points, np.maximum(laplacian.component, 0))
         weights = _linear_weights(apart[self._rows[sources]], apart[self._moving], report)
@@ -170,12 +175,28 @@ class CoarseDeformer:
         self._rest = self.points[self._carried_points] - self._center
         self._offset = self._rest - weights @ (self.points[self._rows[sources]] - self._center)
 
-    def solve(self, handle_positions, *, steps=STEPS, rtol=RTOL, start=None, progress=None):
+    def solve(
+        self,
+        handle_positions: ArrayLike,
+        *,
+        steps: int = STEPS,
+        rtol: float = RTOL,
+        start: ArrayLike | None = None,
+        progress: Progress | None = None,
+    ) -> Floats:
         """Find the points for new positions of the handles; parameters and result as of `Deformer.solve`."""
         return self.deform(handle_positions, steps=steps, rtol=rtol, start=start, progress=progress).points
 
-    def deform(self, handle_positions, *, steps=STEPS, rtol=RTOL, start=None, progress=None) -> Deformation:
-        """Find the points as `solve` does, and say how many steps that took; see `Deformer.deform`."""
+    def deform(
+        self,
+        handle_positions: ArrayLike,
+        *,
+        steps: int = STEPS,
+        rtol: float = RTOL,
+        start: ArrayLike | None = None,
+        progress: Progress | None = None,
+    ) -> Deformation:
+        """Find the points as `solve` does, and report how many steps that took; see `Deformer.deform`."""
         target = check_positions(handle_positions, len(self.handles), "handle positions", "handle")
         target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
         result, taken, converged = self.points.copy(), 0, True
@@ -189,8 +210,8 @@ class CoarseDeformer:
         result[self._held[self._placed]] = target[self._placed]
         return Deformation(result, taken, converged)
 
-    def gradients(self, points):
-        """Find what a deformation does to small steps around each point, as `Deformer.gradients`, from some points."""
+    def gradients(self, points: ArrayLike) -> Floats:
+        """Find deformation gradients as `Deformer.gradients` does, interpolated from some points."""
         result = np.tile(np.eye(3), (len(self.points), 1, 1))
         if len(self._moving):
             points = check_positions(points, len(self.points), "points after the deformation", "point")
@@ -198,21 +219,23 @@ class CoarseDeformer:
             result[self._carried_points] = (self._weights @ found.reshape(-1, 9)).reshape(-1, 3, 3)
         return result
 
-    def _carried(self, placed):
-        """Return where the points that are carried go with coarse points that were placed, (k, 3)."""
+    def _carried(self, placed: Floats) -> Floats:
+        """Return new positions of the carried points, (k, 3), for those of the coarse points."""
         sources = self._coarse.moving
         now = placed[sources] - self._center
         if not self.rotation_aware:
             return self._weights @ now + self._offset + self._center
         rest = self.points[self._rows[sources]] - self._center
-        turn = np.moveaxis(self._coarse.rotations(placed), 2, 0)
-        shift = now - np.einsum("mab,mb->ma", turn, rest)
-        maps = self._weights @ np.concatenate([turn.reshape(-1, 9), shift], axis=1)
+        rotation = np.moveaxis(self._coarse.rotations(placed), 2, 0)
+        shift = now - np.einsum("mab,mb->ma", rotation, rest)
+        maps = self._weights @ np.concatenate([rotation.reshape(-1, 9), shift], axis=1)
         return np.einsum("nab,nb->na", maps[:, :9].reshape(-1, 3, 3), self._rest) + maps[:, 9:] + self._center
 
 
-def coarse_deformer(laplacian, handles, anchors=(), *, count=_COUNT, **settings) -> CoarseDeformer | Deformer:
-    """Prepare a deformation that keeps up with a hand.
+def coarse_deformer(
+    laplacian: LaplaceBeltrami, handles: ArrayLike, anchors: ArrayLike = (), *, count: int = _COUNT, **settings: Any
+) -> CoarseDeformer | Deformer:
+    """Prepare a deformation in real time.
 
     Parameters
     ----------
@@ -222,7 +245,7 @@ def coarse_deformer(laplacian, handles, anchors=(), *, count=_COUNT, **settings)
     Returns
     -------
     CoarseDeformer or Deformer
-        The latter, which solves on all points, where there are hardly more than the former would solve on.
+        The latter, which solves on all points, where they are hardly more than `CoarseDeformer` would solve on.
 
     Raises
     ------
@@ -234,22 +257,22 @@ def coarse_deformer(laplacian, handles, anchors=(), *, count=_COUNT, **settings)
     return CoarseDeformer(laplacian, handles, anchors, count=count, **settings)
 
 
-def _check_count(count):
+def _check_count(count: int) -> int:
     """Return how many points to solve on."""
-    if not real(count) >= 1.0:
-        raise PointCloudError(f"{count!r} points to solve on were asked for. Ask for a number of at least 1.")
-    return real(count)
+    if not whole(count) >= 1:
+        raise PointCloudError(f"The number of points to solve on is {count!r}. Use a whole number of at least 1.")
+    return int(count)
 
 
-def _closer_to_border(points, areas, held, count):
-    """Return by what to multiply distances between chosen points near to where constraints begin."""
+def _closer_to_border(points: Floats, areas: Floats, held: Bools, count: int) -> Floats:
+    """Return factors of the distances between chosen points, smaller near the border of constrained sets."""
     away = np.empty(len(points))
     for own in (held, ~held):
         away[own] = cKDTree(points[~own]).query(points[own], workers=-1)[0]
     return np.clip(away / (_NEAR * np.sqrt(areas.sum() / count)), _CLOSER, 1.0)
 
 
-def _spacing(areas, lengths, component, count):
+def _spacing(areas: Floats, lengths: Floats, component: Ints, count: int) -> Floats:
     """Return how far apart to choose points: as the kernel's width, but closer where components would have few."""
     share = np.bincount(component, areas / lengths**2)
     expected = count * share / share.sum()
@@ -258,21 +281,21 @@ def _spacing(areas, lengths, component, count):
     return lengths * closer[component]
 
 
-def _linear_weights(sources, points, report):
+def _linear_weights(sources: Floats, points: Floats, report: Callable[[float], None]) -> sparse.csr_array:
     """Return the matrix that carries values from sources to points, exact for constants and, along surfaces, linear.
 
     Weights fade to zero at the last neighbour, so that none appears or vanishes suddenly, and rise at the sources, so
     that these keep their values, times a linear function that balances them around the point (moving least squares).
     """
-    weights, indices = [], []
+    found, indices = [], []
     for start, distance, index in nearest_in_blocks(sources, points, _SOURCES + 1, lambda: None):
         report(start / len(points))
         offset = sources.T[:, index] - points.T[:, start : start + len(index), None]
         last = distance[:, -1:]
         share = (distance / np.where(last > 0.0, 1.0001 * last, 1.0)) ** 2  # so that a single one keeps some weight
         weight = (1.0 - share) ** 2 / (share + _SHARP)
-        weights.append(balanced_weights(weight / weight.sum(axis=1, keepdims=True), offset, _RIDGE))
+        found.append(balanced_weights(weight / weight.sum(axis=1, keepdims=True), offset, _RIDGE))
         indices.append(index)
-    weights, indices = np.concatenate(weights), np.concatenate(indices)
-    start = np.arange(0, weights.size + 1, weights.shape[1])
-    return sparse.csr_array((weights.ravel(), indices.ravel(), start), shape=(len(points), len(sources)))
+    weights = np.concatenate(found)
+    starts = np.arange(0, weights.size + 1, weights.shape[1])
+    return sparse.csr_array((weights.ravel(), np.concatenate(indices).ravel(), starts), (len(points), len(sources)))

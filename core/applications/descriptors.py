@@ -1,6 +1,4 @@
-"""Signatures of points that depend on the inner shape alone: bending the surface does not change them."""
-
-from typing import Any
+"""Signatures of points that depend on the intrinsic shape alone: bending the surface does not change them."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,8 +28,8 @@ def signature_times(spectrum: Spectrum, count: int = 100) -> Floats:
     -------
     ndarray, (count,)
         Ascending, evenly in the logarithm [L^2], from ``4 ln 10 / highest`` to ``4 ln 10 / lowest`` nonzero eigenvalue:
-        from where the modes that are missing matter no more to where all is even. They grow with the size of the object
-        squared, so that signatures of scaled copies agree.
+        at earlier times missing modes would matter, at later ones all heat is spread evenly. They grow with the square
+        of the size of the object, so that signatures of scaled copies agree.
 
     Raises
     ------
@@ -69,7 +67,7 @@ def signature_energies(spectrum: Spectrum, count: int = 100) -> Floats:
 def heat_kernel_signature(
     spectrum: Spectrum, times: ArrayLike | None = None, *, count: int = 100, normalized: bool = False
 ) -> Floats:
-    """Compute the heat kernel signature: how much heat is left at a point some time after it was put there.
+    """Compute the heat kernel signature: the heat that is left at a point some time after a unit was put there.
 
     Parameters
     ----------
@@ -95,7 +93,7 @@ def heat_kernel_signature(
     See Also
     --------
     signature_times : The times that suit a spectrum.
-    wave_kernel_signature : Tells details apart better.
+    wave_kernel_signature : Distinguishes details better.
     LaplaceBeltrami.eigenpairs : Computes the spectrum.
 
     References
@@ -127,9 +125,9 @@ def heat_kernel_signature(
 
 
 def wave_kernel_signature(spectrum: Spectrum, energies: ArrayLike | None = None, *, count: int = 100) -> Floats:
-    """Compute the wave kernel signature: the mean chance to meet a particle of some energy at a point.
+    """Compute the wave kernel signature: the mean probability to find a particle of some energy at a point.
 
-    It tells details apart better than the heat kernel signature, as each energy looks at a narrow band of modes.
+    It distinguishes details better than the heat kernel signature, as each energy uses a narrow band of modes.
 
     Parameters
     ----------
@@ -164,7 +162,7 @@ def wave_kernel_signature(spectrum: Spectrum, energies: ArrayLike | None = None,
 
     Examples
     --------
-    On the unit sphere the chance is the same everywhere at every energy, one over the area of 4 pi:
+    On the unit sphere the probability is the same everywhere at every energy, one over the area of 4 pi:
 
     >>> import numpy as np
     >>> import core
@@ -189,7 +187,7 @@ def _nonzero(spectrum: Spectrum) -> tuple[int, Floats]:
     constant = int(np.searchsorted(values, _ZERO * 4.0 * np.pi * inverse_area))
     if constant == len(values):
         raise PointCloudError(
-            f"The {len(values)} modes of the spectrum are constants, which tell no points apart. Compute more modes."
+            f"The {len(values)} modes are constant, so they do not distinguish points. Compute more modes."
         )
     return constant, values[constant:]
 
@@ -205,7 +203,8 @@ def _window(spectrum: Spectrum) -> tuple[float, float, float]:
     return low, high, _WIDTH * (high - low)
 
 
-def _numbers(given: Any, name: str) -> Floats:
+def _numbers(given: ArrayLike, name: str) -> Floats:
+    """Return a row of finite numbers, at least one."""
     advice = "Give a row of finite numbers, at least one."
     values = check_array(given, name, [(None,)], advice)
     if not len(values):
@@ -214,9 +213,8 @@ def _numbers(given: Any, name: str) -> Floats:
     return as_doubles(values)
 
 
-def _at_least_one(count: Any) -> int:
+def _at_least_one(count: int) -> int:
+    """Return the number of values per point."""
     if not 1 <= whole(count) <= _MANY:
-        raise PointCloudError(
-            f"{count!r} values per point were asked for. Use a whole number of at least 1, and at most {_MANY:,}."
-        )
+        raise PointCloudError(f"The number of values per point is {count!r}. Use a whole number from 1 to {_MANY:,}.")
     return int(count)

@@ -13,7 +13,7 @@ from ..types import Bools, Floats, Progress
 
 _ROUNDS = 20  # of Newton's method along a normal; a few are needed
 _MET = 1e-3  # spacings off the surface at which it is met
-_STEEP = 0.2  # least cosine between the normal and that of the surface that it meets: others graze it
+_STEEP = 0.2  # least cosine between the normal and that of the surface where it meets it: others graze it
 
 
 class Deviation(NamedTuple):
@@ -41,8 +41,8 @@ def surface_deviation(
 ) -> Deviation:
     """Measure how far points are from the surface of another cloud, along their normals.
 
-    Each normal is followed, both ways, to where it meets the surface that the other points lie on, between these: two
-    samples of one surface have no distance, wherever their points lie.
+    Each normal is followed in both directions to where it meets the surface through the other points, also between
+    these: two samples of one surface have no distance, wherever their points lie.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def surface_deviation(
     Raises
     ------
     InvalidPointsError
-        Points or normals of a wrong shape, not finite, or normals of no length.
+        Points or normals of a wrong shape, not finite, or normals of zero length.
     PointCloudError
         A greatest distance that is not above zero.
 
@@ -88,7 +88,7 @@ def surface_deviation(
     True True
     """
     points = check_points(points)
-    normals = unit_normals(normals, len(points))
+    directions: Floats = unit_normals(normals, len(points))
     limit = np.inf if greatest is None else real(greatest)
     if not limit > 0.0:
         raise PointCloudError(f"The greatest distance is {greatest!r}. Use a number above zero.")
@@ -98,13 +98,15 @@ def surface_deviation(
     surface = ImplicitSurface(laplacian, unit)
     places = surface.scaled(points)
     nearest = surface.nearest(places)
-    distance = np.einsum("ij,ij->i", surface.points[nearest] - places, normals)
-    # Beyond this no surface is met: far off it, where all slopes are guesses, steps would grow without end.
+    distance = np.einsum("ij,ij->i", surface.points[nearest] - places, directions)
+    # Beyond this no surface is met: far off it, where slopes are extrapolated, steps would grow without bound.
     farthest = np.linalg.norm(places, axis=1) + 2.0 * np.linalg.norm(surface.points, axis=1).max()
     known, rows = np.zeros(len(points), dtype=bool), np.arange(len(points))
     for _ in range(_ROUNDS):
-        there = surface.heights(places[rows] + distance[rows, None] * normals[rows], lambda: report("Deviation", 0.8))
-        cosine = np.einsum("ij,ij->i", there.normal, normals[rows])
+        there = surface.heights(
+            places[rows] + distance[rows, None] * directions[rows], lambda: report("Deviation", 0.8)
+        )
+        cosine = np.einsum("ij,ij->i", there.normal, directions[rows])
         steep = np.abs(cosine) > _STEEP
         met = steep & (np.abs(there.height) < _MET)
         step = np.where(steep, -there.height / np.where(steep, cosine, 1.0), 0.0)

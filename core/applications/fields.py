@@ -1,8 +1,5 @@
 """Functions on the surface that solve Poisson's or Laplace's equation, with or without fixed values."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
@@ -17,7 +14,7 @@ from ..operator import LaplaceBeltrami, narrow_laplacian
 from ..types import Bools, Floats, Ints, Progress
 from .graph import coupled_components, mean_spacing
 
-_MEAN = 1e-2  # of the source's mean size: a larger mean is meant, a smaller one is left by the quadrature
+_MEAN = 1e-2  # of the source's mean size: a larger mean is intended, a smaller one is an error of the quadrature
 _DEEP = 0.6  # share of a point's weights that lead to fixed points, where it lies deep inside a set of them
 _NARROW = 60  # neighbours of the narrow operator: fewer are too noisy at random points, more leak more
 # Distances from thin sets, in units of h, between which the narrow operator gives way to the wide one.
@@ -72,12 +69,11 @@ def solve_poisson(
     Notes
     -----
     Without fixed points the solution is corrected for the kernel's width: of ``lambda = k^2 - mu2 h^2 k^4 / 8`` the
-    inverse is ``1 / k^2 + mu2 h^2 / 8``, so that ``mu2 h^2 / 8`` times the source is to be taken off.
+    inverse is ``1 / k^2 + mu2 h^2 / 8``, so that ``mu2 h^2 / 8`` times the source is subtracted.
 
     A set of fixed points may be any band, line, or single points. Values past the edge of a band continue those before
-    it in a straight line (as in Morris, Fox, Zhu, 1997), which makes weights across the edge larger: none becomes
-    negative, so that the maximum principle holds. Near sets thinner than the kernel, over which it would reach, the
-    operator goes over into a narrow one.
+    it linearly (as in Morris, Fox, Zhu, 1997), which makes weights across the edge larger: none becomes negative, so
+    that the maximum principle holds. Near sets thinner than the kernel the operator is blended with a narrow one.
 
     References
     ----------
@@ -188,7 +184,7 @@ def harmonic_field(
     return np.clip(result, values.min(), values.max())  # only rounding lies outside
 
 
-def read_values(fixed: Any, values: Any, count: int) -> tuple[Ints, Floats]:
+def read_values(fixed: ArrayLike | None, values: ArrayLike | None, count: int) -> tuple[Ints, Floats]:
     """Return fixed points as indices (k,) and their values (k,).
 
     Raises
@@ -214,7 +210,8 @@ def read_values(fixed: Any, values: Any, count: int) -> tuple[Ints, Floats]:
     return index, given[first]
 
 
-def _read_source(source: Any, count: int) -> Floats:
+def _read_source(source: ArrayLike, count: int) -> Floats:
+    """Return the values of the source, (n,)."""
     given = check_array(source, "Sources", [(), (count,)], f"Give one number for each of {count} points.", "biuf")
     given = np.broadcast_to(as_doubles(given), count)
     check_finite(given, "values of the source", "Replace them.")
@@ -229,7 +226,7 @@ def _means(areas: Floats, values: Floats, component: Ints, rows: Ints) -> Floats
 
 
 def _without_mean(areas: Floats, source: Floats, component: Ints, rows: Ints) -> Floats:
-    """Take the mean out of the source on components that nothing holds, or raise if there is one."""
+    """Subtract the mean of the source on components without fixed points, or raise if it is not small."""
     mean, size = (_means(areas, values, component, rows) for values in (source, np.abs(source)))
     wrong = np.flatnonzero(np.abs(mean) > _MEAN * size)
     if len(wrong):
@@ -244,9 +241,9 @@ def _without_mean(areas: Floats, source: Floats, component: Ints, rows: Ints) ->
 
 
 def _with_fixed_points(
-    laplacian: LaplaceBeltrami, fixed: Bools, values: Floats, free: Ints, report: Callable[..., Any]
+    laplacian: LaplaceBeltrami, fixed: Bools, values: Floats, free: Ints, report: Progress
 ) -> tuple[sparse.csr_array, Floats]:
-    """Return the stiffness of the free points, (k, k), and the load, (k,), that the fixed ones are to them."""
+    """Return the stiffness of the free points, (k, k), and the load on them by the fixed ones, (k,)."""
     report("Equations", 0.1)
     spacing = mean_spacing(laplacian)
     edge = _edge_distance(laplacian, fixed, spacing)
@@ -320,7 +317,7 @@ def _edge_distance(laplacian: LaplaceBeltrami, fixed: Bools, spacing: Floats) ->
 
 
 def _thick(laplacian: LaplaceBeltrami, fixed: Bools) -> Bools:
-    """Tell which fixed points belong to a set so thick that the kernel does not reach over it, (n,) bool."""
+    """Return which fixed points belong to a set thicker than the kernel, (n,) bool."""
     rows = np.flatnonzero(fixed)
     weights = -laplacian.stiffness[rows][:, np.flatnonzero(~fixed)]
     deep = weights.sum(axis=1) < (1.0 - _DEEP) * laplacian.stiffness.diagonal()[rows]

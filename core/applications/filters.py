@@ -1,9 +1,8 @@
-"""Filters of functions on the points by the frequencies they are made of (section 4 of the paper, Figure 12)."""
+"""Filters of functions on the points by frequency (section 4 of the paper, Figure 12)."""
 
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,20 +10,20 @@ from scipy.fft import dct
 from scipy.special import expit
 
 from ..algebra import Rows, chebyshev_terms, largest_eigenvalue
-from ..arguments import as_array, check_switches, real, whole
-from ..errors import InvalidPointsError, PointCloudError
+from ..arguments import as_doubles, check_array, check_finite, check_switches, real, whole
+from ..errors import PointCloudError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
 from ..operator import LaplaceBeltrami, Spectrum, symmetric_form
 from ..types import Floats, Ints, Progress, Response
 
-_NODES = 4096  # at which a response is read
+_NODES = 4096  # at which a response is evaluated
 _DEGREE = 800  # of a polynomial, at most
-_ROUGH = 0.02  # largest error of a response, as a share of its largest value, that is taken at that degree
+_ROUGH = 0.02  # largest error of a response, as a share of its largest value, that is accepted at that degree
 _ZERO = 1e-8  # eigenvalues below this share of 4 pi / area belong to constants
 
 
-def exponential(time: float) -> Callable[..., Any]:
+def exponential(time: float) -> Response:
     """Return the response ``exp(-time * eigenvalue)``: the flow of heat for that time.
 
     Parameters
@@ -48,15 +47,15 @@ def exponential(time: float) -> Callable[..., Any]:
     return lambda eigenvalues: np.exp(-number * np.asarray(eigenvalues))
 
 
-def fairing(time: float, order: int = 3) -> Callable[..., Any]:
+def fairing(time: float, order: int = 3) -> Response:
     """Return the response ``1 / (1 + (time * eigenvalue)^order)`` of an implicit step of fairing.
 
     Parameters
     ----------
     time : float
-        [L^2], not negative. What has a wavelength of ``2 pi sqrt(time)`` is halved.
+        [L^2], not negative. Details of a wavelength of ``2 pi sqrt(time)`` are halved.
     order : int
-        1 for the flow of heat, 2 or 3 for a sharper line between what stays and what goes.
+        1 for the flow of heat, 2 or 3 for a sharper cutoff.
 
     Returns
     -------
@@ -76,7 +75,7 @@ def fairing(time: float, order: int = 3) -> Callable[..., Any]:
     return lambda eigenvalues: 1.0 / (1.0 + (number * np.asarray(eigenvalues)) ** power)
 
 
-def band(low: float, high: float = np.inf, *, softness: float = 0.1) -> Callable[..., Any]:
+def band(low: float, high: float = np.inf, *, softness: float = 0.1) -> Response:
     """Return the response that keeps the eigenvalues from low to high and fades out on both sides.
 
     Parameters
@@ -85,8 +84,8 @@ def band(low: float, high: float = np.inf, *, softness: float = 0.1) -> Callable
         Eigenvalues [1 / L^2] at which the response is one half. A wavelength w has the eigenvalue ``(2 pi / w)^2``;
         low = 0 keeps all below high, high = infinity all above low.
     softness : float
-        Relative width of the fade in frequency, the root of the eigenvalue. A small one asks `chebyshev_filter` for
-        many products.
+        Relative width of the fade in frequency, the root of the eigenvalue. The smaller, the more products
+        `chebyshev_filter` needs.
 
     Returns
     -------
@@ -116,15 +115,15 @@ def band(low: float, high: float = np.inf, *, softness: float = 0.1) -> Callable
     return respond
 
 
-def boost(gain: float, low: float, high: float = np.inf, *, softness: float = 0.25) -> Callable[..., Any]:
-    """Return the response that multiplies the details of a `band` by a gain and keeps all else.
+def boost(gain: float, low: float, high: float = np.inf, *, softness: float = 0.25) -> Response:
+    """Return the response that multiplies the details of a `band` by a gain and leaves others unchanged.
 
     Parameters
     ----------
     gain : float
         Above 1 for stronger details, below for weaker ones.
     low, high, softness : float
-        As for `band`. With an infinite high, noise grows as well.
+        As for `band`. With an infinite high, noise is amplified as well.
 
     Returns
     -------
@@ -139,8 +138,8 @@ def boost(gain: float, low: float, high: float = np.inf, *, softness: float = 0.
     factor = real(gain)
     if not np.isfinite(factor):
         raise PointCloudError(f"The gain of the details is {gain!r}. Use a finite number.")
-    part = band(low, high, softness=softness)
-    return lambda eigenvalues: 1.0 + (factor - 1.0) * part(eigenvalues)
+    inside = band(low, high, softness=softness)
+    return lambda eigenvalues: 1.0 + (factor - 1.0) * np.asarray(inside(eigenvalues))
 
 
 def spectral_filter(
@@ -160,7 +159,7 @@ def spectral_filter(
         A whole number m keeps the first m modes and drops the others; the cost follows m. A callable maps an array of
         eigenvalues [1 / L^2] to the factors of their modes.
     rest : float
-        Factor of what the spectrum does not hold; 1 keeps the details.
+        Factor of the residual outside the span of the modes; 1 keeps the details.
 
     Returns
     -------
@@ -202,9 +201,7 @@ def spectral_filter(
     """
     n, count = spectrum.eigenvectors.shape
     values = check_values(values, n)
-    areas = check_values(areas, n)
-    if areas.ndim != 1:
-        raise InvalidPointsError(f"Areas have the shape {areas.shape}. Give one area for each of the {n} points.")
+    areas = check_values(areas, n, columns=False)
     kept = real(rest)
     if not np.isfinite(kept):
         raise PointCloudError(f"The factor of the rest is {rest!r}. Use a finite number.")
@@ -225,7 +222,7 @@ def spectral_filter(
 def chebyshev_filter(
     laplacian: LaplaceBeltrami,
     values: ArrayLike,
-    response: Callable[..., Any],
+    response: Response,
     *,
     dirichlet: bool = False,
     raw: bool = False,
@@ -246,20 +243,18 @@ def chebyshev_filter(
         Maps an array of eigenvalues [1 / L^2] to factors. It should be smooth: the more abrupt, the more products with
         the operator.
     dirichlet : bool
-        Take the functions to vanish at the boundary (Dirichlet), instead of meeting it level (Neumann).
+        Assume that the functions vanish at the boundary (Dirichlet), instead of their normal derivatives (Neumann).
     raw : bool
         Leave out the symbol correction.
     tolerance : float
-        Largest error of a factor, as a share of the largest one. A response with kinks may be met less closely, within
-        2 percent.
+        Largest error of a factor, as a share of the largest one. For a response with kinks it may be up to 2 percent.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
     Returns
     -------
     ndarray
-        Same shape as the values. Points that the operator leaves out count as constants of their own: their values are
-        multiplied by ``response(0)``.
+        Same shape as the values. Values of points that the operator leaves out are multiplied by ``response(0)``.
 
     Raises
     ------
@@ -276,14 +271,14 @@ def chebyshev_filter(
         raise PointCloudError(f"The tolerance of a filter is {tolerance!r}. Use a number that is not negative.")
     done = 0.0
 
-    def tell() -> None:
+    def report_done() -> None:
         report("Filter", done)
 
-    tell()
+    report_done()
     columns = values.reshape(len(values), -1)
     filtered = respond(response, np.zeros(1))[0] * columns
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        order, root, multiply = corrected_operator(laplacian, dirichlet, raw, pool, tell)
+        order, root, multiply = corrected_operator(laplacian, dirichlet, raw, pool, report_done)
         top = largest_eigenvalue(lambda y: multiply(y[:, None])[:, 0], len(order))
         coefficients = _polynomial(response, top, largest)
         start = columns[order] / root[:, None]
@@ -297,8 +292,8 @@ def chebyshev_filter(
 
 
 def corrected_operator(
-    laplacian: LaplaceBeltrami, dirichlet: bool, raw: bool, pool: Any, report: Callable[..., Any]
-) -> tuple[Ints, Floats, Callable[..., Any]]:
+    laplacian: LaplaceBeltrami, dirichlet: bool, raw: bool, pool: ThreadPoolExecutor, report: Callable[[], None]
+) -> tuple[Ints, Floats, Callable[[Floats], Floats]]:
     """Return the negated operator with the symbol correction as a product with a symmetric matrix, on all cores.
 
     Returns
@@ -322,7 +317,7 @@ def corrected_operator(
     return order, root, multiply
 
 
-def _polynomial(response: Callable[..., Any], top: float, tolerance: float) -> Floats:
+def _polynomial(response: Response, top: float, tolerance: float) -> Floats:
     """Return the Chebyshev coefficients of a response over [0, top], as many as the tolerance needs."""
     angle = np.pi * (np.arange(_NODES) + 0.5) / _NODES
     factors = respond(response, 0.5 * top * (1.0 + np.cos(angle)))
@@ -337,42 +332,33 @@ def _polynomial(response: Callable[..., Any], top: float, tolerance: float) -> F
     error = np.abs(np.polynomial.chebyshev.chebval(np.cos(angle), coefficients) - factors).max()
     if error > _ROUGH * largest:
         raise PointCloudError(
-            f"The response changes too abruptly for a polynomial: at degree {_DEGREE} it is off by"
+            f"The response changes too abruptly for a polynomial: at degree {_DEGREE} its error is"
             f" {error / largest:.0%}. Soften it, or compute a spectrum first."
         )
     return coefficients
 
 
-def respond(response: Callable[..., Any], eigenvalues: Floats) -> Floats:
+def respond(response: Response, eigenvalues: Floats) -> Floats:
     """Return a response's factors for eigenvalues, (m,), after a check."""
-    factors = as_array(response(eigenvalues), "Responses")
-    if factors.shape not in ((), eigenvalues.shape) or factors.dtype.kind not in "iufb":
-        raise PointCloudError(
-            f"The response gives an array of shape {factors.shape} and type {factors.dtype} for"
-            f" {len(eigenvalues)} eigenvalues. Let it return one real number for each."
-        )
-    factors = np.broadcast_to(factors, eigenvalues.shape).astype(np.float64)
-    bad = ~np.isfinite(factors)
-    if bad.any():
-        raise PointCloudError(
-            f"The response is not finite for {np.count_nonzero(bad)} of {len(bad)} eigenvalues, the first of"
-            f" them {eigenvalues[bad].min():.3g}. Let it return finite numbers from zero up."
-        )
+    advice = f"Let the response return one finite number for each of {len(eigenvalues)} eigenvalues from zero up."
+    factors = check_array(response(eigenvalues), "Values of the response", [(), eigenvalues.shape], advice, "iufb")
+    factors = np.broadcast_to(as_doubles(factors), eigenvalues.shape)
+    check_finite(factors, "values of the response", advice)
     return factors
 
 
-def check_modes(count: Any, spectrum: Spectrum, areas: Floats) -> int:
+def check_modes(count: int, spectrum: Spectrum, areas: Floats) -> int:
     """Check a number of modes to keep and return it as an integer."""
-    held = len(spectrum.eigenvalues)
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= held:
+    available = len(spectrum.eigenvalues)
+    if not 1 <= whole(count) <= available:
         raise PointCloudError(
-            f"The first {count!r} modes were to be kept, and the spectrum holds {held}. Use a whole number from"
-            f" 1 to {held}, or compute more modes."
+            f"The number of modes to keep is {count!r}, and the spectrum has {available}. Use a whole number from"
+            f" 1 to {available}, or compute more modes."
         )
     constant = int(np.count_nonzero(spectrum.eigenvalues < _ZERO * 4.0 * np.pi / areas.sum()))
     if count < constant:
         raise PointCloudError(
-            f"The first {constant} modes are the constants of as many components, and {count} of them cannot"
-            f" be chosen. Keep at least {constant} modes."
+            f"The first {constant} modes are the constants of as many components, so {count} are too few. Keep at"
+            f" least {constant} modes."
         )
     return int(count)

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,11 +18,11 @@ from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
 from .graph import mean_spacing
 
-_BEND = 0.35  # sine of half the angle between two normals, at most, at which an arc is a good guess of the way
-_SQUARE = 0.1  # cosine of two normals below which they stand at a right angle
+_CURVED = 0.35  # sine of half the angle between two normals, at most, at which an arc is close to the geodesic
+_SQUARE = 0.1  # cosine of two normals below which they are nearly perpendicular
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
-_WITHIN = (1.5, 6.0, np.inf)  # times the straight distance: how far a way between two points is looked for, in turn
-_GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point: the surface is there
+_WITHIN = (1.5, 6.0, np.inf)  # straight distances within which a path between two points is searched, one by one
+_GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point, if a surface is there
 
 
 def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Floats:
@@ -58,8 +57,8 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
     The shortest path (Dijkstra, 1959) over all pairs of the operator, each as long as the circular arc through both
     points with their normals. A path may choose among the 40 to 120 neighbours within the kernel, which do not
     couple different sheets, so that it is hardly longer than the true one: by 0.06 to 0.2 % on the unit sphere with
-    8,000 points, where the heat method (Crane, Weischedel, Wardetzky, 2013) on the same operator is off by 0.2 to
-    0.4 % from one source, and by 4 % from five, because it smooths the ridges where the ways from two sources meet.
+    8,000 points, where the heat method (Crane, Weischedel, Wardetzky, 2013) on the same operator has errors of 0.2 to
+    0.4 % from one source, and of 4 % from five, because it smooths the ridges where paths from two sources meet.
 
     Examples
     --------
@@ -78,7 +77,7 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
 
 
 class Geodesics:
-    """Distances along a surface from several sets of points, each of which then takes a few tenths of the time.
+    """Distances along a surface from several sets of points: lengths of edges are computed once.
 
     Parameters
     ----------
@@ -138,7 +137,7 @@ class Geodesics:
         return result
 
     def nearest_source(self, sources: ArrayLike, *, progress: Progress | None = None) -> Ints:
-        """Tell which of some points is nearest; see `nearest_source`.
+        """Find the nearest of some points; see `nearest_source`.
 
         Parameters
         ----------
@@ -150,7 +149,7 @@ class Geodesics:
         Returns
         -------
         ndarray, (n,) int
-            Place of the nearest source among the sources; -1 on components without one and at points left out.
+            Index of the nearest source among the sources; -1 on components without one and at points left out.
 
         Raises
         ------
@@ -159,7 +158,7 @@ class Geodesics:
         """
         known = _known_sources(self._laplacian, sources)[1]
         index = as_indices(sources, len(self._laplacian.points), "sources")
-        label = np.full(len(self._laplacian.points) + 1, -1)  # one more for points that nothing reaches
+        label = np.full(len(self._laplacian.points) + 1, -1)  # one more for points without a path to a source
         label[index] = np.arange(len(index))
         if progress is not None:
             progress("Distance", 0.5)
@@ -194,11 +193,11 @@ class Geodesics:
         given = as_indices(curve, count, "points of the curve")
         _check_curve(laplacian, given)
         report = progress or (lambda stage, fraction: None)
-        way = self._way(given, closed, lambda done: report("Curve", 0.5 * done))
+        path = self._path(given, closed, lambda done: report("Curve", 0.5 * done))
         report("Distance", 0.5)
-        band, away, side = self._beside(way)
+        band, away, side = self._beside(path)
         lengths = np.maximum(away, 1e-300)
-        pairs = self._graph  # and one more point, from which the ways to the band start
+        pairs = self._graph  # and one more point, from which the paths to the band start
         graph = sparse.csr_array(
             (
                 np.concatenate([pairs.data, lengths]),
@@ -208,28 +207,28 @@ class Geodesics:
             shape=(count + 1, count + 1),
         )
         distance, before = dijkstra(graph, indices=count, return_predecessors=True)
-        # The side on which a way leaves the curve is that of all of it.
+        # The side on which a path leaves the curve is that of all its points.
         root = np.where((before == count) | (before < 0), np.arange(count + 1), before)
         while np.any(root != root[root]):
             root = root[root]
         sides = np.ones(count + 1)
         sides[band] = side
         result = np.where(np.isfinite(distance), sides[root] * distance, np.inf)[:count]
-        result[way] = 0.0
+        result[path] = 0.0
         return result
 
-    def _way(self, curve: Ints, closed: bool, report: Callable[..., Any]) -> Ints:
-        """Join points by shortest ways, and return all points of these in their order, (m,), the first one twice."""
+    def _path(self, curve: Ints, closed: bool, report: Callable[[float], None]) -> Ints:
+        """Join points by shortest paths, and return all points of these in their order, (m,), the first one twice."""
         ends = np.append(curve, curve[0]) if closed else curve
         points = self._laplacian.surface_points
-        pieces: list[Any] = [ends[:1]]
+        path = [int(ends[0])]
         for number, (first, last) in enumerate(pairwise(ends)):
             report(number / len(ends))
             row = self._graph.indices[self._graph.indptr[first] : self._graph.indptr[first + 1]]
             if last in row:
-                pieces.append([last])
+                path.append(last)
                 continue
-            # Points farther away than the end do not matter; how far that is along the surface is not known yet.
+            # Points farther away than the end do not matter; its distance along the surface is not known yet.
             apart = max(float(np.linalg.norm(points[last] - points[first])), 1e-300)
             for times in _WITHIN:
                 before = dijkstra(self._graph, indices=first, return_predecessors=True, limit=times * apart)[1]
@@ -237,49 +236,49 @@ class Geodesics:
                     break
             else:
                 raise InvalidPointsError(
-                    f"No way along the surface joins the points {first} and {last} of the curve. Leave one of them out."
+                    f"No path along the surface connects the points {first} and {last} of the curve. Leave one out."
                 )
-            piece = [last]
-            while before[piece[-1]] != first:
-                piece.append(before[piece[-1]])
-            pieces.append(piece[::-1])
-        return np.concatenate(pieces)
+            backwards = [last]
+            while before[backwards[-1]] != first:
+                backwards.append(before[backwards[-1]])
+            path += backwards[::-1]
+        return np.array(path)
 
-    def _beside(self, way: Ints) -> tuple[Ints, Floats, Floats]:
+    def _beside(self, path: Ints) -> tuple[Ints, Floats, Floats]:
         """Return the points near a polygon, (b,), how far away they are, and on which side, 1 or -1."""
         points, normals = self._laplacian.surface_points, self._laplacian.normals
-        # Each point of the way ends a segment before it and one after it; at the ends of an open way one of them.
-        chord = np.diff(points[way], axis=0)
-        left = np.cross(normals[way[:-1]], chord)
+        # Each point of the path ends a segment before it and one after it; at the ends of an open path one of them.
+        chord = np.diff(points[path], axis=0)
+        left = np.cross(normals[path[:-1]], chord)
         left /= np.maximum(np.linalg.norm(left, axis=1), 1e-300)[:, None]
-        corner = np.zeros((len(way), 3))
+        corner = np.zeros((len(path), 3))
         corner[:-1] += left
         corner[1:] += left
-        if way[0] == way[-1]:
+        if path[0] == path[-1]:
             corner[[0, -1]] = left[0] + left[-1]
-        near = self._graph[way].tocoo()
-        arc = near.data / np.maximum(np.linalg.norm(points[near.col] - points[way[near.row]], axis=1), 1e-300)
+        near = self._graph[path].tocoo()
+        arc = near.data / np.maximum(np.linalg.norm(points[near.col] - points[path[near.row]], axis=1), 1e-300)
         found = []
         for segment, kept in ((near.row, near.row < len(chord)), (near.row - 1, near.row > 0)):
             segment, point = segment[kept], near.col[kept]
-            offset = points[point] - points[way[segment]]
+            offset = points[point] - points[path[segment]]
             along = np.einsum("ij,ij->i", offset, chord[segment]) / np.einsum("ij,ij->i", *(chord[segment],) * 2)
             foot = np.clip(along, 0.0, 1.0)
             offset -= foot[:, None] * chord[segment]
             across = np.where(
                 ((along > 0.0) & (along < 1.0))[:, None], left[segment], corner[segment + (along >= 1.0)]
-            )  # at a corner the mean of both sides tells the side (Baerentzen, Aanaes, 2005)
+            )  # at a corner the mean of both normals decides the side (Baerentzen, Aanaes, 2005)
             away = np.linalg.norm(offset, axis=1) * arc[kept]
             found.append((point, away, np.where(np.einsum("ij,ij->i", offset, across) < 0.0, -1.0, 1.0)))
         point, away, side = (np.concatenate(values) for values in zip(*found, strict=True))
         order = np.lexsort((away, point))
-        order = order[~np.isin(point[order], way)]
+        order = order[~np.isin(point[order], path)]
         band, first = np.unique(point[order], return_index=True)
         return band, away[order][first], side[order][first]
 
 
 def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Ints:
-    """Tell which of some points is nearest along the surface: Voronoi cells.
+    """Find the nearest of some points along the surface: geodesic Voronoi cells.
 
     Parameters
     ----------
@@ -293,7 +292,7 @@ def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: 
     Returns
     -------
     ndarray, (n,) int
-        Place of the nearest source among the sources, from 0; -1 on components without one and at points left out.
+        Index of the nearest source among the sources, from 0; -1 on components without one and at points left out.
 
     Raises
     ------
@@ -302,7 +301,7 @@ def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: 
 
     See Also
     --------
-    geodesic_distance : How far it is.
+    geodesic_distance : The distance to it.
 
     Examples
     --------
@@ -331,7 +330,7 @@ def signed_distance(
         Of n points.
     curve : array_like, (k,) int
         The points of the curve in their order, at least two. Points that are not neighbours are joined by the shortest
-        way between them.
+        path between them.
     closed : bool
         Whether the last point is joined with the first.
     progress : callable, optional
@@ -340,9 +339,8 @@ def signed_distance(
     Returns
     -------
     ndarray, (n,)
-        Distances [L], zero on the curve; left is seen from where the normals point to. Beyond the ends of an open
-        curve the sign goes by its straight continuation near the end. Infinity on other components and at points left
-        out.
+        Distances [L], zero on the curve; left as seen against the normals. Beyond the ends of an open curve the sign is
+        that from its straight continuation near the end. Infinity on other components and at points left out.
 
     Raises
     ------
@@ -355,8 +353,8 @@ def signed_distance(
 
     Notes
     -----
-    Within the kernel's reach of the curve, distance and side are those from its segments; from there on the distance is
-    that of the shortest path (see `geodesic_distance`), and the side that on which the path left the curve.
+    Within the kernel's radius of the curve, distance and side are those from its segments; beyond, the distance is that
+    of the shortest path (see `geodesic_distance`), and the side that on which the path left the curve.
 
     Examples
     --------
@@ -375,29 +373,29 @@ def signed_distance(
 
 def _check_curve(laplacian: LaplaceBeltrami, curve: Ints) -> None:
     """Refuse a curve that does not lie on one component."""
-    part = laplacian.component[curve]
-    if len(curve) < 2 or part.min() < 0 or part.min() != part.max():
+    component = laplacian.component[curve]
+    if len(curve) < 2 or component.min() < 0 or component.min() != component.max():
         raise InvalidPointsError(
-            f"The curve has {len(curve)} points, {np.count_nonzero(part < 0)} of them left out of the operator, on"
-            f" {len(np.unique(part[part >= 0]))} components. Give at least two points of one component."
+            f"The curve has {len(curve)} points, {np.count_nonzero(component < 0)} of them left out of the operator, on"
+            f" {len(np.unique(component[component >= 0]))} components. Give at least two points of one component."
         )
 
 
-def _known_sources(laplacian: LaplaceBeltrami, sources: Any) -> tuple[Bools, Ints]:
-    """Return the mask of the sources, (n,) bool, and those of them that the operator has."""
+def _known_sources(laplacian: LaplaceBeltrami, sources: ArrayLike) -> tuple[Bools, Ints]:
+    """Return the mask of the sources, (n,) bool, and those of them that the operator does not leave out."""
     chosen = as_mask(sources, len(laplacian.points))
     if not chosen.any():
         raise InvalidPointsError("There are no sources to measure distances from. Choose at least one point.")
     known = np.flatnonzero(chosen & (laplacian.component >= 0))
     if not len(known):
         raise InvalidPointsError(
-            f"All {np.count_nonzero(chosen)} sources are points that the operator left out, because they lie"
-            " apart from the surface. Choose points of the surface."
+            f"All {np.count_nonzero(chosen)} sources are points that the operator left out, because they are"
+            " outliers. Choose points of the surface."
         )
     return chosen, known
 
 
-def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[..., Any]) -> sparse.csr_array:
+def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[[], None]) -> sparse.csr_array:
     """Return the symmetric (n, n) CSR matrix of the lengths of all pairs of the operator."""
     stiffness, points = laplacian.stiffness, laplacian.surface_points
     count = len(points)
@@ -410,29 +408,29 @@ def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[..., Any]) ->
     tree = cKDTree(points[laplacian.component >= 0])
     places, normals = points.T.copy(), laplacian.normals.T.copy()
 
-    def measure(block: Any) -> None:
+    def measure(block: slice) -> None:
         i, j = first[block], second[block]
         one, other = (partial(np.take, indices=end, axis=1) for end in (i, j))
         chord, left, right, cosine = pair_heights(one, other, places, normals)
         length = np.linalg.norm(chord, axis=0)
-        turn = np.abs(np.where(cosine < 0.0, -right, right) - left)
-        # Which way normals face each other across a right angle is chance: it bends, either way.
-        turn = np.where(np.abs(cosine) < _SQUARE, np.maximum(turn, np.abs(left) + np.abs(right)), turn)
-        bend = np.minimum(0.5 * turn / np.maximum(length, 1e-300), 1.0)
-        arcs[block] = circle_arc(length, bend)
+        rise = np.abs(np.where(cosine < 0.0, -right, right) - left)
+        # The relative sign of nearly perpendicular normals is arbitrary: assume the more curved arc.
+        rise = np.where(np.abs(cosine) < _SQUARE, np.maximum(rise, np.abs(left) + np.abs(right)), rise)
+        sine = np.minimum(0.5 * rise / np.maximum(length, 1e-300), 1.0)
+        arcs[block] = circle_arc(length, sine)
         short = length < 0.5 * (laplacian.smoothing_lengths[i] + laplacian.smoothing_lengths[j])
-        kept[block] = short | (bend < _BEND)
-        # The straight way between two points near a boundary may lead through a hole or past a bay.
+        kept[block] = short | (sine < _CURVED)
+        # The straight segment between two points near a boundary may cross a hole or a bay.
         doubtful = np.flatnonzero(kept[block] & laplacian.near_boundary[i] & laplacian.near_boundary[j] & ~short)
         middle = 0.5 * (points[i[doubtful]] + points[j[doubtful]])
-        height = 0.25 * length[doubtful] * bend[doubtful]
-        reach = _GAP * 0.5 * (spacing[i[doubtful]] + spacing[j[doubtful]]) + height
-        kept[block.start + doubtful] = tree.query(middle)[0] < reach
+        height = 0.25 * length[doubtful] * sine[doubtful]
+        radius = _GAP * 0.5 * (spacing[i[doubtful]] + spacing[j[doubtful]]) + height
+        kept[block.start + doubtful] = tree.query(middle)[0] < radius
 
     on_all_cores(measure, blocks(len(first), _BLOCK), report)
-    arcs = np.maximum(arcs, 1e-300)  # points at one place are neighbours too
+    arcs = np.maximum(arcs, 1e-300)  # coincident points are neighbours too
 
-    def upper(chosen: Any) -> sparse.csr_array:
+    def upper(chosen: slice | Bools) -> sparse.csr_array:
         start = np.concatenate([[0], np.cumsum(np.bincount(first[chosen], minlength=count))])
         return sparse.csr_array((arcs[chosen], second[chosen], start.astype(np.int32)), shape=(count, count))
 
@@ -440,7 +438,7 @@ def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[..., Any]) ->
     if kept.all():
         half = upper(slice(None))
     else:
-        # On few points all the ways from one may bend too much: a poor way is better than none.
+        # On few points all arcs from one may be too curved: an inaccurate path is better than none.
         label = connected_components(upper(kept), directed=False)[1]
         kept |= label[first] != label[second]
         half = upper(kept)

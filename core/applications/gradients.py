@@ -1,14 +1,17 @@
-"""Deformation gradients: what a moved surface does to small steps around each of its points."""
+"""Deformation gradients: the linear maps of small steps around each point of a moved surface."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..algebra import rotations_in_groups
 from ..arguments import check_positions
 from ..geometry import frames
+from ..operator import LaplaceBeltrami
+from ..types import Bools, Floats
 
-_FAINT = 1e-3  # share of what its area asks below which a point counts as coupled to none
+_FAINT = 1e-3  # share of the sum of weights that its area implies below which a point counts as coupled to none
 _ROUND = 0.05  # share of the smaller extent of a neighbourhood, squared, in both: a half where it is round
 
 
@@ -25,7 +28,7 @@ class DeformationGradients:
     deformation_gradients : Does it once.
     """
 
-    def __init__(self, laplacian):
+    def __init__(self, laplacian: LaplaceBeltrami) -> None:
         self._count = len(laplacian.points)
         joined = coupled(laplacian)
         own, alone = np.flatnonzero(joined), np.flatnonzero(~joined)
@@ -46,18 +49,18 @@ class DeformationGradients:
         self._frames = np.ascontiguousarray(np.moveaxis(frames(laplacian.normals[own]), 0, 2))
         self._tangents = np.ascontiguousarray(self._frames[:, 1:])
 
-    def at(self, positions):
+    def at(self, positions: ArrayLike) -> Floats:
         """Return the gradients, (n, 3, 3), for the points after the deformation, (n, 3) [L]."""
         now = check_positions(positions, self._count, "points after the deformation", "point")
         if not len(self._own):
             return np.tile(np.eye(3), (self._count, 1, 1))
         now = now[self._own]
         after, before = sums_over_steps(self._products, now - now.mean(axis=0)), self._at_rest
-        turn = rotations_in_groups(after, self._component)
+        rotation = rotations_in_groups(after, self._component)
         spread = np.einsum("aan->n", before)
-        size = np.einsum("abn,abn->n", turn, after) / np.where(spread > 0.0, spread, 1.0)
-        alike = size * turn  # the similarity that fits best
-        # What is left of it along the surface: the linear fit in the tangent plane, to steps less those by similarity.
+        size = np.einsum("abn,abn->n", rotation, after) / np.where(spread > 0.0, spread, 1.0)
+        alike = size * rotation  # the similarity that fits best
+        # Its residual along the surface: the linear fit in the tangent plane, to steps less those by similarity.
         tangents = self._tangents
         left = np.einsum("abn,bcn->acn", after - np.einsum("abn,bcn->acn", alike, before), tangents)
         inner = np.einsum("abn,bdn->adn", np.einsum("ban,bcn->acn", tangents, before), tangents)
@@ -70,7 +73,7 @@ class DeformationGradients:
         return np.moveaxis(np.einsum("abn,cbn->acn", columns, self._frames), 2, 0)[self._near]
 
 
-def deformation_gradients(laplacian, positions):
+def deformation_gradients(laplacian: LaplaceBeltrami, positions: ArrayLike) -> Floats:
     """Find how a deformation maps small steps around each point.
 
     Parameters
@@ -83,9 +86,9 @@ def deformation_gradients(laplacian, positions):
     Returns
     -------
     ndarray, (n, 3, 3)
-        F, so that a step s along the surface becomes F s. Across the surface, of which points tell nothing, lengths
-        change by the square root of the change of the area, and the normal stays normal: a turn, a shift and a scale of
-        all points come out to round-off. Points that belong to no surface have the F of the nearest that does.
+        F, so that a step s along the surface becomes F s. Across the surface, which points do not determine, lengths
+        change by the square root of the change of the area, and the normal stays normal: rotations, shifts and scales
+        of all points are exact to round-off. Points on no surface have the F of the nearest that is.
 
     Raises
     ------
@@ -95,18 +98,18 @@ def deformation_gradients(laplacian, positions):
     See Also
     --------
     Deformer : Deforms a surface by its handles.
-    Splats.deformed : Carries ellipsoids along.
+    Splats.deformed : Deforms ellipsoids.
 
     Notes
     -----
     With S the sum of w (x_j - x_i)(p_j - p_i)^T, the similarity s R that fits the steps best has the polar factor R of
-    S; the linear fit in the tangent plane to what it leaves is added. The weights w are those of the stiffness, as far
-    as they are positive, by the squared lengths of the steps: heights above the tangent plane, which grow as these,
-    then weigh as in the operator, to which linear functions add up to zero, and do not pull at the fit.
+    S; the linear fit in the tangent plane to its residuals is added. The weights w are those of the stiffness, as far
+    as they are positive, divided by the squared lengths of the steps: heights above the tangent plane, which grow as
+    these, then weigh as in the operator, to which linear functions add up to zero, and do not bias the fit.
 
     Examples
     --------
-    A sphere that is stretched to twice its length along z: steps along its equator stay, those across it double.
+    A sphere stretched to twice its length along z: steps along its equator stay, those across it double.
 
     >>> import numpy as np
     >>> import core
@@ -120,12 +123,12 @@ def deformation_gradients(laplacian, positions):
     return DeformationGradients(laplacian).at(positions)
 
 
-def coupled(laplacian):
-    """Tell which points the operator couples to others, (n,) bool.
+def coupled(laplacian: LaplaceBeltrami) -> Bools:
+    """Return which points the operator couples to others, (n,) bool.
 
     On a surface the weights times the squared lengths of the steps add up to four times the area, for the Laplacian of
-    the squared distance is four. Points of which hardly anything of that is left, such as single ones far off the
-    surface, belong to a component by name only.
+    the squared distance is four. Points where that sum is far smaller, such as single ones far off the surface, belong
+    to a component by name only.
     """
     pairs = laplacian.stiffness.tocoo()
     step = laplacian.points[pairs.row] - laplacian.points[pairs.col]
@@ -134,7 +137,7 @@ def coupled(laplacian):
     return (laplacian.component >= 0) & (sums > _FAINT * 4.0 * laplacian.areas)
 
 
-def sums_over_steps(products, points):
+def sums_over_steps(products: sparse.csr_array, points: Floats) -> Floats:
     """Return the sums over neighbours of w_ij (x_j - x_i)(p_j - p_i)^T, (3, 3, m), p the points at rest.
 
     Parameters
@@ -148,7 +151,7 @@ def sums_over_steps(products, points):
     return np.array([(products @ column).reshape(3, -1) for column in np.ascontiguousarray(points.T)])
 
 
-def step_products(weights, rest):
+def step_products(weights: sparse.coo_array, rest: Floats) -> sparse.csr_array:
     """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_j - p_i)_c (x_j - x_i), for `sums_over_steps`.
 
     Parameters
@@ -159,17 +162,17 @@ def step_products(weights, rest):
         The points at rest, p.
     """
     step = rest[weights.col] - rest[weights.row]
-    parts = []
+    products = []
     for c in range(3):
         share = weights.data * step[:, c]
-        part = sparse.csr_array((share, (weights.row, weights.col)), shape=weights.shape)
+        product = sparse.csr_array((share, (weights.row, weights.col)), shape=weights.shape)
         own = np.bincount(weights.row, share, minlength=len(rest))
-        parts.append(part - sparse.diags_array(own, format="csr"))
-    return sparse.vstack(parts, format="csr")
+        products.append(product - sparse.diags_array(own, format="csr"))
+    return sparse.vstack(products, format="csr")
 
 
-def lifted_inverse(matrices, least=_ROUND):
-    """Return the inverses of symmetric matrices, (2, 2, m), lifted where steps lie in a row and tell nothing across."""
+def lifted_inverse(matrices: Floats, least: float = _ROUND) -> Floats:
+    """Return the inverses of symmetric matrices, (2, 2, m), regularized where steps lie in a row."""
     (a, b), (_, d) = matrices
     trace = a + d
     smaller = 0.5 * (trace - np.hypot(a - d, 2.0 * b))

@@ -11,21 +11,21 @@ from ..geometry import SMALLEST
 from ..operator import LaplaceBeltrami
 from ..types import Array, Bools, Floats, Ints
 
-_SEEN = 3  # times as many nearest points are looked at as are joined: those of close sheets are among them
+_SEEN = 3  # nearest points examined for each that is joined: those of close sheets are among them
 
 
 @dataclass(frozen=True)
 class NearGraph:
-    """Places of a cloud, joined to their nearest neighbours along the surface.
+    """Distinct positions of a cloud, joined to their nearest neighbours along the surface.
 
     Attributes
     ----------
     lengths : csr_array, (m, m)
-        Symmetric; distances of joined places [L], all positive. All places of a component hang together.
+        Symmetric; distances of joined positions [L], all positive. All positions of a component are connected.
     place : ndarray, (n,) int
-        Row of each of the caller's points, the same for points at the same place; -1 for points left out.
+        Row of each of the caller's points, the same for coincident points; -1 for points left out.
     first : ndarray, (m,) int
-        One of the caller's points at each place.
+        One of the caller's points at each position.
     """
 
     lengths: sparse.csr_array
@@ -33,7 +33,7 @@ class NearGraph:
     first: Ints
 
     def scatter(self, quantity: Array, neutral: bool | int) -> Array:
-        """Return a quantity of the places, (m,), for the caller's points; those left out get the neutral value."""
+        """Return a quantity of the rows, (m,), for the caller's points; those left out get the neutral value."""
         result = quantity[self.place]
         result[self.place < 0] = neutral
         return result
@@ -42,14 +42,14 @@ class NearGraph:
 def near_graph(laplacian: LaplaceBeltrami, count: int) -> NearGraph:
     """Join every point to its nearest ones among those that the operator couples it with.
 
-    The operator's pairs lie on one sheet of the surface, so the graph does not cross the gap between close sheets; and
-    it takes only the nearest of them, so that it does not leap over anything as narrow as the kernel is wide.
+    The operator's pairs lie on one sheet of the surface, so the graph does not cross the gap between close sheets; it
+    uses only the nearest of them, so that edges do not cross features narrower than the kernel.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
     count : int
-        Nearest neighbours of each point; all that are as far as the last one belong to them.
+        Nearest neighbours of each point; all at the distance of the last one are included.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def near_graph(laplacian: LaplaceBeltrami, count: int) -> NearGraph:
 
 
 def _coupled(stiffness: sparse.csr_array, first: Ints, index: Ints) -> Bools:
-    """Tell which of their neighbours, (m, k) int, the stiffness couples places with."""
+    """Return which of their neighbours, (m, k) int, the stiffness couples rows with."""
     row = np.repeat(first, index.shape[1])
     number = np.arange(1.0, index.size + 1.0)  # survives a product with the pattern of the stiffness
     numbers = sparse.csr_array((number, (row, first[index].ravel())), shape=stiffness.shape)
@@ -85,22 +85,22 @@ def _coupled(stiffness: sparse.csr_array, first: Ints, index: Ints) -> Bools:
 
 
 def _bridge(lengths: sparse.csr_array, points: Floats, component: Ints) -> sparse.csr_array:
-    """Join pieces of one component at their nearest points, so that it hangs together.
+    """Join disconnected subsets of each component at their nearest points.
 
     The stiffness leaves a point without pairs where no other one seems to lie on its sheet.
     """
-    piece = connected_components(lengths, directed=False)[1]
-    if piece.max() == component.max():
+    label = connected_components(lengths, directed=False)[1]
+    if label.max() == component.max():
         return lengths.tocsr()
-    size = np.bincount(piece)
+    size = np.bincount(label)
     ends = []
     for number in range(component.max() + 1):
-        pieces = np.unique(piece[component == number])
-        main = pieces[np.argmax(size[pieces])]
-        own = np.flatnonzero(piece == main)
+        labels = np.unique(label[component == number])
+        main = labels[np.argmax(size[labels])]
+        own = np.flatnonzero(label == main)
         tree = cKDTree(points[own])
-        for other in pieces[pieces != main]:
-            rows = np.flatnonzero(piece == other)
+        for other in labels[labels != main]:
+            rows = np.flatnonzero(label == other)
             distance, nearest = tree.query(points[rows])
             best = distance.argmin()
             ends.append((rows[best], own[nearest[best]], distance[best]))
@@ -113,7 +113,7 @@ def coupled_components(laplacian: LaplaceBeltrami) -> Ints:
     """Number the components of the cloud between which the operator couples no points, (n,) int.
 
     Those of fewer than 50 points are -1: points left out, and single ones within a component that are so far off
-    its surface that they lost all neighbours.
+    its surface that they have no neighbours.
     """
     count, label = connected_components(laplacian.stiffness, directed=False)
     large = np.bincount(label, minlength=count) >= SMALLEST

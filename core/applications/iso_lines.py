@@ -1,6 +1,7 @@
 """Lines on a mesh along which values are the same."""
 
-from typing import Any, NamedTuple
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,9 +21,9 @@ class IsoLine(NamedTuple):
     level : float
         These values.
     points : ndarray, (k, 3)
-        Corners of the line, one after the other [L].
+        Vertices of the line in their order [L].
     closed : bool
-        Whether it goes on from the last corner to the first.
+        Whether the last vertex is joined to the first.
     """
 
     level: float
@@ -36,22 +37,22 @@ def iso_lines(vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: 
     Parameters
     ----------
     vertices : array_like, (n, 3)
-        Places [L].
+        Coordinates [L].
     faces : array_like, (m, 3) or (m, 4) int
         Triangles or quads, by their vertices; quads count as two triangles.
     values : array_like, (n,)
-        Across triangles with one that is not finite there are no lines.
+        Triangles with one that is not finite have no lines.
     levels : array_like, (l,)
 
     Returns
     -------
     list of IsoLine
-        As long as they can be: they end at the boundary of the mesh, and where more than two faces meet, only.
+        Of maximal length: they end only at the boundary of the mesh, and where more than two faces meet.
 
     Raises
     ------
     PointCloudError
-        Arrays of wrong shapes or types, faces of vertices that are not there, or a level that is no number.
+        Arrays of wrong shapes or types, faces of vertices that do not exist, or a level that is not finite.
 
     See Also
     --------
@@ -73,12 +74,14 @@ def iso_lines(vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: 
     """
     vertices, triangles, values, levels = _checked(vertices, faces, values, levels)
     triangles = triangles[np.isfinite(values[triangles]).all(axis=1)]
-    parts = [_joined(vertices, values, level, _segments(triangles, values > level)) for level in levels]
-    return [line for part in parts for line in part]
+    lines = [_joined(vertices, values, level, _segments(triangles, values > level)) for level in levels]
+    return list(chain.from_iterable(lines))
 
 
-def _checked(vertices: Any, faces: Any, values: Any, levels: ArrayLike) -> tuple[Floats, Ints, Floats, list[Any]]:
-    """Return what `iso_lines` takes as arrays, with triangles for faces."""
+def _checked(
+    vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: ArrayLike
+) -> tuple[Floats, Ints, Floats, list[float]]:
+    """Return the arguments of `iso_lines` as arrays, with triangles for faces."""
     count = len(np.atleast_1d(as_array(vertices, "Vertices")))
     vertices = check_positions(vertices, count, "vertices", "vertex")
     faces = check_array(faces, "Faces", [(None, 3), (None, 4)], "Give three or four whole numbers for each.", "iu")
@@ -95,7 +98,7 @@ def _checked(vertices: Any, faces: Any, values: Any, levels: ArrayLike) -> tuple
 
 
 def _segments(triangles: Ints, above: Bools) -> Ints:
-    """Return the pieces of a line within triangles, (s, 2, 2) int: two edges each, given by their lower and upper end.
+    """Return the segments of a line within triangles, (s, 2, 2) int: two edges each, by their lower and upper end.
 
     An edge is cut where one end is above the level and the other one is not.
     """
@@ -107,20 +110,20 @@ def _segments(triangles: Ints, above: Bools) -> Ints:
 
 
 def _joined(vertices: Floats, values: Floats, level: float, segments: Ints) -> list[IsoLine]:
-    """Join pieces to lines."""
+    """Join segments to lines."""
     if not len(segments):
         return []
     count = len(vertices)
     key = segments[:, :, 0] * count + segments[:, :, 1]
     cuts, ends = np.unique(key, return_inverse=True)
     ends = ends.reshape(key.shape)
-    meeting = np.bincount(ends.ravel())[ends] > 2  # where faces meet that are more than two, each piece ends alone
+    meeting = np.bincount(ends.ravel())[ends] > 2  # where more than two faces meet, each segment ends alone
     ends[meeting] = len(cuts) + np.arange(np.count_nonzero(meeting))
     cuts = np.concatenate([cuts, key[meeting]])
     low, high = np.divmod(cuts, count)
     share = (level - values[low]) / (values[high] - values[low])
     places = vertices[low] + share[:, None] * (vertices[high] - vertices[low])
-    order, starts, closed = _walk(ends, len(cuts))
+    order, starts, closed = _ordered(ends, len(cuts))
     return [
         IsoLine(level, places[line], bool(loop))
         for line, loop in zip(np.split(order, starts[1:]), closed, strict=True)
@@ -128,8 +131,8 @@ def _joined(vertices: Floats, values: Floats, level: float, segments: Ints) -> l
     ]
 
 
-def _walk(ends: Ints, count: int) -> tuple[Ints, Ints, Bools]:
-    """Order cuts along the lines that pieces, (s, 2) pairs of cuts, make up.
+def _ordered(ends: Ints, count: int) -> tuple[Ints, Ints, Bools]:
+    """Order cuts along the lines that segments, (s, 2) pairs of cuts, form.
 
     Returns
     -------
@@ -140,14 +143,14 @@ def _walk(ends: Ints, count: int) -> tuple[Ints, Ints, Bools]:
     closed : ndarray, (l,) bool
     """
     used = np.unique(ends)
-    pieces = sparse.csr_array((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    segments = sparse.csr_array((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(count, count))
     degree = np.bincount(ends.ravel(), minlength=count)
-    _, line = connected_components(pieces, directed=False)
+    _, line = connected_components(segments, directed=False)
     line = np.unique(line[used], return_inverse=True)[1].reshape(-1)
     first = used[np.lexsort([degree[used], line])]  # of an open line one of its ends
     first = first[np.unique(np.sort(line), return_index=True)[1]]
-    # From one more place that leads to the first cut of each line, one after the other, all lines are walked along.
-    both = sparse.vstack([pieces + pieces.T, sparse.csr_array((1, count), dtype=bool)])
+    # A depth-first search from one more node, joined to the first cut of each line, visits line after line.
+    both = sparse.vstack([segments + segments.T, sparse.csr_array((1, count), dtype=bool)])
     both = sparse.hstack([both, sparse.csr_array((count + 1, 1), dtype=bool)], format="lil")
     both[count, first] = True
     order = depth_first_order(both.tocsr(), count, directed=True, return_predecessors=False)[1:]

@@ -1,4 +1,4 @@
-"""Modes of two frames of a sequence: which is which, with which sign, and turned how where eigenvalues coincide."""
+"""Modes of two frames of a sequence: their correspondence, signs, and rotations where eigenvalues coincide."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from ..arguments import as_array, real
+from ..arguments import real
 from ..errors import InvalidPointsError, PointCloudError
-from ..geometry import check_points
+from ..geometry import check_points, check_values
 from ..operator import Spectrum
 from ..types import Floats, Ints
 
@@ -22,7 +22,7 @@ class MatchedModes:
     ----------
     spectrum : Spectrum
         Mode k continues mode k of the frame before, so that eigenvalues need not ascend. Eigenvectors are orthonormal
-        for the areas. Where some were turned, their eigenvalues are the Rayleigh quotients. No residuals.
+        for the areas. Where some were rotated, their eigenvalues are the Rayleigh quotients. No residuals.
     overlaps : ndarray, (count,)
         Cosine of the angle between each mode and the one that it continues, -1 to 1. Small where a mode has left the
         computed ones, or the frames differ too much.
@@ -41,10 +41,10 @@ def match_modes(
     *,
     tolerance: float = 0.02,
 ) -> MatchedModes:
-    """Let the modes of a frame continue those of the frame before.
+    """Order the modes of a frame so that they continue those of the frame before.
 
-    Modes come with any sign, change places where eigenvalues cross, and are any basis of their space where eigenvalues
-    coincide. This gives them the order, signs and basis with which they overlap most with those of the frame before.
+    Modes have arbitrary signs, change order where eigenvalues cross, and are any basis of their space where eigenvalues
+    coincide. This gives them the order, signs and basis of largest overlap with those of the frame before.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def match_modes(
     points_before : array_like, (m, 3)
         Of the frame before [L], in any order.
     tolerance : float
-        Eigenvalues within this share of each other count as one: points do not tell them apart.
+        Eigenvalues within this share of each other count as one: points do not distinguish them.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def match_modes(
     Raises
     ------
     InvalidPointsError
-        Points that are no points, or sizes that do not fit each other.
+        Points or areas of a wrong shape or not finite, or modes of other points.
     PointCloudError
         Other numbers of modes, or a tolerance that is not from 0 to below 1.
 
@@ -81,7 +81,7 @@ def match_modes(
     Values are taken from the nearest point of the frame before: the surface should move by less between two frames than
     the modes are wide. A mode of this frame is weighed against each one before by its squared overlap, summed over all
     modes of the same eigenvalue, whose own basis thus does not matter; the assignment of the largest sum is taken [1]_,
-    and each such set is turned by the orthogonal Procrustes problem [2]_, which is the sign for a single mode.
+    and each such set is rotated by the orthogonal Procrustes problem [2]_, which is the sign for a single mode.
 
     References
     ----------
@@ -102,22 +102,17 @@ def match_modes(
     True
     """
     points, points_before = check_points(points), check_points(points_before)
-    areas = as_array(areas, "Areas")
+    areas = check_values(areas, len(points), columns=False)
     values, vectors = spectrum.eigenvalues, spectrum.eigenvectors
     count = len(values)
-    if areas.shape != (len(points),) or vectors.shape != (len(points), count):
-        raise InvalidPointsError(
-            f"{len(points)} points have areas of the shape {areas.shape} and modes of the shape {vectors.shape}. Give"
-            " areas and modes of the same frame as the points."
-        )
-    if len(spectrum_before.eigenvectors) != len(points_before):
-        raise InvalidPointsError(
-            f"The {len(points_before)} points before have modes of {len(spectrum_before.eigenvectors)} points. Give"
-            " points and modes of the same frame."
-        )
+    for frame, own, modes in (("The", points, vectors), ("The earlier", points_before, spectrum_before.eigenvectors)):
+        if len(own) != len(modes):
+            raise InvalidPointsError(
+                f"{frame} frame has {len(own)} points and modes of {len(modes)}. Give points and modes of one frame."
+            )
     if spectrum_before.eigenvectors.shape[1] != count:
         raise PointCloudError(
-            f"The frame has {count} modes, the one before {spectrum_before.eigenvectors.shape[1]}. Compute as many."
+            f"The frame has {count} modes, the earlier one {spectrum_before.eigenvectors.shape[1]}. Compute as many."
         )
     if not 0.0 <= real(tolerance) < 1.0:
         raise PointCloudError(f"The tolerance of eigenvalues is {tolerance!r}. Use a number from 0 to below 1.")
@@ -129,25 +124,24 @@ def match_modes(
     for group in groups:
         weights[group] = np.sum(overlaps[group] ** 2, axis=0)
     continues = linear_sum_assignment(weights, maximize=True)[1]
-    turn = np.zeros((count, count))
+    rotation = np.zeros((count, count))
     for group in groups:
         left, _, right = np.linalg.svd(overlaps[np.ix_(group, continues[group])])
-        turn[np.ix_(group, continues[group])] = left @ right
-    matched = vectors @ turn
-    return MatchedModes(Spectrum(values @ turn**2, matched), np.sum(turn * overlaps, axis=0))
+        rotation[np.ix_(group, continues[group])] = left @ right
+    return MatchedModes(Spectrum(values @ rotation**2, vectors @ rotation), np.sum(rotation * overlaps, axis=0))
 
 
 def _overlaps(vectors: Floats, areas: Floats, carried: Floats) -> Floats:
-    """Return the inner products of modes with those before, (count, count), by the length that these have here."""
+    """Return the inner products of modes with those before, (count, count), the latter normalized by these areas."""
     weighted = areas[:, None] * carried
     lengths = np.sqrt(np.sum(carried * weighted, axis=0))
     return vectors.T @ weighted / np.where(lengths > 0.0, lengths, 1.0)
 
 
 def _equal(values: Floats, tolerance: float) -> list[Ints]:
-    """Return sets of modes whose eigenvalues are as good as one, (g,) int each; they are cut at the widest gaps.
+    """Return sets of modes whose eigenvalues are nearly equal, (g,) int each; they are cut at the widest gaps.
 
-    Zeros, of which each component has one, are told from others by the mean distance of eigenvalues.
+    Zeros, of which each component has one, are distinguished from others by the mean distance of eigenvalues.
     """
     order = np.argsort(values, kind="stable")
     spacing = values[order[-1]] / len(values)

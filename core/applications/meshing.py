@@ -1,7 +1,7 @@
-"""A mesh of the surface that the points lie on: surface nets on a grid that is known near the points only."""
+"""A mesh of the surface that the points lie on: surface nets on a sparse grid near the points."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,15 +19,15 @@ from ..types import Bools, Floats, Ints, Progress
 from .sides import find_sides
 
 _BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
-_REACH = 3.0  # spacings along the surface that a point is known for: wider gaps are holes
-_COVERED = 1.5  # voxels between a point and the next cut: a mesh passes there
+_REACH = 3.0  # spacings along the surface around a point: wider gaps are holes
+_COVERED = 1.5  # voxels between a point and the next cut, at most, where a mesh passes
 _BARE = 0.05  # share of the points that may stay without a mesh; less than 0.002 do where sides are found
-_ROUNDS = 2  # of moving vertices onto the surface, after which they are a thousandth of a voxel off
-_FRAGMENT = 20.0  # cells of points that a piece of the mesh covers at least: fewer points make no surface
-_FEWEST = 20  # faces of a mesh that is no shapeless lump
-_CANDIDATES = 1 << 20  # corners of the grid looked at at one time
-_BYTES = 1200  # of each place where a voxel of the grid meets the surface, at the peak
-_SHARE = 0.8  # of the free memory, for what else goes on meanwhile
+_ROUNDS = 2  # of moving vertices onto the surface, after which errors are a thousandth of a voxel
+_FRAGMENT = 20.0  # Voronoi cells that a component of the mesh covers at least: smaller ones are left out
+_FEWEST = 20  # faces of a mesh
+_CANDIDATES = 1 << 20  # corners of the grid examined at one time
+_BYTES = 1200  # of memory for each voxel of the grid that meets the surface, at the peak
+_SHARE = 0.8  # of the free memory, which other programs need as well
 
 
 class SurfaceMesh(NamedTuple):
@@ -36,9 +36,9 @@ class SurfaceMesh(NamedTuple):
     Attributes
     ----------
     vertices : ndarray, (m, 3)
-        Places on the surface [L].
+        Positions on the surface [L].
     faces : ndarray, (q, 4) int
-        Quads, by their vertices: counterclockwise as the normals see them.
+        Quads, by their vertices: counterclockwise as seen against the normals.
     """
 
     vertices: Floats
@@ -48,8 +48,8 @@ class SurfaceMesh(NamedTuple):
 def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: Progress | None = None) -> SurfaceMesh:
     """Make a mesh of the surface that the points lie on.
 
-    Quadrics of near points tell how far the corners of a regular grid are from the surface, in a narrow band around
-    it, and which of them are on the same side: normals of wrong signs do no harm. Each voxel that the surface cuts gets
+    Quadrics of near points give the distance of corners of a regular grid from the surface, in a narrow band around
+    it, and which of them are on the same side: signs of normals do not matter. Each voxel that the surface cuts gets
     a vertex and each cut edge a quad (surface nets); the vertices are then moved onto the surface, to which they are as
     close as the quadrics: an error of third order in the spacing. Where the points end, at a boundary or at gaps of
     several spacings, the mesh ends too.
@@ -57,9 +57,9 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        The mesh looks to the side that most of its normals point to. Points that it leaves out make no surface.
+        The mesh is oriented to the side that most of its normals point to. Points that it leaves out are not used.
     detail : float
-        How many voxels there are along a typical spacing of the points: 2 gives four times as many faces as 1.
+        Voxels along the median spacing of the points: 2 gives four times as many faces as 1.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -76,7 +76,7 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
 
     See Also
     --------
-    values_on_mesh : Carries functions from the points to the vertices.
+    values_on_mesh : Interpolates functions on the points at the vertices.
     surface_discs : Draws a surface without a mesh.
 
     References
@@ -114,25 +114,25 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     vertices, faces = _without_fragments(*_quads(grid, *cuts), _FRAGMENT * size**2)
     if not len(faces) or places < _FEWEST:
         raise PointCloudError(
-            f"The {np.count_nonzero(kept)} points give no mesh at a detail of {size:g}: it would have voxels larger"
-            " than the surface, or too few points lie between its edges. Raise the detail, or add points."
+            f"The {np.count_nonzero(kept)} points give no mesh at a detail of {size:g}: voxels are larger than the"
+            " surface, or too few points lie between its edges. Raise the detail, or add points."
         )
-    vertices = _onto(surface, vertices, _rim(faces), lambda: report("Faces", 0.9))
+    vertices = _onto(surface, vertices, _boundary(faces), lambda: report("Faces", 0.9))
     return SurfaceMesh(surface.placed(vertices), faces)
 
 
 def values_on_mesh(
-    laplacian: LaplaceBeltrami, vertices: ArrayLike, *, progress: Callable[[], Any] | None = None
+    laplacian: LaplaceBeltrami, vertices: ArrayLike, *, progress: Callable[[], None] | None = None
 ) -> Prolongation:
-    """Prepare to carry functions on the points to the vertices of their mesh, along the surface.
+    """Prepare to interpolate functions on the points at the vertices of their mesh, along the surface.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
     vertices : array_like, (m, 3)
-        Places on or near the surface [L].
+        Positions on or near the surface [L].
     progress : callable, optional
-        Called without arguments again and again; may raise `Cancelled`.
+        Called without arguments, repeatedly; may raise `Cancelled`.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def values_on_mesh(
 
     See Also
     --------
-    mesh_surface : Makes vertices.
+    mesh_surface : Computes the vertices.
     """
     places = np.concatenate([laplacian.points, check_points(vertices)])
     subset = np.arange(len(laplacian.points))
@@ -155,6 +155,7 @@ def values_on_mesh(
 
 
 def _check_memory(places: float, detail: float) -> None:
+    """Refuse a mesh that needs more than the free memory."""
     free = available_memory()
     if free is not None and _BYTES * places > _SHARE * free:
         raise NotEnoughMemoryError(
@@ -165,15 +166,15 @@ def _check_memory(places: float, detail: float) -> None:
 
 
 class _Grid:
-    """Corners of voxels of size one by their numbers, (k,) int64."""
+    """Corners of voxels of size one, numbered by int64, (k,)."""
 
     def __init__(self, points: Floats, margin: float) -> None:
         self.low = np.floor(points.min(axis=0)) - margin
         counts = np.ceil(np.ptp(points, axis=0)) + 2.0 * margin + 2.0
         if np.prod(counts) > 2.0**62:
             raise PointCloudError(
-                "The points are so far apart, for their spacing, that no grid reaches over all of them. Delete the far"
-                " ones, or lower the detail."
+                "The extent of the points is too large relative to their spacing for a grid. Delete distant points, or"
+                " lower the detail."
             )
         self.steps = np.array([counts[1] * counts[2], counts[2], 1.0]).astype(np.int64)
 
@@ -182,43 +183,43 @@ class _Grid:
         return (corners - self.low).astype(np.int64) @ self.steps
 
     def corners(self, keys: Ints) -> Floats:
-        """Return the places of corners, (k, 3) float."""
+        """Return the positions of corners, (k, 3) float."""
         first, rest = np.divmod(keys, self.steps[0])
         second, third = np.divmod(rest, self.steps[1])
         return np.column_stack([first, second, third]) + self.low
 
 
-def _band(surface: ImplicitSurface, report: Callable[..., Any]) -> tuple[_Grid, Ints]:
+def _band(surface: ImplicitSurface, report: Callable[[], None]) -> tuple[_Grid, Ints]:
     """Return a grid and its corners near the surface as sorted numbers: within gaps of the points, and above them."""
     reach = _REACH * surface.spacing + 1.0
     grid = _Grid(surface.points, np.ceil(reach.max()) + 3.0)
     order = np.argsort(grid.keys(np.floor(surface.points / 8.0) * 8.0), kind="stable")  # neighbours work together
     half = np.ceil(np.hypot(reach, _BAND)).astype(int)
-    parts = []
+    tasks = []
     for size in np.unique(half):
         rows = order[half[order] == size]
         across = np.arange(-size, size + 1)
         steps = np.stack(np.meshgrid(across, across, across, indexing="ij"), axis=-1).reshape(-1, 3)
-        parts += [(rows[part], steps) for part in blocks(len(rows), max(_CANDIDATES // len(steps), 1))]
+        tasks += [(rows[block], steps) for block in blocks(len(rows), max(_CANDIDATES // len(steps), 1))]
 
-    def near(part: tuple[Ints, Ints]) -> Ints:
-        rows, steps = part
+    def near(task: tuple[Ints, Ints]) -> Ints:
+        rows, steps = task
         corner = np.round(surface.points[rows])
         shift = surface.points[rows] - corner
         normals = surface.normals[rows]
         squared = -2.0 * shift @ steps.T + (steps * steps).sum(axis=1) + (shift * shift).sum(axis=1)[:, None]
         height = normals @ steps.T - np.einsum("ij,ij->i", normals, shift)[:, None]
         bend = surface.bend(rows)[:, None] * squared
-        held = (np.abs(height) < _BAND + bend) & (squared < (reach[rows] ** 2 + _BAND**2)[:, None])
-        row, step = np.nonzero(held)
+        inside = (np.abs(height) < _BAND + bend) & (squared < (reach[rows] ** 2 + _BAND**2)[:, None])
+        row, step = np.nonzero(inside)
         return np.unique(grid.keys(corner)[row] + (steps @ grid.steps)[step])
 
-    found = on_all_cores(near, parts, report)
+    found = on_all_cores(near, tasks, report)
     return grid, np.unique(np.concatenate(found))
 
 
 def _cuts(
-    surface: ImplicitSurface, grid: _Grid, keys: Ints, report: Callable[..., Any]
+    surface: ImplicitSurface, grid: _Grid, keys: Ints, report: Callable[[], None]
 ) -> tuple[Ints, Ints, Bools, Floats, Bools]:
     """Find the edges of the grid that the surface cuts.
 
@@ -243,7 +244,7 @@ def _cuts(
         wrong = np.bincount(there.nearest, side * there.height, len(surface.points)) < 0.0
         surface.turn(wrong)
         edge, cut, belongs = _between(surface, corners, first, second, axis, side, report)
-        # Ways around that lead through what is no thin part but a gap take the surface between with them.
+        # Paths around that lead through a gap instead of around a thin part lose the surface between.
         if _bare(surface, cut[belongs]) <= _BARE:
             break
     return keys[first[edge]], axis[edge], side[first[edge]] < 0.0, cut, belongs
@@ -256,7 +257,7 @@ def _between(
     second: Ints,
     axis: Ints,
     side: Floats,
-    report: Callable[..., Any],
+    report: Callable[[], None],
 ) -> tuple[Ints, Floats, Bools]:
     """Find the edges between corners on two sides.
 
@@ -269,7 +270,7 @@ def _between(
     first, second, axis = first[edge], second[edge], axis[edge]
     cut, nearest = corners[first], surface.nearest(0.5 * (corners[first] + corners[second]))
     low, high = surface.over(nearest, corners[first]), surface.over(nearest, corners[second])
-    crossed = (low < 0.0) != (high < 0.0)  # elsewhere it is closed around sharp rims
+    crossed = (low < 0.0) != (high < 0.0)  # elsewhere it is closed around sharp edges
     cut[np.arange(len(cut)), axis] += np.where(crossed, low / np.where(crossed, low - high, 1.0), 0.5)
     return edge, cut, surface.heights(cut, report).belongs
 
@@ -287,14 +288,14 @@ def _quads(grid: _Grid, begin: Ints, axis: Ints, forward: Bools, cut: Floats, be
 
     A voxel that several sheets cut has a vertex for each.
     """
-    own, second, third = (grid.steps[(axis + turn) % 3] for turn in range(3))
+    own, second, third = (grid.steps[(axis + shift) % 3] for shift in range(3))
     around = begin[:, None] - np.stack([np.zeros_like(second), second, second + third, third], axis=1)
     sides = np.stack([begin, begin - second, begin - third, begin], axis=1)  # faces of voxels between those around
     sides = 3 * sides + np.stack([axis + 1, axis + 2, axis + 1, axis + 2], axis=1) % 3
     inner = np.where(forward, begin, begin + own)
     corner = _joined(around, sides.ravel(), np.repeat(inner, 4))
     count = np.bincount(corner)
-    total = [np.bincount(corner, np.repeat(cut[:, way], 4)) for way in range(3)]
+    total = [np.bincount(corner, np.repeat(column, 4)) for column in cut.T]
     vertices = np.column_stack(total) / count[:, None]
     faces = corner.reshape(-1, 4)
     faces = np.where(forward[:, None], faces, faces[:, ::-1])[belongs]
@@ -328,16 +329,16 @@ def _joined(around: Ints, sides: Ints, inner: Ints) -> Ints:
 
 
 def _without_fragments(vertices: Floats, faces: Ints, least: float) -> tuple[Floats, Ints]:
-    """Leave out the faces of pieces of less than so many faces, and all vertices without faces."""
+    """Leave out the components of less than so many faces, and all vertices without faces."""
     count = len(vertices)
     edges = (np.ones(3 * len(faces), dtype=bool), (np.repeat(faces[:, 0], 3), faces[:, 1:].ravel()))
-    piece = connected_components(sparse.coo_array(edges, shape=(count, count)), directed=False)[1][faces[:, 0]]
-    faces = faces[np.bincount(piece)[piece] >= least] if len(faces) else faces
+    label = connected_components(sparse.coo_array(edges, shape=(count, count)), directed=False)[1][faces[:, 0]]
+    faces = faces[np.bincount(label)[label] >= least] if len(faces) else faces
     used, faces = np.unique(faces, return_inverse=True)
     return vertices[used], faces.reshape(-1, 4).astype(np.int32)
 
 
-def _rim(faces: Ints) -> Ints:
+def _boundary(faces: Ints) -> Ints:
     """Return the vertices at edges of one face, (k,) int."""
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1).astype(np.int64)
     keys, count = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)
@@ -345,12 +346,12 @@ def _rim(faces: Ints) -> Ints:
     return np.unique(np.concatenate([lone >> 32, lone & 0xFFFFFFFF]))
 
 
-def _onto(surface: ImplicitSurface, vertices: Floats, rim: Ints, report: Callable[..., Any]) -> Floats:
-    """Move vertices onto the surface, and those at the rim to the boundary where there is one within a voxel."""
+def _onto(surface: ImplicitSurface, vertices: Floats, ends: Ints, report: Callable[[], None]) -> Floats:
+    """Move vertices onto the surface, and those at ends of the mesh to the boundary if there is one within a voxel."""
     for _ in range(_ROUNDS):
-        there = surface.heights(vertices[rim], report)
+        there = surface.heights(vertices[ends], report)
         ahead = np.where(np.abs(there.beyond) < 2.0, there.beyond, 0.0)
-        vertices[rim] -= ahead[:, None] * there.outward
+        vertices[ends] -= ahead[:, None] * there.outward
         there = surface.heights(vertices, report)
         vertices -= np.clip(there.height, -0.5, 0.5)[:, None] * there.normal
     return vertices

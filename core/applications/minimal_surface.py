@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,24 +17,22 @@ from ..options import LaplacianOptions, check_options
 from ..types import Bools, Floats, Ints, Progress
 from .boundary_curve import BoundaryCurve
 
-_REACH = 8.0  # smoothing lengths from the boundary at which no kernel sees it, also after a step
-_TURN = 0.3  # most that Newton's step may move a point, in units of the radius to which the surface bends there
+_FAR = 8.0  # smoothing lengths from the boundary beyond all kernels that reach it, also after a step
+_LONGEST = 0.3  # Newton step of a point times the curvature there, at most
 _RISE = 3e-3  # share of the area by which the measured one may rise by chance
 _HALVINGS = 3  # of a step that went too far
-_NECK = 0.7  # smoothing length over the radius to which the surface bends, where it is no longer resolved
+_NECK = 0.7  # smoothing length times curvature where the surface is no longer resolved
 _FEW = 16  # points that may be less well resolved, or lie at a free edge by mistake
 _SURPLUS = 0.01  # of the tolerance: the area that may still be saved when the iteration ends
-_FREE_EDGE, _ON_CURVE = (
-    4.0,
-    0.5,
-)  # spacings from fixed points to points of a free edge; from the boundary's curve to its own
+_FREE_EDGE = 4.0  # spacings from fixed points to points of a free edge
+_ON_CURVE = 0.5  # spacings from the boundary's curve to its points, at most
 _LOPSIDED = 0.2  # mean offset of the neighbours over their mean distance at a boundary, at least
 _RTOL, _PRODUCTS = 1e-6, 500  # of the linear solves
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class MinimalSurface:
-    """Points moved towards the least area that their fixed boundary can span.
+    """Points moved towards the least area with their fixed boundary.
 
     Attributes
     ----------
@@ -48,9 +45,9 @@ class MinimalSurface:
     initial_area : float
         Total area of the given points [L^2].
     converged : bool
-        Whether the area has settled, on a surface whose area every small change raises.
+        Whether the area has converged, to a strict local minimum.
     steps : int
-        Steps that were taken and kept.
+        Steps that were accepted.
     reason : {"converged", "step limit", "stopped", "cancelled", "pinching", "unresolved", "stalled"}
         Why the iteration ended: "stopped" by the callback, "cancelled" by `Cancelled`; "unresolved" where the points
         no longer resolve a surface that does not pinch; "stalled" where no step lowers the area.
@@ -75,7 +72,7 @@ def minimal_surface(
     epsilon: float = 1e-4,
     max_steps: int = 100,
     options: LaplacianOptions = LaplacianOptions(),
-    callback: Callable[..., Any] | None = None,
+    callback: Callable[[int, Floats, float], object] | None = None,
     progress: Progress | None = None,
 ) -> MinimalSurface:
     """Move points until the area is the least that the fixed points permit.
@@ -85,14 +82,14 @@ def minimal_surface(
     points : array_like, (n, 3)
         Coordinates of a surface that ends at the fixed points [L].
     fixed : array_like, (n,) bool or (k,) int
-        Points that stay: every boundary of the surface, and others at will.
+        Points that stay: every boundary of the surface, and any others.
     epsilon : float
         The iteration ends when a step changes the area by a smaller share than this, and the next one could save no
         more than a hundredth of it. Zero: go on to the last step.
     max_steps : int
         Most steps to take.
     options : LaplacianOptions
-        Settings of the operator, which is built anew for every step; but points are never projected to smooth noise,
+        Settings of the operator, which is rebuilt for every step; but points are never projected to smooth noise,
         which the motion itself smooths.
     callback : callable, optional
         Called as ``callback(step, points, area)`` after every step, counted from 1. It ends the iteration by returning
@@ -118,31 +115,31 @@ def minimal_surface(
     --------
     MinimalSurface : The result.
     mean_curvature : Zero on it, but at fixed points.
-    fair_points : Takes noise away.
+    fair_points : Smooths noise.
 
     Notes
     -----
     The paper, after Pinkall and Polthier, solves L x = 0 for the coordinates with the boundary points fixed, and
-    repeats this with the operator of the new points. Taken literally that fails in two ways. Next to a boundary the
+    repeats this with the operator of the new points. Taken literally that fails for two reasons. Next to a boundary the
     kernel is cut off, so that areas come out too large there and the operator pulls points away from the boundary:
     within about five steps the surface slides off and collapses. And points drift within the surface, which costs no
-    area, so that the iteration never settles.
+    area, so that the iteration never converges.
 
-    Here the mirror image of a point in the boundary carries ``2 c - x``, c being the place on the boundary next to it.
+    Here the mirror image of a point in the boundary carries ``2 c - x``, c being the nearest position on the boundary.
     A motion along the normals, x + u n, changes the area by ``-r . u`` with ``r = n . (pull c - K x)``, and to second
     order by the Jacobi operator ``K - areas |A|^2``, with |A|^2 the sum of the squared principal curvatures. Newton's
-    step ``(K - areas |A|^2) u = r`` settles within a few repetitions where the paper's iteration, moved along the
-    normals only, would settle: at r = 0.
+    step ``(K - areas |A|^2) u = r`` converges within a few repetitions where the paper's iteration, moved along the
+    normals only, would converge: at r = 0.
 
-    Newton's step is taken where that matrix is definite and no point moves further than a share of the radius to which
-    the surface bends there. Otherwise, far from the end or on the way to a pinching neck, the step is that of the
-    paper, ``K x = pull c`` for whole coordinates: it never raises the area and keeps the points evenly spread, where
-    long steps along the normals would draw the top of a hemisphere to a spike. A step that still raises the measured
-    area is halved.
+    Newton's step is taken where that matrix is definite and no point moves further than a share of the radius of
+    curvature there. Otherwise, far from convergence or before a neck pinches off, the step is that of the paper,
+    ``K x = pull c`` for whole coordinates: it never raises the area and keeps the points evenly spread, where long
+    steps along the normals would draw the top of a hemisphere to a spike. A step that still raises the measured area is
+    halved.
 
-    Boundaries too far apart span no surface in one piece: then the neck shrinks until the points no longer resolve it.
-    That is reported as pinching, with the last surface that they did resolve. On the way the area may hardly change for
-    many steps; that the Jacobi operator is definite tells a surface that has settled from one that has not.
+    Boundaries too far apart span no connected surface: then the neck shrinks until the points no longer resolve it.
+    That is reported as pinching, with the last surface that they did resolve. Before, the area may hardly change for
+    many steps; a definite Jacobi operator distinguishes convergence from that.
 
     References
     ----------
@@ -165,8 +162,8 @@ def minimal_surface(
     fixed = as_mask(fixed, len(points))
     if not (real(epsilon) >= 0.0 and whole(max_steps) >= 0):
         raise InvalidPointsError(
-            f"A tolerance of {epsilon!r} and {max_steps!r} steps were asked for. Give a tolerance of at least 0"
-            " and a whole number of steps."
+            f"The tolerance is {epsilon!r}, the number of steps {max_steps!r}. Give a tolerance of at least 0 and a"
+            " whole number of steps."
         )
     epsilon, max_steps = real(epsilon), int(whole(max_steps))
     check_options(options)
@@ -174,13 +171,13 @@ def minimal_surface(
     first = build_laplacian(points, options=options, progress=progress)
     film = _Film(first, fixed, options, progress)
     state = film.state(points, first)
-    initial_area, bent = state.area, max(_NECK, state.bent)
+    initial_area, limit = state.area, max(_NECK, state.curved)
     area_history: list[float] = []
     reason = "step limit"
     try:
         while len(area_history) < max_steps:
             before = state
-            state, failure = film.advance(before, bent)
+            state, failure = film.advance(before, limit)
             if failure:
                 reason = failure
                 break
@@ -207,16 +204,17 @@ def minimal_surface(
 
 
 def _notices(reason: str, steps: int) -> list[str]:
+    """Report why the iteration ended before convergence."""
     texts = {
-        "step limit": f"The surface had not settled after {steps} steps. Allow more steps, or a larger tolerance.",
-        "stopped": f"The iteration was stopped after {steps} steps, before the surface had settled.",
+        "step limit": f"The surface had not converged after {steps} steps. Allow more steps, or a larger tolerance.",
+        "stopped": f"The iteration was stopped after {steps} steps, before the surface had converged.",
         "pinching": (
             f"The surface pinches: after {steps} steps the points no longer resolve its neck. These boundaries"
-            " span no surface in one piece; move them closer together. The last sound step was kept."
+            " span no connected surface; move them closer together. The last valid step was kept."
         ),
         "unresolved": (
             f"After {steps} steps the points no longer resolve the surface. Use more points, or spread"
-            " them more evenly. The last sound step was kept."
+            " them more evenly. The last valid step was kept."
         ),
         "stalled": f"After {steps} steps no further one lowered the area. Use more points, or spread them more evenly.",
     }
@@ -226,7 +224,7 @@ def _notices(reason: str, steps: int) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """A surface on the way, its operator, and the step that leads on.
+    """A surface during the iteration, its operator, and the next step.
 
     Attributes
     ----------
@@ -239,8 +237,8 @@ class _State:
         Area that Newton's step would save if the area were quadratic; infinite where that step was not found.
     definite : bool
         Whether the Jacobi operator is.
-    bent : float
-        Smoothing length over the radius to which the surface bends, where that is largest but for a few points.
+    curved : float
+        Greatest smoothing length times curvature, but for a few points.
     """
 
     points: Floats
@@ -249,11 +247,11 @@ class _State:
     step: Floats
     savings: float
     definite: bool
-    bent: float
+    curved: float
 
 
 class _Film:
-    """What stays the same while the surface moves: its boundary, the free points, and the settings."""
+    """The invariants of the iteration: the boundary, the free points, and the settings."""
 
     def __init__(
         self, first: LaplaceBeltrami, fixed: Bools, options: LaplacianOptions, progress: Progress | None
@@ -269,19 +267,22 @@ class _Film:
         distance, foot = None, points
         if self.curve is not None:
             foot, index = self.curve.nearest(points)
-            if not self.curve.rough:  # otherwise the operator fits a boundary's course to them
+            if not self.curve.rough:  # otherwise the operator fits a boundary to them
                 normals = before.normals[self.boundary[self.curve.first]]
                 distance = self.curve.distance(points, before.normals, foot, index, normals)
-                distance[distance > _REACH * before.smoothing_lengths] = np.inf
+                distance[distance > _FAR * before.smoothing_lengths] = np.inf
         laplacian = build_laplacian(
             points, options=self.options, boundary=self.boundary, boundary_distance=distance, progress=self.progress
         )
         torn = np.count_nonzero(laplacian.component[self.free] < 0)
         if torn or laplacian.component.max() > self.components:
-            raise NotASurfaceError(f"The surface came apart; {torn} points lie apart from the rest. Use more points.")
+            raise NotASurfaceError(
+                f"The surface has broken apart: {torn} points are disconnected from the rest. Use more points."
+            )
         return self._with_step(points, laplacian, foot)
 
     def _with_step(self, points: Floats, laplacian: LaplaceBeltrami, foot: Floats) -> _State:
+        """Return the state with the next step."""
         stiffness, pull = laplacian.dirichlet
         free = self.free[stiffness.diagonal()[self.free] > 0.0]  # in noise a point may lie on a sheet of its own
         pulled = (pull @ foot - stiffness @ points)[free]
@@ -294,7 +295,7 @@ class _Film:
         newton = _solve(jacobi, force)
         along, definite = newton.values, newton.definite
         step = np.zeros_like(points)
-        if definite and np.max(np.abs(along) * curvature) <= _TURN:
+        if definite and np.max(np.abs(along) * curvature) <= _LONGEST:
             step[free] = along[:, None] * normals
         else:
             for axis in range(3):
@@ -307,11 +308,11 @@ class _Film:
             step=step,
             savings=0.5 * float(along @ force) if newton.converged else np.inf,
             definite=definite,
-            bent=float(np.partition(curvature * laplacian.smoothing_lengths[free], -few)[-few]),
+            curved=float(np.partition(curvature * laplacian.smoothing_lengths[free], -few)[-few]),
         )
 
-    def advance(self, before: _State, bent: float) -> tuple[_State, str]:
-        """Take a step, or a part of it, to a surface that bends no more than so much.
+    def advance(self, before: _State, limit: float) -> tuple[_State, str]:
+        """Take a step, or a fraction of it, to a surface that is curved no more than the limit.
 
         Returns
         -------
@@ -326,7 +327,7 @@ class _Film:
                 state = self.state(before.points + 0.5**halving * before.step, before.laplacian)
             except PointCloudError:
                 continue
-            if state.bent > bent:
+            if state.curved > limit:
                 continue
             if state.area <= (1.0 + _RISE) * before.area:
                 return state, ""

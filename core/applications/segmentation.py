@@ -1,7 +1,5 @@
 """Divide a surface into parts: nodal domains of a mode, and clusters of points in the spectral embedding."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
@@ -16,13 +14,13 @@ from ..types import Array, Floats, Ints, Progress
 from .graph import NearGraph, near_graph
 
 _NEIGHBORS = 8  # nearest points on the same sheet that a domain may continue to
-_STEP = 0.75  # from level to level, on the way down the hills of a function
+_STEP = 0.75  # from level to level, down the hills of a function
 _LOWEST = 1e-4  # the last but one of these levels, if all signs are trusted
 _MODES = 3  # modes for each part: with fewer, limbs are missed; with more, small features get parts
-_WEAK = 1e-6  # of the largest eigenvalue: what hangs on by less is as good as cut off, and must not outweigh all else
+_WEAK = 1e-6  # of the largest eigenvalue: lower bound of others, so that nearly disconnected parts do not dominate
 _STEPS = 300  # of k-means at most; a few dozen are needed
 _ROUGH = 1e-3  # accuracy at which the starts of k-means are compared
-_LEAST = 0.03  # a cluster of a smaller share of the mean area is no part, but a spike or an outlier
+_LEAST = 0.03  # share of the mean area below which a cluster is a spike or an outlier, not a part
 _ROUNDS = 4  # of leaving such clusters out
 
 
@@ -31,10 +29,10 @@ def nodal_domains(
 ) -> Ints:
     """Divide the points into connected sets on which a function keeps its sign.
 
-    Points hang together through their nearest neighbours on the same sheet, so that two domains of one sign do not join
+    Points are connected to their nearest neighbours on the same sheet, so that two domains of one sign do not join
     through a narrow one of the other sign between them. Where the function is near zero its sign is not trusted: such
     points, and specks of a few points, go to the nearest domain of their sign, or else to the nearest one. Where nodal
-    lines cross, the least change opens a way between two of the four domains; so low bridges do not join domains.
+    lines cross, the least change connects two of the four domains; so low bridges do not join domains.
 
     Parameters
     ----------
@@ -45,7 +43,7 @@ def nodal_domains(
     threshold : float
         Share of the largest size of the values below which a sign is not trusted.
     bridge : float
-        Two hills of one sign are two domains if the way between them goes lower than this share of the lower one.
+        Two hills of one sign are two domains if all paths between them go below this share of the lower one.
     smallest : int
         Points of the smallest domain; smaller ones are specks.
 
@@ -113,15 +111,15 @@ def segment(
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
     factor that fades to zero at the last mode used, so that their distances depend neither on the signs of modes nor on
-    the basis among those of one eigenvalue. All is weighted by areas and free of chance. What is cut off from the main
-    piece of its cluster goes to the nearest part.
+    the basis among those of one eigenvalue. All is weighted by areas and deterministic. Of each cluster the connected
+    component of largest area is a part; its other points go to the nearest part.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
         Of n points.
     parts : int
-        How many parts; at least one for each component of the cloud. The others are dealt out by area.
+        How many parts; at least one for each component of the cloud. The others are distributed by area.
     spectrum : Spectrum, optional
         Its Neumann modes, to save time; used if there are enough of them, which is ``modes_needed``.
     progress : callable, optional
@@ -131,7 +129,7 @@ def segment(
     -------
     ndarray, (n,) int
         Part of each point: 0 for the one of most points, and so on; -1 for points left out of the operator. Moving,
-        turning or scaling the cloud, or the order of its points, make no difference but for points just at a border
+        rotating or scaling the cloud, or the order of its points, make no difference but for points at a border
         between two parts. (On a surface that rotations map to itself, such as a sphere, all choices are equally good.)
 
     Raises
@@ -147,9 +145,9 @@ def segment(
 
     See Also
     --------
-    modes_needed : How many modes it works with.
+    modes_needed : How many modes it uses.
     nodal_domains : Parts by the sign of one function.
-    heat_kernel_signature : Points told apart by modes.
+    heat_kernel_signature : Distinguishes points by modes.
 
     References
     ----------
@@ -157,7 +155,7 @@ def segment(
 
     Examples
     --------
-    A dumbbell comes apart at its waist, where z is zero:
+    A dumbbell is divided at its waist, where z is zero:
 
     >>> import numpy as np
     >>> import core
@@ -188,8 +186,9 @@ def segment(
     report = progress or (lambda stage, fraction: None)
     report("Parts", 0.0)
     graph = near_graph(laplacian, _NEIGHBORS)
-    component, areas = laplacian.component[graph.first], _areas_of_places(laplacian, graph)
-    share = _deal(parts, np.bincount(component, areas))
+    component, known = laplacian.component[graph.first], graph.place >= 0
+    areas: Array = np.bincount(graph.place[known], laplacian.areas[known], minlength=len(graph.first))
+    share = _distribute(parts, np.bincount(component, areas))
     part = component.copy()
     if parts > components:
         signature = _signature(laplacian, parts, spectrum, report)[graph.first]
@@ -200,19 +199,19 @@ def segment(
             part[own] = label[number] + _cluster(signature[own], areas[own], share[number])
         for number in np.flatnonzero(share == 1):
             part[component == number] = label[number]
-    part = _join_nearest(graph.lengths, _main_pieces(graph.lengths, part, areas))
+    part = _join_nearest(graph.lengths, _largest_only(graph.lengths, part, areas))
     center = laplacian.areas @ laplacian.points / laplacian.areas.sum()
     return _by_size(graph, part, np.linalg.norm(laplacian.points - center, axis=1))
 
 
 def modes_needed(laplacian: LaplaceBeltrami, parts: int) -> int:
-    """Return how many modes `segment` works with, the constant ones included.
+    """Return how many modes `segment` uses, the constant ones included.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
     parts : int
-        How many parts are to be asked for.
+        How many parts.
 
     Returns
     -------
@@ -221,21 +220,22 @@ def modes_needed(laplacian: LaplaceBeltrami, parts: int) -> int:
     Raises
     ------
     TooFewPointsError
-        Parts that are no whole number of at least 1.
+        Not a whole number of at least 1.
     """
     return _constant_modes(laplacian) + _MODES * _check_parts(parts) + 1
 
 
-def _check_parts(parts: Any) -> int:
+def _check_parts(parts: int) -> int:
+    """Return the number of parts."""
     if not whole(parts) >= 1:
         raise TooFewPointsError(f"{parts!r} parts were asked for. Ask for a whole number of at least 1.")
     return int(whole(parts))
 
 
 def _constant_modes(laplacian: LaplaceBeltrami) -> int:
-    """Return the number of modes of eigenvalue zero: the parts that the stiffness does not couple."""
-    pieces = connected_components(laplacian.stiffness, directed=False)[1]
-    return len(np.unique(pieces[laplacian.component >= 0]))
+    """Return the number of modes of eigenvalue zero, one for each connected component of the stiffness."""
+    label = connected_components(laplacian.stiffness, directed=False)[1]
+    return len(np.unique(label[laplacian.component >= 0]))
 
 
 def _signature(laplacian: LaplaceBeltrami, parts: int, spectrum: Spectrum | None, progress: Progress) -> Floats:
@@ -260,20 +260,16 @@ def _signature(laplacian: LaplaceBeltrami, parts: int, spectrum: Spectrum | None
     return spectrum.eigenvectors[:, constant : count - 1] * ((1.0 - values / last) / np.sqrt(values))
 
 
-def _deal(parts: int, areas: Array) -> Ints:
-    """Deal parts out to components: one to each, each other one where the area per part is largest then."""
+def _distribute(parts: int, areas: Array) -> Ints:
+    """Return the number of parts of each component: one, and each other one where the area per part is largest."""
     share = np.ones(len(areas), dtype=int)
     for _ in range(parts - len(areas)):
         share[np.argmax(areas / share)] += 1
     return share
 
 
-def _areas_of_places(laplacian: LaplaceBeltrami, graph: NearGraph) -> Array:
-    return np.bincount(graph.place[graph.place >= 0], laplacian.areas[graph.place >= 0], minlength=len(graph.first))
-
-
 def _cluster(signature: Floats, weight: Floats, count: int) -> Ints:
-    """Cluster points, (m, modes), and return labels, (m,); what is far too small for a part is left to the others."""
+    """Cluster points, (m, modes), and return labels, (m,); clusters far too small for a part are left to the others."""
     for _ in range(_ROUNDS):
         centers = _k_means(signature, weight, count)
         label = _nearest(signature, centers)
@@ -299,7 +295,7 @@ def _k_means(signature: Floats, weight: Floats, count: int) -> Floats:
 
 
 def _far_points(points: Floats, weight: Floats, count: int) -> Floats:
-    """Return the point farthest from the middle of all, then again and again the one farthest from those."""
+    """Return the point farthest from the mean of all, then repeatedly the one farthest from those."""
     chosen = [points[np.argmax(_squares(points, weight @ points / weight.sum()))]]
     away = np.full(len(points), np.inf)
     while len(chosen) < count:
@@ -314,22 +310,22 @@ def _halves(points: Floats, weight: Floats, count: int) -> Floats:
     axes = [_main_axis(points, weight)]
     while len(clusters) < count:
         widest = max(range(len(axes)), key=lambda number: axes[number][0])
-        own, (_, middle, axis) = clusters.pop(widest), axes.pop(widest)
-        beyond = (points[own] - middle) @ axis > 0.0
+        own, (_, mean, axis) = clusters.pop(widest), axes.pop(widest)
+        beyond = (points[own] - mean) @ axis > 0.0
         for half in (own[beyond], own[~beyond]):
             clusters.append(half)
             axes.append(_main_axis(points[half], weight[half]))
-    return np.array([middle for _, middle, _ in axes])
+    return np.array([mean for _, mean, _ in axes])
 
 
 def _main_axis(points: Floats, weight: Floats) -> tuple[float, Floats, Floats]:
-    """Return the scatter along the axis where it is largest, the middle of the points, and the axis."""
+    """Return the scatter along the axis where it is largest, the mean of the points, and the axis."""
     if not len(points):
         return 0.0, np.zeros(points.shape[1]), np.zeros(points.shape[1])
-    middle = weight @ points / weight.sum()
-    offset = points - middle
+    mean = weight @ points / weight.sum()
+    offset = points - mean
     scatter, axes = np.linalg.eigh((offset * weight[:, None]).T @ offset)
-    return scatter[-1], middle, axes[:, -1]
+    return scatter[-1], mean, axes[:, -1]
 
 
 def _lloyd(points: Floats, weight: Floats, centers: Floats, rtol: float) -> tuple[Floats, float]:
@@ -358,45 +354,45 @@ def _squares(points: Floats, center: Floats) -> Floats:
     return np.sum((points - center) ** 2, axis=1)
 
 
-def _main_pieces(lengths: sparse.csr_array, part: Ints, areas: Floats) -> Ints:
-    """Keep the label of each part on its connected piece of the largest area, -1 elsewhere."""
-    piece = _pieces(lengths, part)
-    size = np.bincount(piece, areas)
-    order = np.argsort(size[piece], kind="stable")
+def _largest_only(lengths: sparse.csr_array, part: Ints, areas: Floats) -> Ints:
+    """Keep the label of each part on its connected component of the largest area, -1 elsewhere."""
+    component = _components(lengths, part)
+    size = np.bincount(component, areas)
+    order = np.argsort(size[component], kind="stable")
     main = np.zeros(part.max() + 1, dtype=int)
-    main[part[order]] = piece[order]
-    return np.where(main[part] == piece, part, -1)
+    main[part[order]] = component[order]
+    return np.where(main[part] == component, part, -1)
 
 
 def _hills(lengths: sparse.csr_array, sign: Ints, size: Floats, threshold: float, bridge: float) -> Ints:
-    """Number the hills of a function's size, by what hangs together above lower and lower levels; -1 for no hill.
+    """Number the hills of a function's size, by connected components above lower and lower levels; -1 for no hill.
 
     Hills of one sign that meet at a level become one, unless the level is below a share `bridge` of both.
     """
-    lengths = sparse.triu(lengths, format="csr")  # once per edge is enough to tell what hangs together
-    hill, top = np.full(len(size), -1), np.empty(0, dtype=int)  # top: the highest place of each hill
+    lengths = sparse.triu(lengths, format="csr")  # one entry per edge connects its ends
+    hill, top = np.full(len(size), -1), np.empty(0, dtype=int)  # top: the highest point of each hill
     steps = int(np.ceil(np.log(max(threshold, _LOWEST)) / np.log(_STEP)))
     levels = size.max() * np.append(_STEP ** np.arange(1, steps), threshold)
     by_size = np.argsort(size, kind="stable")
     for level in levels:
-        piece = _pieces(lengths, np.where(size > level, sign, -1))
-        count = piece.max() + 1
-        known = by_size[piece[by_size] >= 0]
+        component = _components(lengths, np.where(size > level, sign, -1))
+        count = component.max() + 1
+        known = by_size[component[by_size] >= 0]
         highest = np.empty(count, dtype=int)
-        highest[piece[known]] = known
+        highest[component[known]] = known
         order = np.argsort(size[top], kind="stable")
         head = np.full(count, -1)
-        head[piece[top[order]]] = order
+        head[component[top[order]]] = order
         new = head < 0
-        # A hill that stays is alone in its piece, the highest one there, or reaches far above the level.
-        number = np.where(bridge * size[top] > level, np.arange(len(top)), head[piece[top]])
+        # A hill that stays is alone in its component, the highest one there, or reaches far above the level.
+        number = np.where(bridge * size[top] > level, np.arange(len(top)), head[component[top]])
         hill[hill >= 0] = number[hill[hill >= 0]]
-        alone = np.bincount(piece[top[np.unique(number)]], minlength=count) == 1
+        alone = np.bincount(component[top[np.unique(number)]], minlength=count) == 1
         head[new] = len(top) + np.arange(np.count_nonzero(new))
         top = np.append(top, highest[new])
-        fresh = (hill < 0) & (piece >= 0)
-        fresh[fresh] = (alone | new)[piece[fresh]]
-        hill[fresh] = head[piece[fresh]]
+        fresh = (hill < 0) & (component >= 0)
+        fresh[fresh] = (alone | new)[component[fresh]]
+        hill[fresh] = head[component[fresh]]
         left, hill = np.unique(hill, return_inverse=True)
         hill = hill.reshape(-1) - (left[0] < 0)
         top = top[left[left >= 0]]
@@ -410,16 +406,16 @@ def _keep_edges(lengths: sparse.csr_array, label: Ints) -> sparse.csr_array:
     return sparse.csr_array((edges.data[kept], (edges.row[kept], edges.col[kept])), shape=lengths.shape)
 
 
-def _pieces(lengths: sparse.csr_array, label: Ints) -> Ints:
-    """Number the connected pieces of equal label; labels below zero stay -1."""
-    piece, known = connected_components(_keep_edges(lengths, label), directed=False)[1], label >= 0
+def _components(lengths: sparse.csr_array, label: Ints) -> Ints:
+    """Number the connected components of equal label; labels below zero stay -1."""
+    component, known = connected_components(_keep_edges(lengths, label), directed=False)[1], label >= 0
     result = np.full(len(label), -1)
-    result[known] = np.unique(piece[known], return_inverse=True)[1].reshape(-1)
+    result[known] = np.unique(component[known], return_inverse=True)[1].reshape(-1)
     return result
 
 
 def _join_nearest(lengths: sparse.csr_array, label: Ints) -> Ints:
-    """Give every place of label -1 that a path leads to the label of the nearest place that has one."""
+    """Give every point of label -1 the label of the nearest one that has one, where a path leads there."""
     start = np.flatnonzero(label >= 0)
     if len(start) in (0, len(label)):
         return label

@@ -1,7 +1,5 @@
 """Sets of points: grown by distance along the surface, and around its ends."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import dijkstra
@@ -14,15 +12,14 @@ from ..types import Bools, Floats, Ints
 from .geodesics import Geodesics
 from .graph import near_graph
 
-_OBLIQUE = 3.0  # slope to the ray of a surface whose points are told from those behind it: 72 degrees
-_NEIGHBORS = 20  # so many directions make paths at most 2 % longer than the way along the surface
+_OBLIQUE = 3.0  # slope to the ray of a surface whose points are distinguished from those behind it: 72 degrees
+_NEIGHBORS = 20  # so many directions make paths at most 2 % longer than geodesics
 
 
 def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bools:
     """Add all points within a distance along the surface to a set of points.
 
-    Distances are those of `geodesic_distance`, so that the set does not jump to another sheet, or another component,
-    that passes nearby.
+    Distances are those of `geodesic_distance`, so that the set does not extend to other sheets or components nearby.
 
     Parameters
     ----------
@@ -31,7 +28,7 @@ def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bool
     chosen : array_like, (k,) int or (n,) bool
         The set, which may be empty.
     distance : float
-        How far to grow [L], not negative; infinity selects whole components.
+        Geodesic distance [L], not negative; infinity selects whole components.
 
     Returns
     -------
@@ -62,42 +59,42 @@ def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bool
     0.25
     """
     mask = as_mask(chosen, len(laplacian.points))
-    reach = real(distance)
-    if not reach >= 0.0:
+    limit = real(distance)
+    if not limit >= 0.0:
         raise PointCloudError(f"The distance to grow by is {distance!r}. Use a number that is not negative.")
     sources = np.flatnonzero(mask & (laplacian.component >= 0))
     if not len(sources):
         return mask.copy()
-    return mask | np.isfinite(Geodesics(laplacian).distance(sources, limit=reach))
+    return mask | np.isfinite(Geodesics(laplacian).distance(sources, limit=limit))
 
 
 def front_point(points: ArrayLike, eye: ArrayLike, direction: ArrayLike, reach: float) -> int:
-    """Find the point that one sees along a ray: the nearest to the eye among those around it.
+    """Find the frontmost point along a ray: the nearest to its origin among those around it.
 
     Of points of one surface it is the one that is nearest to the ray.
 
     Parameters
     ----------
     points : array_like, (n, 3)
-        Some may be infinite or no numbers.
+        Some may be infinite or NaN.
     eye, direction : array_like, (3,)
-        Where the ray begins and where it goes.
+        Origin and direction of the ray.
     reach : float
-        How far from the ray the points may be [L]. Twice their spacing finds one wherever it meets the surface.
+        Largest distance of points from the ray [L]. Twice their spacing finds one wherever it meets the surface.
 
     Returns
     -------
     int
-        Its number; -1 if there is none around the ray.
+        Its index; -1 if there is none around the ray.
 
     Raises
     ------
     PointCloudError
-        A direction of no length.
+        A direction of zero length, or a negative reach.
 
     See Also
     --------
-    grow : Takes the points around it in.
+    grow : Adds the points around it.
 
     Examples
     --------
@@ -110,32 +107,30 @@ def front_point(points: ArrayLike, eye: ArrayLike, direction: ArrayLike, reach: 
     >>> print(points[seen, 2].round(1))
     1.0
     """
-    places, eye, direction = _vectors(points, "points", 2), _vectors(eye, "eye", 1), _vectors(direction, "direction", 1)
-    length, reach = np.linalg.norm(direction), real(reach)
+    positions = as_doubles(check_array(points, "Points", [(None, 3)], "Give numbers (n, 3)."))
+    eye, direction = (
+        as_doubles(check_array(given, "Eye and direction", [(3,)], "Give 3 numbers each."))
+        for given in (eye, direction)
+    )
+    length, radius = np.linalg.norm(direction), real(reach)
     if not 0.0 < length < np.inf:
-        raise PointCloudError("The direction of the ray has no length. Give one that is not zero.")
-    if not reach >= 0.0:
-        raise PointCloudError(f"The reach around the ray is {reach!r}. Use a number that is not negative.")
+        raise PointCloudError("The direction of the ray has zero length. Give one that is not zero.")
+    if not radius >= 0.0:
+        raise PointCloudError(f"The radius around the ray is {reach!r}. It must not be negative.")
     axis = direction / length
     with np.errstate(invalid="ignore", over="ignore"):
-        offset = places - eye
+        offset = positions - eye
         depth = offset @ axis
         away = np.linalg.norm(offset - depth[:, None] * axis, axis=1)
-    near = np.flatnonzero((depth > 0.0) & (away <= reach))
+    near = np.flatnonzero((depth > 0.0) & (away <= radius))
     return int(near[(depth + _OBLIQUE * away)[near].argmin()]) if len(near) else -1
 
 
-def _vectors(given: Any, name: str, dimensions: int) -> Floats:
-    """Return one vector, (3,), or several, (n, 3), in double precision; their numbers may be infinite or none."""
-    shape, text = ((None, 3), "(n, 3)") if dimensions == 2 else ((3,), "(3,)")
-    return as_doubles(check_array(given, name.capitalize(), [shape], f"Give numbers {text}."))
-
-
 def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints, Ints]:
-    """Choose the points around both ends of the longest way along the surface, on its largest component.
+    """Choose the points around both ends of the longest geodesic path, on the largest component.
 
     From anywhere the point that is farthest along the surface is such an end, and the one that is farthest from there
-    is the other; so it is exactly on trees, and nearly on surfaces (the double sweep of graph diameters).
+    is the other, exactly on trees and nearly on surfaces (the double sweep of graph diameters).
 
     Parameters
     ----------
@@ -154,7 +149,7 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
     Raises
     ------
     PointCloudError
-        A share out of these bounds, or too few points at different places.
+        A share out of these bounds, or too few distinct points.
 
     See Also
     --------
@@ -180,13 +175,13 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
     largest = np.flatnonzero(component == np.bincount(component[known], weights=areas[known]).argmax())
     graph = near_graph(laplacian, _NEIGHBORS)
 
-    def ways(start: int) -> Floats:
+    def lengths(start: int) -> Floats:
         return dijkstra(graph.lengths, directed=False, indices=graph.place[start])[graph.place[largest]]
 
     offset = laplacian.points[largest] - laplacian.points[largest].mean(axis=0)
-    one = ways(largest[np.einsum("ij,ij->i", offset, offset).argmax()]).argmax()
-    from_one = ways(largest[one])
-    from_other = ways(largest[from_one.argmax()])
+    one = lengths(largest[np.einsum("ij,ij->i", offset, offset).argmax()]).argmax()
+    from_one = lengths(largest[one])
+    from_other = lengths(largest[from_one.argmax()])
     ends: list[Ints] = []
     for near, far in ((from_one, from_other), (from_other, from_one)):
         order = np.argsort(near, kind="stable")

@@ -1,7 +1,6 @@
-"""Areas and volumes of surfaces whose points move, and the scale that keeps them."""
+"""Areas and volumes of surfaces whose points move, and the scale that preserves them."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ class SurfaceSize:
 
     The operator gives the metric of the moved surface, ``P = sum_j w_ij (x'_j - x'_i) (x'_j - x'_i)^T / (2 areas_i)``:
     its two large eigenvalues multiply to the square of the growth of the area, and the vector to the small one is the
-    normal. What the kernel's width does to P cancels in the quotient with that of the surface before.
+    normal. The effect of the kernel's width on P cancels in the quotient with that of the surface before.
     """
 
     def __init__(self, laplacian: LaplaceBeltrami, kind: str) -> None:
@@ -28,7 +27,7 @@ class SurfaceSize:
         Raises
         ------
         PointCloudError
-            The volume of a component is not one by its normals.
+            Normals do not enclose a volume in some component.
         """
         self.laplacian, self.kind = laplacian, kind
         self.known = laplacian.component >= 0
@@ -47,7 +46,7 @@ class SurfaceSize:
                 )
 
     def __call__(self, moved: Floats) -> Floats:
-        """Return the size of each component for new places of all points, (components,)."""
+        """Return the size of each component for new positions of all points, (components,)."""
         growth, normals = self._metric(moved)
         return self._sizes(moved, self.laplacian.areas[self.known] * growth, normals)
 
@@ -69,7 +68,7 @@ class SurfaceSize:
             return np.bincount(self.laplacian.component[self.known], areas)
         return self._along_axes(places, areas, normals).mean(axis=1)
 
-    def _along_axes(self, places: Any, areas: Any, normals: Any) -> Any:
+    def _along_axes(self, places: Floats, areas: Floats, normals: Floats) -> Floats:
         """Return the volume of each component by the divergence of (x, 0, 0), (0, y, 0) and (0, 0, z), (c, 3)."""
         component = self.laplacian.component[self.known]
         total = np.bincount(component)
@@ -80,8 +79,8 @@ class SurfaceSize:
         return np.column_stack(columns)
 
 
-def match_size(size: Callable[..., Any], wanted: Floats, touched: Bools) -> Floats:
-    """Return the scale of each component at which its size is the one wanted, by secant steps on all of them together.
+def match_size(size: Callable[[Floats], Floats], wanted: Floats, touched: Bools) -> Floats:
+    """Return the scale of each component at which its size is the wanted one, by secant steps on all of them together.
 
     Raises
     ------
@@ -100,6 +99,6 @@ def match_size(size: Callable[..., Any], wanted: Floats, touched: Bools) -> Floa
         step = np.where(np.isfinite(step), np.clip(step, -0.5 * scale, 0.5 * scale), 0.0)
         last, scale = scale, np.clip(scale - step, 1.0 / _SCALE, _SCALE)
     raise SolverError(
-        f"{np.count_nonzero(np.abs(error) >= 1e-9)} of {len(wanted)} components lose too much of their size"
-        " for a scale to bring it back. Smooth less, or do not keep the size."
+        f"{np.count_nonzero(np.abs(error) >= 1e-9)} of {len(wanted)} components lose so much of their size"
+        " that no scale restores it. Smooth less, or do not keep the size."
     )

@@ -1,6 +1,4 @@
-"""Slopes of values along the surface, by which a point tells of what lies around it."""
-
-from typing import Any
+"""Gradients of values along the surface, by which values are extrapolated around each point."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +12,9 @@ from .gradients import lifted_inverse
 
 _COUNT = 12  # neighbours: two rings of an even sample
 _ROUND = 0.01  # of `lifted_inverse`
-_RIDGE = 0.01  # holds curvatures back where neighbours hardly tell them, in their own terms
-_TOLD = 0.1  # of what neighbours tell about slopes, what is left beside curvatures at least, or these count as zero
-_UNFIT = 14.0  # one by the share of the squared rises that a fit with as many coefficients may miss, to be of use
+_RIDGE = 0.01  # of the second derivatives, which neighbours may hardly determine, as a share of their trace
+_DETERMINED = 0.1  # share of the determinant of slopes alone that is left beside second derivatives, or these are zero
+_UNFIT = 14.0  # inverse of the share of the squared rises that a fit of so many coefficients may miss
 _BLOCK = 1 << 13  # points at one time
 
 
@@ -28,7 +26,7 @@ class Slopes:
     points : array_like, (n, 3)
         Coordinates [L].
     discs : Discs
-        How the surface lies, and as far as which slopes are to hold; those of radius 0 are unknown.
+        Tangent planes, and radii within which slopes are to hold; slopes of discs of radius 0 are unknown.
 
     Raises
     ------
@@ -41,11 +39,11 @@ class Slopes:
 
     Notes
     -----
-    A quadratic function of the tangent plane through the value at the point is fitted to the nearest neighbours, which
-    count the less the farther they are, and the less the higher they lie above that plane: those a radius above it do
-    not count, such as the other side of a thin wall. As far as it fits badly its slope is made less steep where that
-    would leave the range of their values within the disc, like a limiter of finite volumes: noise, peaks and jumps do
-    not swing. Halfway to a neighbour, slopes of both then give values that differ by terms of third order.
+    A quadratic function of the tangent plane through the value at the point is fitted to the nearest neighbours, with
+    weights that fall with their distance and with their height above that plane: those a radius above it do not count,
+    such as the other side of a thin wall. As far as it fits badly, its slope is limited so that values within the disc
+    stay in the range of the neighbours, as by a limiter of finite volumes: no overshoots at noise, peaks and jumps.
+    Halfway to a neighbour, slopes of both then give values that differ by terms of third order.
 
     Examples
     --------
@@ -68,22 +66,23 @@ class Slopes:
         found = range(1, min(_COUNT, max(len(self._points) - 1, 0)) + 2)  # the point itself first
         self._near = cKDTree(self._points).query(self._points, k=found, workers=-1)[1].astype(np.int32)
 
-    def of(self, values: Any) -> Floats:
+    def of(self, values: ArrayLike) -> Floats:
         """Return the slopes of values, (n,), as vectors in the tangent planes, (n, 3) [1/L].
 
         Values that are not finite count as unknown, and have none.
         """
         count = len(self._points)
-        given = check_array(values, "Values", [(count,)], f"Give one real number for each of {count} points.", "iufb")
-        values, slopes = as_doubles(given), np.zeros(self._points.shape)
+        advice = f"Give one real number for each of {count} points."
+        given = as_doubles(check_array(values, "Values", [(count,)], advice, "iufb"))
+        slopes = np.zeros(self._points.shape)
 
-        def find(rows: Any) -> None:
-            slopes[rows] = self._found(rows, values)
+        def find(rows: slice) -> None:
+            slopes[rows] = self._found(rows, given)
 
-        on_all_cores(find, blocks(len(values), _BLOCK))
+        on_all_cores(find, blocks(count, _BLOCK))
         return slopes
 
-    def _found(self, rows: Any, values: Floats) -> Floats:
+    def _found(self, rows: slice, values: Floats) -> Floats:
         """Return the slopes at some points."""
         near, radii = self._near[rows], self._discs.radii[rows, None]
         axes = frames(self._discs.normals[rows])
@@ -108,12 +107,12 @@ def _fit(flat: list[Floats], height: Floats, rise: Floats) -> Floats:
     terms = np.stack([across, along, 0.5 * across**2, across * along, 0.5 * along**2], axis=1)
     weighted = weight[:, None] * terms
     inner, sums = weighted @ terms.transpose(0, 2, 1), weighted @ rise[:, :, None]
-    bent = inner[:, 2:, 2:]
-    bent = bent + (_RIDGE * np.trace(bent, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None] * np.eye(3)
-    known = np.linalg.solve(bent, np.concatenate([inner[:, 2:, :2], sums[:, 2:]], axis=2))
+    second = inner[:, 2:, 2:]
+    second = second + (_RIDGE * np.trace(second, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None] * np.eye(3)
+    known = np.linalg.solve(second, np.concatenate([inner[:, 2:, :2], sums[:, 2:]], axis=2))
     alone = np.concatenate([inner[:, :2, :2], sums[:, :2]], axis=2)
     left = alone - inner[:, :2, 2:] @ known
-    known *= (_determinant(left) > _TOLD * _determinant(alone))[:, None, None]
+    known *= (_determinant(left) > _DETERMINED * _determinant(alone))[:, None, None]
     left = alone - inner[:, :2, 2:] @ known
     slope = lifted_inverse(left[:, :, :2].transpose(1, 2, 0), _ROUND).transpose(2, 0, 1) @ left[:, :, 2:]
     found = np.concatenate([slope, known[:, :, 2:] - known[:, :, :2] @ slope], axis=1)
@@ -135,6 +134,6 @@ def _limit(slope: Floats, rise: Floats) -> Floats:
 
 
 def _freedom(weight: Floats, rise: Floats, missed: Floats) -> Floats:
-    """Return how far a fit is to be trusted, (n,): 1 where it misses nothing, 0 and less where it misses much."""
-    total, lost = (np.einsum("nk,nk->n", weight, part**2) for part in (rise, missed))
+    """Return the trust in a fit, (n,): 1 where it is exact, 0 and less where its residuals are large."""
+    total, lost = (np.einsum("nk,nk->n", weight, values**2) for values in (rise, missed))
     return 1.0 - _UNFIT * np.divide(lost, total, out=np.zeros_like(total), where=total > 0.0)

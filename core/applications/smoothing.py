@@ -1,9 +1,7 @@
-"""New places for the points: smoothed or sharpened by frequency, faired without eigenvectors, moved by a mode.
+"""New positions of the points: smoothed or sharpened by frequency, faired without eigenvectors, displaced by a mode.
 
-And how far they are from the smooth ones.
+And roughness, the displacement from the smooth ones.
 """
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..algebra import solve_symmetric
-from ..arguments import check_switches, real
+from ..arguments import check_switches, real, whole
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
 from ..operator import LaplaceBeltrami, Spectrum
@@ -21,7 +19,7 @@ from .sizes import SurfaceSize, match_size
 
 _KEPT = (None, "area", "volume")
 _TOLERANCE = 1e-5  # of the factors: the coordinates are large next to the spacing
-_DETAIL = 6.0  # smoothing lengths of a wavelength below which details are taken as rough
+_DETAIL = 6.0  # smoothing lengths of a wavelength below which details count as roughness
 _AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 
@@ -40,7 +38,7 @@ def smooth_points(
     """Filter the shape of the surface by frequency.
 
     The coordinates are three functions on the points. Each component keeps its centre, so that the result moves
-    and turns with the points, and components do not collapse into each other.
+    and rotates with the points, and components do not collapse into each other.
 
     Parameters
     ----------
@@ -50,19 +48,20 @@ def smooth_points(
         eigenvalues [1 / L^2] to factors, such as `exponential`, `band` and `boost` return; without a spectrum it needs
         no eigenvectors and should be smooth.
     spectrum : Spectrum, optional
-        Of this operator, with its dirichlet. What it does not hold takes the response at its highest eigenvalue, or is
-        dropped where the response is a number. Eigenvalues matter for callables alone: for many modes, beyond those
-        that are resolved, ``eigenpairs(count, raw=True)`` will do.
+        Of this operator, with the same dirichlet. The residual outside its modes gets the response at its highest
+        eigenvalue, or is dropped where the response is a number. Eigenvalues matter for callables only: for many modes,
+        beyond those that are resolved, ``eigenpairs(count, raw=True)`` suffices.
     strength : float
-        Share of the way from the points to the filtered ones: 1 is all of it, above exaggerates, below 0 sharpens.
+        Factor of the displacements to the filtered positions: 1 is the full effect, above exaggerates, below 0
+        sharpens.
     mask : array_like, (n,), optional
         Weight of each point from 0, which stays where it is, to 1, such as those of a vertex group.
     keep : {None, "area", "volume"}
         Scale the filtered shape about the centre of each component (of the masked region) so that the result has
-        its area, or enclosed volume, before. The volume needs a closed surface and normals that point outwards.
+        the same area, or enclosed volume. The volume needs a closed surface and normals that point outwards.
     dirichlet : bool
-        Boundary points stay where they are: what is filtered is the distance from the surface that spans the boundary
-        like a soap film. Otherwise a boundary shrinks like all else, as Neumann modes meet it level.
+        Boundary points stay where they are: displacements from the harmonic surface that spans the boundary are
+        filtered, with Dirichlet conditions. Otherwise a boundary shrinks as well, with Neumann conditions.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
     base : ndarray, (n, 3), optional
@@ -71,15 +70,15 @@ def smooth_points(
     Returns
     -------
     ndarray, (n, 3)
-        New places for ``laplacian.points`` [L]. Points that the operator leaves out stay.
+        New positions of ``laplacian.points`` [L]. Points that the operator leaves out stay.
 
     Raises
     ------
     PointCloudError
-        A response, mask, strength or choice that makes no sense, modes that are constants alone, or a volume to keep
-        of a surface that encloses none.
+        An invalid response, mask, strength or choice, modes that are constants only, or a volume to keep of a surface
+        that encloses none.
     TooFewPointsError, SolverError
-        From the spectrum, where it is computed here; a scale that is not found.
+        From the spectrum, where it is computed here; no scale restores the size.
 
     See Also
     --------
@@ -108,18 +107,19 @@ def smooth_points(
     >>> print(np.linalg.norm(same, axis=1).mean().round(2))
     1.0
     """
-    if not callable(response) and (isinstance(response, bool) or not isinstance(response, (int, np.integer))):
+    if not (callable(response) or np.isfinite(whole(response))):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
     blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
     base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
     rest = laplacian.points - base
-    if callable(response) and spectrum is None:
-        filtered = chebyshev_filter(
-            laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
-        )
-    elif callable(response) and spectrum is not None:
-        end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
-        filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
+    if callable(response):
+        if spectrum is None:
+            filtered = chebyshev_filter(
+                laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
+            )
+        else:
+            end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
+            filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
     else:
         if spectrum is None:
             spectrum = laplacian.eigenpairs(response, raw=True, dirichlet=dirichlet, progress=progress)
@@ -139,17 +139,17 @@ def fair_points(
     *,
     order: int = 3,
     strength: float = 1.0,
-    mask: None = None,
+    mask: ArrayLike | None = None,
     keep: str | None = None,
     dirichlet: bool = False,
     progress: Progress | None = None,
-    base: None = None,
+    base: Floats | None = None,
 ) -> Floats:
     """Smooth the surface by an implicit step, without eigenvectors: for noise, also on large clouds.
 
     Solves ``(1 + (time L)^order) x = x0`` with the negated operator L, whose eigenvalues are the symbol-corrected ones.
-    With ``order=1`` this is implicit fairing, ``(areas + time K) x = areas x0``, which also shrinks what is wide. The
-    third order spares it, at the same effect on noise.
+    With ``order=1`` this is implicit fairing, ``(areas + time K) x = areas x0``, which also shrinks large features. The
+    third order preserves them, at the same effect on noise.
 
     Parameters
     ----------
@@ -158,22 +158,21 @@ def fair_points(
         [L^2]. Details of a wavelength below ``2 pi sqrt(time)`` are more than halved. If not given, half the mean
         square of the smoothing lengths, which removes the noise of single points.
     order : int
-        1, 2 or 3: the higher, the sharper the line between what stays and what goes.
+        1, 2 or 3: the higher, the sharper the cutoff.
     strength, mask, keep, dirichlet, progress, base
         As in `smooth_points`.
 
     Returns
     -------
     ndarray, (n, 3)
-        New places for ``laplacian.points`` [L]. Points that the operator leaves out stay.
+        New positions of ``laplacian.points`` [L]. Points that the operator leaves out stay.
 
     Raises
     ------
     PointCloudError
-        A time, order, mask, strength or choice that makes no sense, or a volume to keep of a surface that encloses
-        none.
+        An invalid time, order, mask, strength or choice, or a volume to keep of a surface that encloses none.
     SolverError
-        A scale is not found.
+        No scale restores the size.
 
     See Also
     --------
@@ -182,7 +181,7 @@ def fair_points(
 
     Notes
     -----
-    The operator's spectrum is bounded by its wide kernel. A polynomial of it then inverts the equations in fewer
+    The operator's spectrum is bounded by its wide kernel. A polynomial of the operator solves the equations in fewer
     products than conjugate gradients, whose steps grow with the power ``order / 2`` of the time, not with its root.
 
     References
@@ -203,7 +202,7 @@ def fair_points(
     """
     if time is None:
         known = laplacian.component >= 0
-        time = 0.5 * np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known])
+        time = 0.5 * float(np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known]))
     return smooth_points(
         laplacian,
         fairing(time, order),
@@ -219,14 +218,14 @@ def fair_points(
 def roughness(
     laplacian: LaplaceBeltrami, wavelength: float | None = None, *, progress: Progress | None = None
 ) -> Floats:
-    """Measure how far the points stick out of the smooth surface.
+    """Measure the signed height of points above the smoothed surface.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
         Its normals must agree in sign, as estimated ones do.
     wavelength : float, optional
-        Size of the details [L] of which one half counts: finer ones count whole, wider ones are shape. If not given,
+        Wavelength [L] of which half counts as roughness: finer details count fully, wider ones as shape. If not given,
         6 times the median smoothing length.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
@@ -234,8 +233,8 @@ def roughness(
     Returns
     -------
     ndarray, (n,)
-        Distance from the smooth surface along the normal [L], positive where a point lies on the side that the normals
-        point to. Zero for points that the operator leaves out.
+        Distance from the smoothed surface along the normal [L], positive on the side that the normals point to. Zero
+        for points that the operator leaves out.
 
     Raises
     ------
@@ -244,8 +243,8 @@ def roughness(
 
     See Also
     --------
-    fair_points : Makes the smooth surface.
-    principal_curvatures : How the surface itself bends.
+    fair_points : Computes the smoothed surface.
+    principal_curvatures : Curvature of the surface itself.
 
     Examples
     --------
@@ -260,7 +259,7 @@ def roughness(
     400 0.02
     """
     if wavelength is None:
-        wavelength = _DETAIL * np.median(laplacian.smoothing_lengths)
+        wavelength = _DETAIL * float(np.median(laplacian.smoothing_lengths))
     length = real(wavelength)
     if not 0.0 < length < np.inf:
         raise PointCloudError(f"The wavelength of the roughness is {wavelength!r}. Use a number above zero.")
@@ -323,12 +322,14 @@ def displace_by_mode(
         raise PointCloudError(f"Amplitude {amplitude!r} and phase {phase!r} must be finite numbers.")
     largest = np.abs(mode).max()
     if largest == 0.0:
-        raise PointCloudError(f"The mode is zero at all {len(points)} points, which moves none. Choose another one.")
+        raise PointCloudError(
+            f"The mode is zero at all {len(points)} points, so that no point would move. Choose another one."
+        )
     return points + (most * np.cos(angle)) * (mode / largest)[:, None] * laplacian.normals
 
 
 def smoothing_base(laplacian: LaplaceBeltrami, *, dirichlet: bool = False, progress: Progress | None = None) -> Floats:
-    """Return the part of the points' places that filters leave alone.
+    """Return the positions that filters do not change: they filter displacements from these.
 
     Parameters
     ----------
@@ -377,11 +378,10 @@ def _centers(laplacian: LaplaceBeltrami, weights: Floats) -> Floats:
 
 
 def boundary_places(laplacian: LaplaceBeltrami) -> Floats:
-    """Return the place on the boundary nearest to every point next to one, (n, 3) [L]; other rows are the points
-    themselves.
+    """Return the nearest position on the boundary of points near one, (n, 3) [L]; elsewhere the points themselves.
 
-    The boundary runs straight from each boundary point to its neighbours on the boundary, moved outwards to where the
-    operator takes it to be: of random points, those at the boundary lie a little inside.
+    The boundary is straight from each boundary point to its neighbours on the boundary, moved outwards by the distance
+    that the operator assumes: of random points, those at the boundary lie a little inside.
     """
     places = laplacian.points.copy()
     near = laplacian.near_boundary & (laplacian.component >= 0)
@@ -391,10 +391,10 @@ def boundary_places(laplacian: LaplaceBeltrami) -> Floats:
         return places
     if not len(boundary):
         raise PointCloudError(
-            f"{len(rows)} points are next to a boundary that has no points, so that nothing holds it. Name the"
+            f"{len(rows)} points are next to a boundary that has no points, so that it cannot be fixed. Give the"
             " boundary's points."
         )
-    # Parts are searched apart from each other, by a fourth coordinate that divides them.
+    # Components are searched separately, by a fourth coordinate.
     far = 4.0 * np.ptp(laplacian.points, axis=0).max()
     located = np.column_stack([laplacian.points, far * laplacian.component])
     tree = cKDTree(located[boundary])
@@ -403,7 +403,9 @@ def boundary_places(laplacian: LaplaceBeltrami) -> Floats:
     length, index = tree.query(located[boundary], k=np.arange(1, count + 1))
     start = laplacian.points[boundary[nearest]]
     along = laplacian.points[boundary[index[nearest]]] - start[:, None]
-    along[length[nearest] > laplacian.smoothing_lengths[boundary[nearest], None]] = 0.0  # not across to another course
+    along[length[nearest] > laplacian.smoothing_lengths[boundary[nearest], None]] = (
+        0.0  # not across to another boundary
+    )
     squared = np.einsum("ikc,ikc->ik", along, along)
     offset = laplacian.points[rows] - start
     share = np.einsum("ikc,ic->ik", along, offset) / np.where(squared > 0.0, squared, 1.0)
@@ -416,12 +418,12 @@ def boundary_places(laplacian: LaplaceBeltrami) -> Floats:
 
 
 class PointBlend:
-    """Strength, mask and what is kept, checked before any work: called with filtered places, it gives the result.
+    """Strength, mask and the size to keep, checked before any work: called with filtered positions, it blends them.
 
     Parameters
     ----------
     laplacian, strength, mask, keep, dirichlet
-        As in `smooth_points`, whose results without these are filtered places.
+        As in `smooth_points`, whose results without these are filtered positions.
 
     Attributes
     ----------
@@ -431,40 +433,39 @@ class PointBlend:
     Raises
     ------
     PointCloudError
-        A mask, strength or choice that makes no sense.
+        An invalid mask, strength or choice.
     """
 
     def __init__(
         self,
         laplacian: LaplaceBeltrami,
         *,
-        strength: Any = 1.0,
+        strength: float = 1.0,
         mask: ArrayLike | None = None,
         keep: str | None = None,
-        dirichlet: bool | float = False,
+        dirichlet: bool = False,
     ) -> None:
         n = len(laplacian.points)
         self.laplacian, self.keep = laplacian, keep
         check_switches(dirichlet=dirichlet)
         if not np.isfinite(real(strength)):
             raise PointCloudError(f"The strength is {strength!r}. Use a finite number, 1 for the full effect.")
-        weights = np.ones(n) if mask is None else check_values(mask, n)
-        if weights.ndim != 1 or weights.min() < -1e-6 or weights.max() > 1.0 + 1e-6:
+        weights = np.ones(n) if mask is None else check_values(mask, n, columns=False)
+        if weights.min() < -1e-6 or weights.max() > 1.0 + 1e-6:
             raise InvalidPointsError(
-                f"The mask has the shape {weights.shape} and values from {weights.min():.3g} to"
-                f" {weights.max():.3g}. Give {n} weights from 0 to 1."
+                f"The mask has values from {weights.min():.3g} to {weights.max():.3g}. Give {n} weights from 0 to 1."
             )
         weights = np.clip(weights, 0.0, 1.0)
         weights[laplacian.component < 0] = 0.0
         if dirichlet:
             weights[laplacian.boundary] = 0.0  # also in corners, where the images are not exact
         if not weights.any():
-            raise PointCloudError(f"The mask is zero at all {n} points, so that none would move. Choose some points.")
+            raise PointCloudError(f"The mask is zero at all {n} points, so that no point would move. Choose some.")
         self.mask, self.weights = weights, real(strength) * weights
         if not (keep is None or isinstance(keep, str)) or keep not in _KEPT:
             raise PointCloudError(f"What to keep is {keep!r}. Choose one of None, 'area', 'volume'.")
         if keep is not None and dirichlet:
-            raise PointCloudError("A boundary that stays fixes the size already: keep neither area nor volume with it.")
+            raise PointCloudError("A fixed boundary determines the size: keep neither area nor volume with it.")
         if keep == "volume" and laplacian.boundary.any():
             components = len(np.unique(laplacian.component[laplacian.boundary]))
             raise PointCloudError(
@@ -472,22 +473,22 @@ class PointBlend:
             )
 
     def __call__(self, filtered: Floats) -> Floats:
-        """Return the result for filtered places.
+        """Return the result for filtered positions.
 
         Parameters
         ----------
         filtered : ndarray, (n, 3)
-            Where the filter at full strength puts the points [L].
+            Positions by the filter at full strength [L].
 
         Returns
         -------
         ndarray, (n, 3)
-            New places for ``laplacian.points`` [L].
+            New positions of ``laplacian.points`` [L].
 
         Raises
         ------
         SolverError
-            A scale is not found.
+            No scale restores the size.
         """
         points = self.laplacian.points
         if self.keep is None or not self.weights.any():

@@ -1,7 +1,6 @@
-"""Directions carried along the surface, and maps of it around a point."""
+"""Parallel transport of directions along the surface, and maps of it around a point."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,15 +13,15 @@ from ..operator import LaplaceBeltrami, connection_laplacian, tangent_frames
 from ..types import Array, Floats, Progress
 from .geodesics import Geodesics
 
-_TIME = 2.0  # smoothing lengths that heat spreads over: with fewer, the randomness of points is not averaged out
-_FARTHEST = 200.0  # times as far the object may reach, or the heat there is below the least number
+_TIME = 2.0  # smoothing lengths that heat spreads over: fewer do not average out the randomness of points
+_FARTHEST = 200.0  # extent of the object in such lengths, at most, or the heat there underflows
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 
 
 def transport(
     laplacian: LaplaceBeltrami, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None
 ) -> Floats:
-    """Carry directions at some points along the surface to all others.
+    """Extend directions at some points to the whole surface by parallel transport.
 
     Parameters
     ----------
@@ -31,16 +30,15 @@ def transport(
     sources : array_like, (k,) int or (n,) bool
         Points with known directions, at least one.
     directions : array_like, (k, 3) or (3,)
-        Their directions, of any length, in the order of the indices; one serves all. What they have along the normal
-        does not count.
+        Their directions, of any length, in the order of the indices; one serves all. Normal parts do not count.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
     Returns
     -------
     ndarray, (n, 3)
-        Unit tangent vectors: each the direction of the nearest source, carried along the shortest way without turning
-        it in the surface. Where ways of several sources meet, directions blend. Zero on components without a source.
+        Unit tangent vectors: the direction of the nearest source, parallel along the geodesic. Where geodesics from
+        several sources meet, directions blend. Zero on components without a source.
 
     Raises
     ------
@@ -60,7 +58,7 @@ def transport(
 
     Examples
     --------
-    From near the pole of the unit sphere a direction comes to the equator along meridians:
+    From near the pole of the unit sphere a direction is transported to the equator along meridians:
 
     >>> import numpy as np
     >>> import core
@@ -96,8 +94,8 @@ class Transport:
     Notes
     -----
     One step of heat flow by the connection Laplacian (Sharp, Soliman, Crane, 2019). The factors are those of a coarse
-    version of it; ten or so steps of refinement make the solution that of all points, so that far from the sources too
-    it is right relative to its own size, which is all that its direction asks for.
+    version of it; ten or so steps of refinement make the solution that of all points, accurate relative to its own
+    size also far from the sources, so that its directions are.
 
     Examples
     --------
@@ -106,8 +104,8 @@ class Transport:
     >>> import numpy as np
     >>> import core
     >>> points = core.example_sphere()
-    >>> carried = core.Transport(core.build_laplacian(points))
-    >>> print(np.abs(carried.extend([0], [1, 0, 0]) + carried.extend([0], [-1, 0, 0])).max().round(6))
+    >>> field = core.Transport(core.build_laplacian(points))
+    >>> print(np.abs(field.extend([0], [1, 0, 0]) + field.extend([0], [-1, 0, 0])).max().round(6))
     0.0
     """
 
@@ -118,18 +116,18 @@ class Transport:
         self._geodesics: Geodesics | None = None
         self.frames = tangent_frames(laplacian.normals)
         areas = laplacian.areas
-        reach = max(
+        length = max(
             _TIME * (areas @ laplacian.smoothing_lengths) / areas.sum(),
             np.linalg.norm(np.ptp(laplacian.points, axis=0)) / _FARTHEST,
         )
-        mass = areas / reach**2
+        mass = areas / length**2
         flow = connection_laplacian(
             laplacian.stiffness, laplacian.normals, self.frames, mass, lambda: report("Equations", 0.1)
         )
         self._flow = TwoGrid(flow, mass, laplacian.points, report)
 
     def extend(self, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None) -> Floats:
-        """Carry directions to all points; see `transport`.
+        """Extend directions to all points; see `transport`.
 
         Parameters
         ----------
@@ -163,8 +161,7 @@ class Transport:
         wrong = np.count_nonzero(size <= 1e-9 * np.linalg.norm(directions, axis=-1))
         if wrong:
             raise InvalidPointsError(
-                f"{wrong} of {len(index)} directions are zero or stand at a right angle to the surface. Give ones"
-                " that lead along it."
+                f"{wrong} of {len(index)} directions are zero or normal to the surface. Give tangential ones."
             )
         load = np.zeros(len(self.frames), dtype=complex)
         load[index] = given / size
@@ -180,35 +177,35 @@ class Transport:
         geodesics: Geodesics | None = None,
         progress: Progress | None = None,
     ) -> Floats:
-        """Lay the surface out flat around a point; see `logarithmic_map`.
+        """Map the surface around a point to the plane; see `logarithmic_map`.
 
         Parameters
         ----------
         source : int
-            The point in the middle.
+            The point at the center.
         direction : array_like, (3,), optional
-            Where the first coordinate grows.
+            Direction of the first coordinate.
         geodesics : Geodesics, optional
-            Of the same operator, if there is one; otherwise the first map makes it for all.
+            Of the same operator, if there is one; otherwise computed once for all maps.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
         Returns
         -------
         ndarray, (n, 2)
-            Coordinates [L]; not a number on other components and at points left out.
+            Coordinates [L]; NaN on other components and at points left out.
 
         Raises
         ------
         InvalidPointsError
-            A source that is no point of the surface, or a direction along the normal.
+            A source that is not on the surface, or a direction along the normal.
         SolverError
             The solver did not converge.
         """
         laplacian, frames = self._laplacian, self.frames
         chosen = as_indices(np.atleast_1d(as_array(source, "Sources")), len(frames), "sources")
         if len(chosen) != 1:
-            raise InvalidPointsError(f"There are {len(chosen)} sources. Name the one point in the middle of the map.")
+            raise InvalidPointsError(f"There are {len(chosen)} sources. Give the one point at the center of the map.")
         source = int(chosen[0])
         axis = self.extend([source], frames[source].real if direction is None else direction, progress=progress)
         if geodesics is None:
@@ -218,41 +215,41 @@ class Transport:
         report = progress or _silent
         outwards = _gradient(laplacian, frames, np.where(reached, distance, 0.0), lambda: report("Map", 0.9))
         angle = np.angle(outwards * np.einsum("ij,ij->i", axis, frames).conj())
-        # The distance has no gradient at the point itself: around it, the tangent plane tells the direction.
+        # The distance has no gradient at the point itself: around it, directions are those in the tangent plane.
         near = laplacian.stiffness[[source]].tocoo().col
         offset = (laplacian.surface_points[near] - laplacian.surface_points[source]) @ frames[source]
         angle[near] = np.angle(offset * (axis[source] @ frames[source]).conj())
-        place = np.where(reached, distance, np.nan) * np.exp(1j * angle)
-        return np.column_stack([place.real, place.imag])
+        position = np.where(reached, distance, np.nan) * np.exp(1j * angle)
+        return np.column_stack([position.real, position.imag])
 
 
 def logarithmic_map(
     laplacian: LaplaceBeltrami, source: int, direction: ArrayLike | None = None, *, progress: Progress | None = None
 ) -> Floats:
-    """Lay the surface out flat around a point: polar coordinates by distance and direction along the surface.
+    """Map the surface around a point to the plane: polar coordinates by distance and direction along the surface.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
         Of n points.
     source : int
-        The point in the middle.
+        The point at the center.
     direction : array_like, (3,), optional
-        Where the first coordinate grows, of any length; the second one grows to the left of it, seen from where the
-        normal points to. Without one, the coordinate axis that leads most along the surface there.
+        Direction of the first coordinate, of any length; the second one is to the left of it, as seen against the
+        normal. Without one, the coordinate axis that is most tangential there.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
     Returns
     -------
     ndarray, (n, 2)
-        Coordinates [L]: the distance from the middle along the surface, in the direction in which the shortest way
-        begins. Not a number on other components and at points left out.
+        Coordinates [L]: the geodesic distance from the center, in the initial direction of the geodesic. NaN on other
+        components and at points left out.
 
     Raises
     ------
     InvalidPointsError
-        A source that is no point of the surface, or a direction along the normal.
+        A source that is not on the surface, or a direction along the normal.
     SolverError
         The solver did not converge.
 
@@ -263,10 +260,9 @@ def logarithmic_map(
 
     Notes
     -----
-    The direction in which a way begins is the angle, where it ends, between the gradient of the distance and a
-    direction carried there from the middle, as in the Vector Heat Method; distances are those of `geodesic_distance`.
-    On regular grids, where shortest paths keep to the directions of the grid, directions are off by up to a few
-    degrees.
+    The initial direction of a geodesic is the angle, at its end, between the gradient of the distance and a direction
+    transported there from the center, as in the Vector Heat Method; distances are those of `geodesic_distance`. On
+    regular grids, where shortest paths follow the directions of the grid, errors of directions are up to a few degrees.
 
     Examples
     --------
@@ -282,13 +278,13 @@ def logarithmic_map(
     return Transport(laplacian, progress=progress).logarithmic_map(source, direction, progress=progress)
 
 
-def _gradient(laplacian: LaplaceBeltrami, frames: Array, values: Floats, report: Callable[..., Any]) -> Array:
+def _gradient(laplacian: LaplaceBeltrami, frames: Array, values: Floats, report: Callable[[], None]) -> Array:
     """Return the gradient of a function, (n,) complex in the frames, by least squares over all pairs."""
     stiffness = laplacian.stiffness
     places, axes = np.ascontiguousarray(laplacian.surface_points.T), np.ascontiguousarray(frames.T)
     result = np.empty(len(values), dtype=complex)
 
-    def fit(rows: Any) -> None:
+    def fit(rows: slice) -> None:
         start = stiffness.indptr[rows.start : rows.stop + 1]
         second, weight = stiffness.indices[start[0] : start[-1]], -stiffness.data[start[0] : start[-1]]
         own = np.repeat(np.arange(len(start) - 1), np.diff(start))  # a pair of a point with itself has no length

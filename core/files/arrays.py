@@ -1,14 +1,15 @@
-"""Arrays of numpy, alone (.npy) or several in an archive (.npz), without anything that could run what a file holds."""
+"""Arrays of numpy, alone (.npy) or several in an archive (.npz), read without running any code of the file."""
 
 import re
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import IO
 
 import numpy as np
 
 from ..errors import InvalidPointsError
 from .lines import brief
+from .rows import unpacks_too_far
 from .table import PointTable
 
 _MAGIC = b"\x93NUMPY"
@@ -16,8 +17,6 @@ _LONGEST = 10_000  # bytes of a header, as numpy's own
 _FIELDS = {"descr": "'[^']*'", "fortran_order": "True|False", "shape": r"\([^()]*\)"}  # of a header
 _NUMBERS = r"'[<>=|]?([iu][1248]|f(2|4|8|12|16))'"
 _ROWS = r"\((\d{1,15})L?,\s*3L?,?\s*\)"  # Python 2 wrote 200L
-_RATIO = 100  # of an unpacked to a packed array; those of points have 1 to 20 ...
-_HARMLESS = 64e6  # ... or fewer bytes than this
 
 
 def read_array(path: Path) -> PointTable:
@@ -43,10 +42,10 @@ def read_array(path: Path) -> PointTable:
             entry = archive.getinfo(name)
             if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 raise InvalidPointsError(
-                    f"{path} is packed in a way that numpy does not use. Save it again with numpy.savez."
+                    f"{path} uses a compression that numpy does not support. Save it again with numpy.savez."
                 )
             unpacked = entry.file_size
-            if unpacked > max(_RATIO * size, _HARMLESS):
+            if unpacks_too_far(unpacked, size):
                 raise InvalidPointsError(
                     f"{path} would unpack to {unpacked / 1e6:,.0f} MB from {size / 1e6:,.1f} MB, which points never do."
                     " Save it again with numpy.savez, without compression."
@@ -55,10 +54,10 @@ def read_array(path: Path) -> PointTable:
                 return _read_rows(member, path, unpacked)
 
 
-def _read_rows(file: Any, path: Path, size: int) -> PointTable:
-    """Read an array (n, 3) of a file, or a part of one, that has so many bytes, and take memory for no more.
+def _read_rows(file: IO[bytes], path: Path, size: int) -> PointTable:
+    """Read an array (n, 3) of a file, or a member of an archive, of so many bytes, and allocate no more memory.
 
-    The header is not given to numpy, which reads it as Python.
+    The header is not parsed by numpy, which evaluates it as Python.
     """
     start = file.read(8)
     length = int.from_bytes(file.read(2 if start[6:7] == b"\x01" else 4), "little")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from ..errors import InvalidPointsError
 from ..types import Array, Floats, Ints
 from .lines import brief, is_number
 
+Blocks: TypeAlias = Callable[[], Iterator[list[str]]]
+
 _DELIMITERS = (";", "\t", "|", None, ",")  # in this order; None is white space
 _HEADER = 20  # lines that are no comments before the first point at most
-_SAMPLE = 100  # rows that tell what columns hold
-_ROUNDS = 20  # times that rows are read anew without a column that turned out to hold no numbers
+_SAMPLE = 100  # rows by which kinds of columns are decided
+_ROUNDS = 20  # times that rows are read again without a column that turned out not to be numeric
 _DIGITS = 24  # of a whole number of 64 bits at most, and more
 _MISSING = r"(?:n/?a|nan|null|none|nil|no ?data|-|--|\?|\*)"
 _IS_MISSING = re.compile(f"{_MISSING}?", re.IGNORECASE)
@@ -32,10 +34,10 @@ class Rows:
     Attributes
     ----------
     blocks : callable
-        Gives the lines of the file anew at each call; see `read_blocks`.
+        Returns an iterator of lists of the lines of the file at each call; see `read_blocks`.
     path : pathlib.Path
     first : int
-        How many lines stand before the first row.
+        How many lines precede the first row.
     delimiter : str or None
         None is white space.
     before : list of str
@@ -46,12 +48,12 @@ class Rows:
         Whether cells without a number are read as NaN.
     """
 
-    blocks: Callable[..., Any]
+    blocks: Blocks
     path: Path
     first: int
     delimiter: str | None
     before: list[str]
-    sample: list[Any] = field(default_factory=list)
+    sample: list[list[str]] = field(default_factory=list)
     filled: bool = False
 
     @property
@@ -59,23 +61,23 @@ class Rows:
         """Return the number of columns, of the longest row of the sample."""
         return max(map(len, self.sample))
 
-    def lines(self) -> Any:
+    def lines(self) -> Iterator[str]:
         """Yield the lines from the first row on."""
         return islice(chain.from_iterable(self.blocks()), self.first, None)
 
 
 def is_comment(line: str) -> bool:
-    """Tell whether a line is marked as a comment."""
+    """Whether a line is marked as a comment."""
     return line.lstrip().startswith(_COMMENTS)
 
 
-def find_rows(blocks: Callable[..., Any], path: Path) -> Rows:
-    """Find the first line with three numbers, and what separates them.
+def find_rows(blocks: Blocks, path: Path) -> Rows:
+    """Find the first line with three numbers, and their delimiter.
 
     Raises
     ------
     InvalidPointsError
-        There is none, or too much stands before it.
+        There is none, or too many lines precede it.
     """
     before: list[str] = []
     texts = 0
@@ -98,9 +100,9 @@ def find_rows(blocks: Callable[..., Any], path: Path) -> Rows:
 
 
 def _is_row(words: list[str]) -> bool:
-    """Tell whether words are those of a point: three numbers, of which cells may lack one; not numbers of columns.
+    """Whether words are those of a point: three numbers, of which one cell may be empty.
 
-    As pandas writes them, with an empty name for that of rows.
+    Not those of columns, as pandas numbers them, with an empty name for that of rows.
     """
     numbers = sum(map(is_number, words))
     numbered = words[:1] == [""] and words[1:] == [str(index) for index in range(len(words) - 1)]
@@ -108,12 +110,12 @@ def _is_row(words: list[str]) -> bool:
 
 
 def is_numeric(words: list[str]) -> bool:
-    """Tell whether there are numbers among words, and nothing else."""
+    """Whether words are numbers, or missing."""
     return any(map(is_number, words)) and all(is_number(word) or _IS_MISSING.fullmatch(word) for word in words)
 
 
 def split_row(line: str, delimiter: str | None) -> list[str]:
-    """Split a line without its comment, with decimal points; no words if the delimiter cannot be meant."""
+    """Split a line without its comment, with decimal points; no words if the delimiter does not fit."""
     line = _unquoted(_unmarked(line.replace("#N/A", "")), delimiter).split("#")[0].split("//")[0].strip(" ")
     if delimiter is None and re.search(r"\s,|,\s|,$", line):
         return []
@@ -129,7 +131,7 @@ def _unmarked(text: str) -> str:
 
 
 def _unquoted(text: str, delimiter: str | None) -> str:
-    """Return text without quotes, and what they protect as it does no harm: a decimal comma as a point."""
+    """Return text without quotes, and the delimiters inside them replaced: a decimal comma by a point."""
     if '"' not in text:
         return text
     inside = "." if delimiter == "," else "_"
@@ -152,11 +154,11 @@ def kinds(rows: Rows) -> tuple[list[int], list[int], list[int]]:
 
 
 def load(
-    rows: Rows, places: list[int], others: list[int], name: Callable[..., Any]
-) -> tuple[list[Any], Floats, list[Any]]:
+    rows: Rows, places: list[int], others: list[int], name: Callable[[int], str]
+) -> tuple[list[int], Floats, list[str]]:
     """Read columns of numbers.
 
-    A cell without a number becomes NaN, and a column in which another one holds text is left out, unless it is a place.
+    A cell without a number becomes NaN, and a column with a cell of text is left out, unless it is a coordinate.
 
     Parameters
     ----------
@@ -166,7 +168,7 @@ def load(
     others : list of int
         Indices of the other columns.
     name : callable
-        Gives the name of a column by its index, for the notices.
+        Returns the name of a column by its index, for the notices.
 
     Returns
     -------
@@ -176,7 +178,7 @@ def load(
     list of str
         Notices.
     """
-    notices = []
+    notices: list[str] = []
     for _ in range(_ROUNDS):
         try:
             values = _load(rows, places + others)
@@ -187,7 +189,7 @@ def load(
             _refuse_places(faults, places, rows.path)
             rows.filled = rows.filled or "" in faults.values()
             others = [index for index in others if not faults.get(index)]
-            notices += _tell_faults(faults, name, rows.path)
+            notices += _fault_notices(faults, name, rows.path)
         else:
             return _without_empty(rows, values, places, others, name, notices)
     notices = [f"{rows.path.name}: left out all columns but x y z, for many of them hold text in some rows."]
@@ -195,14 +197,14 @@ def load(
 
 
 def _refuse_places(faults: dict[int, str], places: list[int], path: Path) -> None:
-    """Refuse a file in which a place is text, or missing."""
+    """Refuse a file in which a coordinate is text, or missing."""
     fatal = next((text for index, text in faults.items() if index in places and text), "")
     if fatal:
         raise InvalidPointsError(f"{path} does not hold columns of numbers x y z: {fatal}. Correct the file.") from None
 
 
-def _tell_faults(faults: dict[int, str], name: Callable[..., Any], path: Path) -> list[str]:
-    """Tell which columns are left out, and for what."""
+def _fault_notices(faults: dict[int, str], name: Callable[[int], str], path: Path) -> list[str]:
+    """Report which columns are left out, and why."""
     wrong = [name(index) for index, text in faults.items() if text]
     why = next(filter(None, faults.values()), "")
     return [f"{path.name}: left out {brief(', '.join(wrong))}, for {why}."] if wrong else []
@@ -214,7 +216,7 @@ def load_whole(rows: Rows, index: int) -> tuple[Ints | None, bool]:
     Returns
     -------
     ndarray, (n,), or None
-        None if they are no whole numbers, or too large for 64 bits.
+        None if they are not whole numbers, or too large for 64 bits.
     bool
         Whether they are whole numbers but for missing ones, so that doubles lose digits.
     """
@@ -227,7 +229,8 @@ def load_whole(rows: Rows, index: int) -> tuple[Ints | None, bool]:
     return None, bool(np.char.isdecimal(np.char.lstrip(texts[texts != "nan"], "+-")).all())
 
 
-def _load(rows: Rows, columns: list[int], dtype: str | type[Any] = float) -> Array:
+def _load(rows: Rows, columns: list[int], dtype: str = "f8") -> Array:
+    """Load columns by numpy."""
     clean = partial(_filled, columns=columns) if rows.filled else _plain
     lines = chain.from_iterable(clean(block, rows.delimiter) for block in _blocks(rows))
     return np.loadtxt(lines, dtype=dtype, delimiter=rows.delimiter, usecols=columns, ndmin=2)
@@ -243,7 +246,7 @@ def _blocks(rows: Rows) -> Iterator[list[str]]:
 
 
 def _plain(lines: list[str], delimiter: str | None) -> list[str]:
-    """Return lines as numpy reads them: it knows comments with # alone, decimal points, and no quotes."""
+    """Return lines as numpy reads them: comments by # only, decimal points, and no quotes."""
     if delimiter is not None and any(map(str.isspace, lines)):
         lines = ["" if line.isspace() else line for line in lines]
     given = "\n".join(lines)
@@ -263,7 +266,7 @@ def _filled(lines: list[str], delimiter: str | None, columns: list[int]) -> list
     text = re.sub("#.*", "", text)
     if delimiter is None:
         return re.sub(rf"(?i)(?<!\S){_MISSING}(?!\S)", "nan", text).split("\n")
-    last, least = max(columns), max(columns[:3])  # rows may end after the places
+    last, least = max(columns), max(columns[:3])  # rows may end after the coordinates
     lines = [
         line + delimiter * (last - line.count(delimiter)) if line.count(delimiter) >= least else line
         for line in text.split("\n")
@@ -275,7 +278,7 @@ def _filled(lines: list[str], delimiter: str | None, columns: list[int]) -> list
 
 
 def _find_faults(rows: Rows, places: list[int], others: list[int]) -> dict[int, str]:
-    """Return what is wrong in the first row that lacks numbers: by column a text, which is empty for an empty cell."""
+    """Return the faults of the first row that lacks numbers: a text by column, empty for an empty cell."""
     for number, line in enumerate(rows.lines(), start=rows.first + 1):
         words = split_row(line, rows.delimiter) if line.strip() else []
         if not any(words):
@@ -298,16 +301,16 @@ def _find_faults(rows: Rows, places: list[int], others: list[int]) -> dict[int, 
 
 
 def _without_empty(
-    rows: Rows, values: Floats, places: list[int], others: list[int], name: Callable[..., Any], notices: list[str]
-) -> tuple[list[Any], Floats, list[Any]]:
-    """Leave out columns without any number, and tell how many cells of which others have none."""
+    rows: Rows, values: Floats, places: list[int], others: list[int], name: Callable[[int], str], notices: list[str]
+) -> tuple[list[int], Floats, list[str]]:
+    """Leave out columns without any number, and report how many cells of which others have none."""
     if not rows.filled:
         return others, values, notices
     missing = np.isnan(values).sum(axis=0)
     kept = (missing < len(values)) | (np.arange(len(missing)) < len(places))
-    told = list(map(name, [*places, *others]))
-    empty = [name for name, there in zip(told, kept, strict=True) if not there]
-    gaps = [f"{n} of {name}" for name, n, there in zip(told, missing, kept, strict=True) if n and there]
+    names = list(map(name, [*places, *others]))
+    empty = [label for label, there in zip(names, kept, strict=True) if not there]
+    gaps = [f"{n} of {label}" for label, n, there in zip(names, missing, kept, strict=True) if n and there]
     if empty:
         notices.append(f"{rows.path.name}: left out {brief(', '.join(empty))}, which has no numbers.")
     if gaps:

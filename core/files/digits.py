@@ -1,4 +1,4 @@
-"""Whole numbers and times whose digits single precision would lose: less an offset, or in two parts."""
+"""Whole numbers and times whose digits single precision would lose: minus an offset, or in two columns."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -15,8 +15,8 @@ _MEANT = 6  # ... that numbers have because they were measured so; more come out
 _SINGLE = 9  # digits with which single precision is written
 _FINE = 1e-5  # step of single precision that does not hurt, as a share of the extent ...
 _FINEST = 1e-3  # ... and in all: a millisecond, say, unless an offset does not help
-_HELPFUL = 0.125  # share of the largest number that is left by an offset that helps
-_FIRST = 1000  # numbers that are looked at before all others
+_HELPFUL = 0.125  # share of the largest number that a useful offset leaves at most
+_FIRST = 1000  # numbers that are tested before all others
 
 
 class Digits(NamedTuple):

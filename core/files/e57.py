@@ -4,7 +4,7 @@ import itertools
 import os
 import struct
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
@@ -14,12 +14,12 @@ from ..errors import InvalidPointsError
 from ..types import Array, Floats, Ints
 from .e57_bytes import PAGE, place_of, read_bytes, read_streams, unpack
 from .lines import brief
+from .rows import unpacks_too_far
 from .table import NORMAL, SCANNER, PointTable, full_color, unit_colors
 
 _HEAD = "<8sI12xQQQ"  # magic, version, offset and length of the description, size of a page
 _LONGEST = 32_000_000  # bytes of a description; that of a thousand scans has some millions
-_RATIO = 100  # of values, 8 bytes each, to the file; fields that are the same everywhere take no room in it ...
-_HARMLESS = 64e6  # ... or fewer bytes than this
+
 _LEAST, _GREATEST = -(2**63), 2**63 - 1  # whole numbers
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
@@ -40,16 +40,16 @@ class _Field(NamedTuple):
 
 class _Scan(NamedTuple):
     element: Element  # that describes it
-    fields: list[Any]
+    fields: list[_Field]
     count: int  # type: ignore[assignment]  # of its points
     offset: int  # in the file
 
 
 def read_e57(path: Path) -> PointTable:
-    """Read the points of all scans of an E57 file, where their poses put them, with all fields that are numbers.
+    """Read the points of all scans of an E57 file, transformed by their poses, with all numeric fields.
 
-    Each point gets the place of its scanner as a vector, if the file tells it, and the number of its scan, if there are
-    several. Those that are marked as invalid are left out.
+    Each point gets the position of its scanner as a vector, if the file has it, and the number of its scan, if there
+    are several. Those that are marked as invalid are left out.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def read_e57(path: Path) -> PointTable:
     with open(path, "rb") as file:
         scans = [scan for scan in _find_scans(file, path) if scan.count]
         values = sum(scan.count * max(len(scan.fields), 3) for scan in scans)
-        if 8 * values > max(_RATIO * os.fstat(file.fileno()).st_size, _HARMLESS):
+        if unpacks_too_far(8 * values, os.fstat(file.fileno()).st_size):  # constant fields take no bytes of the file
             count = sum(scan.count for scan in scans)
             raise InvalidPointsError(f"{path} is too short for the {count:,} points that it names. Copy it again.")
         places = [place_of(scan.offset) for scan in scans]
@@ -77,6 +77,7 @@ def read_e57(path: Path) -> PointTable:
 
 
 def _find_scans(file: BinaryIO, path: Path) -> list[_Scan]:
+    """Return the scans that the description of a file lists."""
     head = file.read(struct.calcsize(_HEAD)).ljust(struct.calcsize(_HEAD), b"\0")
     magic, version, begin, length, page = struct.unpack(_HEAD, head)
     if (magic, version, page) != (b"ASTM-E57", 1, PAGE):
@@ -87,8 +88,8 @@ def _find_scans(file: BinaryIO, path: Path) -> list[_Scan]:
     return [_describe(scan) for scan in root.findall("data3D/vectorChild")]
 
 
-def _parse(text: bytes) -> Any:
-    """Return the root of a tree of XML, whose tags keep their prefixes; in UTF-8, which is what E57 files use."""
+def _parse(text: bytes) -> Element:
+    """Return the root of a tree of XML, whose tags keep their prefixes; in UTF-8, as E57 files are."""
     builder, parser = TreeBuilder(), expat.ParserCreate("UTF-8")
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -101,23 +102,25 @@ def _parse(text: bytes) -> Any:
 
 
 def _refuse_doctype(*_: int | str | None) -> None:
-    """A few entities that it declares could stand for any amount of text."""
+    """Refuse declarations of entities, a few of which may expand to any amount of text."""
     raise ValueError("its description has a DOCTYPE, which E57 files never have")
 
 
-def _describe(scan: Any) -> _Scan:
+def _describe(scan: Element) -> _Scan:
+    """Return the fields, number and offset of the points of a scan."""
     points, prototype = scan.find("points"), scan.find("points/prototype")
-    if prototype is None:
+    if points is None or prototype is None:
         raise ValueError("it describes a scan without its points")
     count, offset = int(points.get("recordCount", "0")), int(points.get("fileOffset", "0"))
     if count < 0:
         raise ValueError(f"it describes a scan of {count} points")
-    fields = [_field(element) for element in prototype.iter() if element.get("type") in _KINDS]
-    return _Scan(scan, fields, count, offset)
+    kinds = [(element, element.get("type", "")) for element in prototype.iter()]
+    return _Scan(scan, [_field(element, kind) for element, kind in kinds if kind in _KINDS], count, offset)
 
 
-def _field(element: Any) -> _Field:
-    name, kind = element.tag, element.get("type")
+def _field(element: Element, kind: str) -> _Field:
+    """Return a field of a kind."""
+    name = element.tag
     if kind == "Float":
         return _Field(name, kind, 32 if element.get("precision") == "single" else 64)
     if kind == "String":
@@ -161,7 +164,7 @@ def _read_scan(file: BinaryIO, place: int, end: float, scan: _Scan, path: Path) 
         table.colors = _unit_colors(values, *np.transpose(limits))
     if fields.keys() >= set(_NORMALS):
         columns[NORMAL] = np.stack([columns.pop(name) for name in _NORMALS], axis=1)
-    _put(table, scan.element)
+    _transform(table, scan.element)
     return table
 
 
@@ -179,17 +182,17 @@ def _values(stream: Ints, field: _Field, count: int) -> Array:
 
 
 def _from_spherical(points: Floats) -> Floats:
-    """Return the places of ranges, azimuths and elevations, (n, 3)."""
+    """Return the positions of ranges, azimuths and elevations, (n, 3)."""
     distance, azimuth, elevation = points.T
     flat = distance * np.cos(elevation)
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)], axis=1)
 
 
-def _color_range(scan: Any, field: _Field) -> list[float] | tuple[float, float]:
-    """Return the values of no and of full color: those that the scan tells, or else those that the field can have."""
-    told = [_number(scan, f"colorLimits/{field.name}{end}", np.nan) for end in ("Minimum", "Maximum")]
+def _color_range(scan: Element, field: _Field) -> list[float] | tuple[float, float]:
+    """Return the values of no and of full color: those of the scan, or else those that the field can have."""
+    given = [_number(scan, f"colorLimits/{field.name}{end}", np.nan) for end in ("Minimum", "Maximum")]
     own = [field.scale * limit + field.offset for limit in (field.low, field.high)]
-    return next(limits for limits in (told, own, (0.0, 255.0)) if limits[0] < limits[1])
+    return next(limits for limits in (given, own, (0.0, 255.0)) if limits[0] < limits[1])
 
 
 def _unit_colors(values: Array, low: Floats, high: Floats) -> Array:
@@ -200,35 +203,35 @@ def _unit_colors(values: Array, low: Floats, high: Floats) -> Array:
     return unit_colors((values - low) / (high - low))
 
 
-def _put(table: PointTable, scan: Any) -> None:
-    """Turn and move points and normals from where the scanner is the origin, if the file tells where it was."""
+def _transform(table: PointTable, scan: Element) -> None:
+    """Transform points and normals by the pose of the scanner, if the file has it."""
     if scan.find("pose/rotation") is not None:
         w, x, y, z = (_number(scan, f"pose/rotation/{name}") for name in "wxyz")
         square = w * w + x * x + y * y + z * z
         if not 0.0 < square < np.inf:
-            raise ValueError("a scan has a rotation that is none")
+            raise ValueError("a scan has an invalid rotation")
         cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        turn = np.eye(3) + (2.0 / square) * (w * cross + cross @ cross)
-        table.points = table.points @ turn.T
+        rotation = np.eye(3) + (2.0 / square) * (w * cross + cross @ cross)
+        table.points = table.points @ rotation.T
         if NORMAL in table.attributes:
-            table.attributes[NORMAL] = (table.attributes[NORMAL] @ turn.T).astype(np.float32)
+            table.attributes[NORMAL] = (table.attributes[NORMAL] @ rotation.T).astype(np.float32)
     if scan.find("pose/translation") is not None:
-        place = np.array([_number(scan, f"pose/translation/{name}") for name in "xyz"])
-        if not np.isfinite(place).all():
-            raise ValueError("a scanner stood at a place that is none")
-        table.points += place
-        table.attributes[SCANNER] = np.tile(place, (len(table.points), 1))
-        table.single = table.single and not place.any()
+        position = np.array([_number(scan, f"pose/translation/{name}") for name in "xyz"])
+        if not np.isfinite(position).all():
+            raise ValueError("a scanner position is invalid")
+        table.points += position
+        table.attributes[SCANNER] = np.tile(position, (len(table.points), 1))
+        table.single = table.single and not position.any()
 
 
-def _number(scan: Any, path: str, default: float = 0.0) -> float:
-    """Return a number that describes a scan; where its element is empty it is zero."""
+def _number(scan: Element, path: str, default: float = 0.0) -> float:
+    """Return a number that describes a scan; zero where its element is empty."""
     element = scan.find(path)
     return default if element is None else float(element.text or 0.0)
 
 
 def _join(tables: list[PointTable]) -> PointTable:
-    """Return one table of several, whose columns are gone afterwards; what a scan lacks is zero, its colors white."""
+    """Return one table of several, whose columns are removed; attributes that a scan lacks are zero, colors white."""
     if len(tables) == 1:
         return tables[0]
     for index, table in enumerate(tables):
@@ -238,18 +241,18 @@ def _join(tables: list[PointTable]) -> PointTable:
         np.concatenate([table.points for table in tables]), single=any(table.single for table in tables)
     )
     for name, like in likes.items():
-        parts = [table.attributes.pop(name, None) for table in tables]
-        result.attributes[name] = _stacked(parts, tables, np.zeros(like.shape[1:], like.dtype))
+        columns = [table.attributes.pop(name, None) for table in tables]
+        result.attributes[name] = _stacked(columns, tables, np.zeros(like.shape[1:], like.dtype))
     if any(table.colors is not None for table in tables):
         result.colors = _stacked([table.colors for table in tables], tables, np.ones(4, np.float32))
     return result
 
 
-def _stacked(parts: list[Array | None], tables: list[PointTable], missing: Array) -> Array:
-    """Return the parts of all tables one after another; a table without one gets the missing value at each point."""
+def _stacked(columns: list[Array | None], tables: list[PointTable], missing: Array) -> Array:
+    """Return the columns of all tables one after another; a table without one gets the missing value at each point."""
     return np.concatenate(
         [
-            np.broadcast_to(missing, (len(table.points), *missing.shape)) if part is None else part
-            for part, table in zip(parts, tables, strict=True)
+            np.broadcast_to(missing, (len(table.points), *missing.shape)) if column is None else column
+            for column, table in zip(columns, tables, strict=True)
         ]
     )

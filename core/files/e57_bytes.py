@@ -42,7 +42,7 @@ def read_bytes(file: BinaryIO, place: int, count: int, path: Path) -> Ints:
     """
     first, last = place // _BODY, -(-(place + count) // _BODY)
     if last * PAGE > os.fstat(file.fileno()).st_size:
-        raise InvalidPointsError(f"{path} is too short for what it describes. Copy it again.")
+        raise InvalidPointsError(f"{path} is shorter than its header states. Copy it again.")
     result = np.empty((last - first, _BODY), np.uint8)
     file.seek(first * PAGE)
     for row in range(0, len(result), _BLOCK):
@@ -51,8 +51,8 @@ def read_bytes(file: BinaryIO, place: int, count: int, path: Path) -> Ints:
         wrong = np.flatnonzero(_checksums(pages) != pages.view(">u4")[:, -1])
         if len(wrong):
             raise InvalidPointsError(
-                f"{path} is broken: the checksum of its page {first + row + wrong[0] + 1} of {PAGE} bytes is another."
-                " Copy it again."
+                f"{path} is broken: the checksum of its page {first + row + wrong[0] + 1} of {PAGE} bytes does not"
+                " match. Copy it again."
             )
         rows[:] = pages[:, :_BODY]
     return result.reshape(-1)[place - first * _BODY :][:count]
@@ -68,7 +68,7 @@ def _checksums(pages: Ints) -> Ints:
 
 @cache
 def _crc_table() -> Ints:
-    """Return what each two bytes do to a CRC-32C, (65536,)."""
+    """Return the CRC-32C of each two bytes, (65536,)."""
     table = np.arange(2**16)
     for _ in range(16):
         table = (table >> 1) ^ np.where(table & 1, 0x82F63B78, 0)
@@ -84,7 +84,7 @@ def read_streams(file: BinaryIO, place: int, end: float, widths: list[int], coun
     place, end : int
         Of the section of the points, without checksums; it ends there at the latest.
     widths : list of int
-        Bits of a value of each field; what has 0 is left out.
+        Bits of a value of each field; those of 0 are left out.
     count : int
         How many points there are; a shorter section is refused before there is memory for them.
     path : pathlib.Path
@@ -98,7 +98,7 @@ def read_streams(file: BinaryIO, place: int, end: float, widths: list[int], coun
     kind, length, first = struct.unpack(_SECTION, read_bytes(file, place, struct.calcsize(_SECTION), path))
     begin = place_of(first)
     if kind != _POINTS or not place < begin <= place + length <= end:
-        raise ValueError("it has no points where it says so")
+        raise ValueError("it has no points at the offset that it states")
     data = read_bytes(file, begin, place + length - begin, path)
     needed = [-(-count * width // 8) for width in widths]
     if sum(needed) > len(data):
@@ -113,15 +113,15 @@ def read_streams(file: BinaryIO, place: int, end: float, widths: list[int], coun
         kind, length, number = struct.unpack_from(_PACKET, data, place)
         behind, at = place + length + 1, place + head + 2 * number
         if kind not in (_INDEX, _VALUES, _EMPTY) or behind % 4 or behind > len(data):
-            raise ValueError("its points are not divided as they should be")
+            raise ValueError("the packets of its points are invalid")
         if kind == _VALUES:
             sizes = data[place + head : at].view("<u2").tolist() if at <= behind else []
             if len(sizes) != len(widths) or at + sum(sizes) > behind:
-                raise ValueError("a packet of its points does not hold what it says")
+                raise ValueError("a data packet does not match its header")
             for index, size in enumerate(sizes):
-                part = data[at : at + min(size, needed[index] - filled[index])]
-                streams[index][filled[index] : filled[index] + len(part)] = part
-                filled[index] += len(part)
+                values = data[at : at + min(size, needed[index] - filled[index])]
+                streams[index][filled[index] : filled[index] + len(values)] = values
+                filled[index] += len(values)
                 at += size
         place = behind
     return streams

@@ -1,4 +1,4 @@
-"""Which file is read and written how, by the ending of its name."""
+"""Readers and writers of files, by the suffixes of their names."""
 
 import os
 import struct
@@ -27,7 +27,7 @@ from .whole import replacing
 
 _DEGREE = 1e5  # metres
 
-# What the modules that readers use raise about broken files; RuntimeError of archives with a password.
+# Errors of the modules that readers use at broken files; RuntimeError of archives with a password.
 _FAULTS = (ValueError, OverflowError, EOFError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile)
 
 _READERS = {
@@ -91,21 +91,21 @@ def read_points(path: Path, columns: str = "", las: LasChoices = LasChoices()) -
 
 
 def _doubts(table: PointTable, path: Path) -> Iterator[str]:
-    """Yield what a user should know about the coordinates of a table."""
+    """Yield notices about units and precision of the coordinates of a table."""
     units = np.ones(3)
     if table.degrees or look_like_degrees(table.points):
         known = "are" if table.degrees else "look like"
         yield (
             f"{path.name}: x and y {known} degrees of longitude and latitude, in which lengths, areas and curvatures"
-            " mean nothing. Project the points to meters first."
+            " are meaningless. Project the points to meters first."
         )
         units[:2] = _DEGREE
     if table.single:
-        yield from told_steps(table.points, path, units)
+        yield from precision_notices(table.points, path, units)
 
 
-def told_steps(points: Floats, path: Path, units: Floats | float = 1.0) -> Iterator[str]:
-    """Yield that points, (n, 3), were kept in single precision, where its steps, in some units, are wide for them."""
+def precision_notices(points: Floats, path: Path, units: Floats | float = 1.0) -> Iterator[str]:
+    """Report that points, (n, 3), were kept in single precision, where its steps, in some units, are too coarse."""
     steps = units * np.spacing(np.abs(points).max(axis=0).astype(np.float32))
     if steps.max() * 8192.0 > np.ptp(points, axis=0).max():
         step = np.spacing(np.float32(np.abs(points).max()))
@@ -117,7 +117,7 @@ def told_steps(points: Floats, path: Path, units: Floats | float = 1.0) -> Itera
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turn what may go wrong while a file is read into errors that tell its name and what to do.
+    """Convert errors while a file is read into typed ones that state its name and what to do.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def reading(path: Path) -> Iterator[None]:
     PointCloudError
         There is no such file, or it is broken.
     """
-    if not os.path.isfile(path):  # that of pathlib fails at folders that may not be read
+    if not os.path.isfile(path):  # that of pathlib fails at folders without permission
         raise PointCloudError(f"There is no file {path}. Check its name and folder.")
     try:
         with np.errstate(invalid="ignore", over="ignore"):  # in numbers that are refused, or kept as infinite
@@ -160,13 +160,13 @@ def write_points(path: Path, table: PointTable, double: bool = True) -> list[str
     Returns
     -------
     list of str
-        What is written otherwise than it was given.
+        Notices of differences between what was given and what is written.
     """
     suffix = path.suffix.lower()
     if suffix not in WRITABLE:
         raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(WRITABLE)}.")
-    with replacing(path) as part:
+    with replacing(path) as temporary:
         if suffix == ".ply":
-            return write_ply(part, table, double)
-        write_columns(part, table, "," if suffix == ".csv" else " ", double)
+            return write_ply(temporary, table, double)
+        write_columns(temporary, table, "," if suffix == ".csv" else " ", double)
         return []

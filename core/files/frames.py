@@ -14,7 +14,7 @@ _NUMBERED = re.compile(r"(.*?)(\d+)(\D*)", re.ASCII)
 def numbered_files(folder: Path) -> list[Path]:
     """Find the frames of a sequence: the files with points in a folder whose names differ by a number alone.
 
-    Files without a number are no frames. See `order_frames`.
+    Files without a number are not frames. See `order_frames`.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def order_frames(paths: list[Path]) -> list[Path]:
 
 
 def frame_number(path: FilePath) -> int:
-    """Return the last number in the name of a file, by which `order_frames` goes."""
+    """Return the last number in the name of a file, by which `order_frames` sorts."""
     return int(_parts(Path(path))[2])
 
 
@@ -80,5 +80,5 @@ def _parts(path: Path) -> re.Match[str]:
     """Divide the name of a file at its last number."""
     match = _NUMBERED.fullmatch(path.stem)
     if match is None:
-        raise PointCloudError(f"{path.name} has no number, so that its place is unknown. Name frames by numbers.")
+        raise PointCloudError(f"{path.name} has no number, so its order is unknown. Name frames by numbers.")
     return match

@@ -1,7 +1,6 @@
-"""What columns without names are, by their numbers: colors, normals, or values of an unknown kind."""
+"""Kinds of columns without names, by their values: colors, normals, or unknown."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -11,10 +10,10 @@ _COLORS = ("r", "g", "b")
 _SCANNED = ("intensity", *_COLORS)
 _NORMALS = ("nx", "ny", "nz")
 _FULL = 255.0
-_SAMPLE = 10_000  # rows that are looked at first
-_MOST = 30  # columns that are looked at
-_LENGTH = 0.02  # that normals, rounded to a few digits, may differ from 1
-_STEP = 1e-4  # that shares of 255 may differ from whole ones, in a file of a few digits
+_SAMPLE = 10_000  # rows that are examined first
+_MOST = 30  # columns that are examined
+_LENGTH = 0.02  # by which lengths of normals, rounded to a few digits, may differ from 1
+_STEP = 1e-4  # by which shares of 255 may differ from whole ones, in a file of a few digits
 
 
 def guess_names(values: Array, unknown: list[str], scanned: bool = True) -> list[str]:
@@ -26,7 +25,7 @@ def guess_names(values: Array, unknown: list[str], scanned: bool = True) -> list
     unknown : list of str
         A name for each, for those that are neither.
     scanned : bool
-        Whether a single number before colors may be an intensity: not one before the places, which counts.
+        Whether a single number before colors may be an intensity: not one before the coordinates, which counts points.
 
     Returns
     -------
@@ -49,8 +48,8 @@ def guess_names(values: Array, unknown: list[str], scanned: bool = True) -> list
     return names
 
 
-def _triples(values: Array, fits: Callable[..., Any]) -> list[int | None]:
-    """Return where three columns fit, or None for nowhere."""
+def _triples(values: Array, fits: Callable[[Array], bool]) -> list[int | None]:
+    """Return the first of three columns that fit, each, and None for no such columns."""
     sample = values[:: max(len(values) // _SAMPLE, 1)]
     firsts = range(min(values.shape[1], _MOST) - 2) if len(values) else ()
     return [
@@ -62,7 +61,7 @@ def _triples(values: Array, fits: Callable[..., Any]) -> list[int | None]:
 def _best_pair(colors: list[int | None], normals: list[int | None], values: Array) -> tuple[int | None, int | None]:
     """Choose columns of colors and of normals that explain most; of colors those whose channels differ least.
 
-    What stands beside them differs more: opacities, intensities, labels.
+    Opacities, intensities and labels beside them differ more.
     """
     pairs = [
         (color, normal)
@@ -80,6 +79,7 @@ def _best_pair(colors: list[int | None], normals: list[int | None], values: Arra
 
 
 def _spread(values: Floats, first: int | None) -> float:
+    """Return how much the channels of colors differ."""
     if first is None:
         return 0.0
     channels = values[:, first : first + 3]
@@ -88,7 +88,7 @@ def _spread(values: Floats, first: int | None) -> float:
 
 
 def _are_colors(values: Floats) -> bool:
-    """Tell whether three columns are whole numbers from 0 to 255, or their shares, and not all 0 or 1."""
+    """Whether three columns are whole numbers from 0 to 255, or their shares, and not all 0 or 1."""
     if not ((values >= 0.0) & (values <= _FULL)).all() or _are_normals(values):
         return False
     if values.max() > 1.0:
@@ -98,7 +98,7 @@ def _are_colors(values: Floats) -> bool:
 
 
 def _are_normals(values: Floats) -> bool:
-    """Tell whether three columns are vectors of length 1, but for some that are zero or missing."""
+    """Whether three columns are vectors of length 1, but for some that are zero or missing."""
     lengths = np.linalg.norm(values, axis=1)
     there = lengths > 0.0
     return bool(2 * there.sum() > len(values) and (np.abs(lengths[there] - 1.0) < _LENGTH).all())

@@ -39,7 +39,7 @@ def find_names(rows: Rows, numeric: list[int]) -> list[str | None]:
 
 
 def _split(line: str, delimiter: str | None, least: int = 3) -> Iterator[list[str]]:
-    """Yield the words of a line that may be names, so many at least, by all that could separate them."""
+    """Yield the words of a line that may be names, so many at least, by all possible delimiters."""
     body = _unmarked(line.strip(" \r\n").lstrip(_MARKS) if is_comment(line) else line.strip(" \r\n"))
     bodies = [body.partition(":")[2], body] if is_comment(line) and ":" in body else [body]
     for text in bodies:
@@ -51,18 +51,18 @@ def _split(line: str, delimiter: str | None, least: int = 3) -> Iterator[list[st
 
 
 def _unmarked(text: str) -> str:
-    """Return text without a mark of comments before it: any that does not come again, as what separates names does."""
+    """Return text without a mark of comments before it: any that does not occur again, as delimiters do."""
     mark = re.match(r"(rem\s|[^\w\s\"',|]+)\s*", text, re.IGNORECASE)
     return text[mark.end() :] if mark and text.count(mark[1]) == 1 else text
 
 
 def names_places(line: str, delimiter: str | None) -> bool:
-    """Tell whether a line names two coordinates or more."""
+    """Whether a line names two coordinates or more."""
     return any(sum(map(is_place, names)) > 1 for names in _split(line, delimiter, least=2))
 
 
 def _closed(text: str) -> str:
-    """Return text with its brackets closed up to the words before them, so that white space divides names alone."""
+    """Return text with brackets joined to the words before them, so that white space separates names only."""
     return re.sub(r"\s*([\[(])([^\])]*)", lambda match: match[1] + "_".join(match[2].split()), text)
 
 
@@ -91,7 +91,7 @@ def _fit(names: list[str], marked: bool, rows: Rows, numeric: list[int]) -> list
 
 
 def counts(rows: Rows, index: int = 0) -> bool:
-    """Tell whether a column counts the rows."""
+    """Whether a column counts the rows."""
     words = [row[index] for row in rows.sample if index < len(row)]
     if len(words) < 3 or not all(word.isdecimal() and word.isascii() and len(word) <= _MOST_DIGITS for word in words):
         return False
@@ -100,12 +100,12 @@ def counts(rows: Rows, index: int = 0) -> bool:
 
 
 def unnamed(index: int) -> str:
-    """Return what a column without a name is called, by its number in the file."""
+    """Return the name of a column without one, by its number in the file."""
     return f"column_{index + 1}"
 
 
 def _distinct(names: Sequence[str | None]) -> list[str | None]:
-    """Number names that come again."""
+    """Number repeated names."""
     seen: Counter[str | None] = Counter()
     result: list[str | None] = []
     for index, name in enumerate(names):

@@ -17,7 +17,7 @@ class LasChoices:
     classes : frozenset of int
         Those whose points are read; empty for all.
     withheld : bool
-        Whether points are read that are flagged as withheld, which stands for deleted.
+        Whether points are read that are flagged as withheld, which means deleted.
     """
 
     classes: frozenset[int] = frozenset()
@@ -30,7 +30,7 @@ def parse_classes(text: str) -> frozenset[int]:
     Raises
     ------
     PointCloudError
-        It holds something else.
+        A word is neither a class nor a range.
     """
     classes: set[int] = set()
     for word in re.split(r"[\s,;]+", text.strip()) if text.strip() else ():

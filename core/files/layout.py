@@ -28,7 +28,7 @@ class Layout(NamedTuple):
         Indices of other columns that are read.
     notices : list of str
     announced : int or None
-        How many points the line before them says there are.
+        How many points the line before them announces.
     degrees : bool
         Whether x and y are angles.
     """
@@ -61,8 +61,8 @@ def given_layout(columns: str, rows: Rows) -> Layout:
         x, y or z is missing, a name comes twice, or the file has another number of columns.
     """
     words = columns.replace(",", " ").split()
-    all_told = words[-1] != _REST
-    names = [None if word == _SKIPPED else word for word in words[: len(words) - (not all_told)]]
+    complete = words[-1] != _REST
+    names = [None if word == _SKIPPED else word for word in words[: len(words) - (not complete)]]
     lower = [name and name.lower() for name in names]
     missing = [axis for axis in "xyz" if axis not in lower]
     twice = [name for name in lower if name and lower.count(name) > 1]
@@ -70,7 +70,7 @@ def given_layout(columns: str, rows: Rows) -> Layout:
         problem = f"do not name {' '.join(missing)}" if missing else f"name {twice[0]} more than once"
         raise InvalidPointsError(f"{rows.path}: the columns {brief(columns)!r} {problem}. Name x y z once each.")
     width = len(rows.sample[0])
-    if len(names) > width or (len(names) < width and all_told):
+    if len(names) > width or (len(names) < width and complete):
         raise InvalidPointsError(
             f"{rows.path}: {len(names)} columns are named, but its first point has {width}. Write {_SKIPPED} for a"
             f" column to leave out, and {_REST} at the end for all that follow."
@@ -79,11 +79,11 @@ def given_layout(columns: str, rows: Rows) -> Layout:
     places = [lower.index(axis) for axis in "xyz"]
     others = [index for index in (*numeric, *empty) if index < len(names) and names[index] and index not in places]
     texts = [name for index, name in enumerate(names) if name and index in textual and index not in places]
-    return Layout(names, places, others, _tell_texts(texts, rows.path))
+    return Layout(names, places, others, _text_notices(texts, rows.path))
 
 
 def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
-    """Find the layout of a text by its names, or by what columns hold.
+    """Find the layout of a text by its names, or by the values of columns.
 
     Parameters
     ----------
@@ -94,17 +94,17 @@ def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
     Raises
     ------
     InvalidPointsError
-        The names tell that no three columns are places.
+        By their names, no three columns are coordinates.
     """
     numeric, textual, empty = kinds(rows)
     names = find_names(rows, numeric)
     found = find_places(names, numeric) if names else None
-    if found and not found.sure:  # what counts the points is no guess at a place
+    if found and not found.sure:  # a column that counts the points is no coordinate
         found = find_places(names, [index for index in numeric if not counts(rows, index)]) or found
     notices = []
     if found:
         places = found.indices
-        notices += _tell_places(found, names, rows.path)
+        notices += _place_notices(found, names, rows.path)
     else:
         if names:
             _refuse_others(names, rows.path)
@@ -115,18 +115,18 @@ def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
     sparse = [index for index in empty if index < len(names) and names[index] not in (None, unnamed(index))]
     others = [index for index in sorted(read + sparse) if index not in places]
     layout = Layout(names, places, others, notices, _announced(rows), bool(found and found.degrees))
-    notices += _tell_texts([layout.label(index) for index in textual if index < len(names)], rows.path)
+    notices += _text_notices([layout.label(index) for index in textual if index < len(names)], rows.path)
     if len(read) < len(numeric):
         notices.append(
             f"{rows.path.name}: left out {len(numeric) - len(read)} columns or more at the end, which have no names."
         )
-    passed = [
+    skipped = [
         line.strip()
         for line in rows.before
         if _is_odd_row(line, rows.delimiter) or (not any(names) and names_places(line, rows.delimiter))
     ]
-    if passed:
-        notices.append(f"{rows.path.name}: passed over {brief(repr(passed[0]))}, which stands before the first point.")
+    if skipped:
+        notices.append(f"{rows.path.name}: skipped {brief(repr(skipped[0]))}, before the first point.")
     if rows.sample[0] == [str(index) for index in range(rows.width)] and not any(names):
         notices.append(
             f"{rows.path.name}: its first row, {' '.join(rows.sample[0])}, is read as a point. Delete it from the file"
@@ -136,43 +136,41 @@ def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
 
 
 def _is_odd_row(line: str, delimiter: str | None) -> bool:
-    """Tell whether a line before the first point holds numbers, but is neither a point nor their number."""
+    """Whether a line before the first point holds numbers, but is neither a point nor their number."""
     words = split_row(line, delimiter)
     return len(words) > 1 and is_numeric(words)
 
 
-def _tell_places(found: Places, names: list[str | None], path: Path) -> list[str]:
-    """Tell which columns are x y z, unless they are called so."""
-    told = ", ".join(names[index] for index in found.indices)
-    notices = []
+def _place_notices(found: Places, names: Sequence[str | None], path: Path) -> list[str]:
+    """Report which columns are x y z, unless those are their names."""
+    used = brief(", ".join(names[index] or "" for index in found.indices))
     if not found.sure:
-        notices.append(f"{path.name}: no names tell which columns are x y z. Took {brief(told)} for them. {_GIVE}.")
-    elif not found.plain:
-        notices.append(f"{path.name}: took {brief(told)} for x y z.")
-    return notices
+        return [f"{path.name}: no names identify x y z. Used {used}. {_GIVE}."]
+    return [] if found.plain else [f"{path.name}: used {used} for x y z."]
 
 
 def _refuse_others(names: Sequence[str | None], path: Path) -> None:
-    """Refuse a file with names of columns that are no places, if there are too few others; a title has none of them."""
-    told = [name for name in names if name]
-    if any(map(is_other, told)):
+    """Refuse a file with names of other columns than coordinates; a title has none of them."""
+    given = [name for name in names if name]
+    if any(map(is_other, given)):
         raise InvalidPointsError(
-            f"{path} has no x y z among its columns {brief(', '.join(told))}. Give the names of all columns in Columns"
+            f"{path} has no x y z among its columns {brief(', '.join(given))}. Give the names of all columns in Columns"
             " at the import, with x y z among them."
         )
 
 
 def _first_places(rows: Rows, numeric: list[int]) -> list[int]:
-    """Return the first three columns of numbers; not one before them that counts the points, as they do not."""
+    """Return the first three columns of numbers, without a first one that counts the points."""
     counted = len(numeric) > 3 and counts(rows, numeric[0]) and not counts(rows, numeric[1])
     return numeric[1:4] if counted else numeric[:3]
 
 
-def _tell_texts(texts: Sequence[str], path: Path) -> list[str]:
+def _text_notices(texts: Sequence[str], path: Path) -> list[str]:
+    """Report columns of text."""
     return [f"{path.name}: left out {brief(', '.join(texts))}, which holds text."] if texts else []
 
 
 def _announced(rows: Rows) -> int | None:
-    """Return the number of points that the last line before them tells, if it does."""
+    """Return the number of points that the last line before them announces, if it does."""
     word = rows.before[-1].strip().lstrip("#/%! ") if rows.before else ""
     return int(word) if word.isdecimal() and len(word) <= _MOST_DIGITS else None

@@ -1,4 +1,4 @@
-"""Text in blocks of lines: all lines of a file at once would take many times its size."""
+"""Text in blocks of lines: all lines of a file at once would need many times its size."""
 
 import codecs
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from ..errors import InvalidPointsError
 
 _BLOCK = 2**16  # characters that are read at once
 _LONGEST = 100_000  # characters of a line, thousands of columns
-_BRIEF = 100  # characters of what a text of an error quotes
+_BRIEF = 100  # characters of a quotation in a message
 
 
 def read_text(path: Path, skipped: tuple[str, ...] = ()) -> Iterator[list[str]]:
@@ -19,7 +19,7 @@ def read_text(path: Path, skipped: tuple[str, ...] = ()) -> Iterator[list[str]]:
 
 
 def _encoding(path: Path) -> str:
-    """Return the encoding of a file of text: its first bytes tell UTF-16, and what is no UTF-8 is Windows' own."""
+    """Return the encoding of a text: UTF-16 by its byte order mark, UTF-8 if it is valid, or that of Windows."""
     with open(path, "rb") as file:
         start = file.read(_BLOCK)
     if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -40,7 +40,7 @@ def read_blocks(file: IO[AnyStr], path: Path, skipped: tuple[AnyStr, ...] = ()) 
     path : pathlib.Path
         Its name, for the text of the error.
     skipped : tuple of str
-        How lines begin that may be of any length; only the beginning of a longer one is told.
+        Prefixes of lines of any length; only the beginning of a longer one is yielded.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def read_blocks(file: IO[AnyStr], path: Path, skipped: tuple[AnyStr, ...] = ()) 
         if max(map(len, lines)) >= _LONGEST:
             if any(len(line) >= _LONGEST and not line.startswith(skipped) for line in lines):
                 raise InvalidPointsError(
-                    f"{path} has a line of {_LONGEST:,} characters or more, which is no point. Export it again."
+                    f"{path} has a line of {_LONGEST:,} characters or more, which is not a point. Export it again."
                 )
             while len(end) == _LONGEST and end[-1] not in ("\n", ord("\n")):
                 end = file.readline(_LONGEST)
@@ -61,7 +61,7 @@ def read_blocks(file: IO[AnyStr], path: Path, skipped: tuple[AnyStr, ...] = ()) 
 
 
 def is_number(word: str) -> bool:
-    """Tell whether a word is a number for numpy, which takes fewer than Python: no 1_0, and no digits but 0 to 9."""
+    """Whether a word is a number for numpy, which accepts fewer than Python: no 1_0, and no digits but 0 to 9."""
     try:
         float(word)
     except ValueError:
@@ -70,5 +70,5 @@ def is_number(word: str) -> bool:
 
 
 def brief(text: str) -> str:
-    """Return the beginning of a text that came from a file."""
+    """Return the beginning of a text from a file."""
     return text if len(text) <= _BRIEF else f"{text[:_BRIEF]}..."

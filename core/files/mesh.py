@@ -1,4 +1,4 @@
-"""Meshes to files: vertices with what they hold, and faces."""
+"""Meshes to files: vertices with their attributes, and faces."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -33,13 +33,13 @@ def write_mesh(path: Path, table: PointTable, faces: list[Ints], double: bool = 
     Returns
     -------
     list of str
-        What is written otherwise than it was given.
+        Notices of differences between what was given and what is written.
     """
     suffix = path.suffix.lower()
     if suffix not in MESHES:
         raise PointCloudError(f"A mesh cannot be written to {path}. Give it one of {', '.join(MESHES)}.")
-    with replacing(path) as part:
-        return _WRITERS[suffix](part, table, double, faces) or []
+    with replacing(path) as temporary:
+        return _WRITERS[suffix](temporary, table, double, faces) or []
 
 
 def _write_obj(path: Path, table: PointTable, double: bool, faces: list[Ints]) -> None:
@@ -50,11 +50,12 @@ def _write_obj(path: Path, table: PointTable, double: bool, faces: list[Ints]) -
         values, line = np.hstack([values, table.colors[:, :3]]), " ".join([line, *3 * ["%.6g"]])
     with open(path, "w", encoding="utf-8", newline="\n") as file:
         _write_rows(file, line, values)
-        for part in faces:
-            _write_rows(file, " ".join(["f", *part.shape[1] * ["%d"]]), part + 1)
+        for polygons in faces:
+            _write_rows(file, " ".join(["f", *polygons.shape[1] * ["%d"]]), polygons + 1)
 
 
 def _write_rows(file: TextIO, line: str, rows: Array) -> None:
+    """Write rows of numbers by the format of a line."""
     line += "\n"
     for start in range(0, len(rows), _BLOCK):
         block = rows[start : start + _BLOCK]
@@ -67,7 +68,8 @@ def _write_stl(path: Path, table: PointTable, double: bool, faces: list[Ints]) -
         raise PointCloudError(
             "STL keeps single precision, too little for coordinates as large as these. Write .ply or .obj."
         )
-    corners = np.concatenate([triangles(part, table.points) for part in faces]) if len(faces) else np.zeros((0, 3), int)
+    divided = [triangles(polygons, table.points) for polygons in faces]
+    corners = np.concatenate(divided) if divided else np.zeros((0, 3), int)
     places = table.points[corners]
     normals = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)

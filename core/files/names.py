@@ -1,9 +1,9 @@
-"""What columns are by their names: files of surveys have words of their own for x y z, in any order."""
+"""Kinds of columns by their names: files of surveys have words of their own for x y z, in any order."""
 
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..types import Array
 from .ascii_words import LETTERS
@@ -58,7 +58,7 @@ _SYSTEMS = (  # the surest first
     _System({"1"}, {"2"}, ({"3"},)),
 )
 _ANY = set().union(*(words for system in _SYSTEMS for words in (system.x, system.y, *system.z)))
-_FILLERS = re.compile(  # words that say nothing of what is measured: where, in which system, in which unit
+_FILLERS = re.compile(  # words that do not name a quantity but a position, system or unit
     r"(points?|pts?|p|pos|positions?|locations?|loc|vertex|vertices|vert|cent(er|re)|centroid|mean|wert"
     r"|grid|map|local|world|global|utm\d*s?|epsg|ecef|geo|gps|gnss|wgs\d*|gk|mga\d*|rd|eov"
     r"|msl|asl|tvd(ss)?|nn|nhn|ue|ueber|navd\d*|ellipsoidal|ellipsoid|ellps|ell|orthometric|ortho"
@@ -67,7 +67,7 @@ _FILLERS = re.compile(  # words that say nothing of what is measured: where, in 
 _JOINED = re.compile(  # without a space as well
     r"(coord(inate|onnee|enada|inata)?s?|koord(inaten?)?|points?|positions?|(?<![a-z])pos|pos(?![a-z]))"
 )
-_OTHERS = re.compile(  # of columns that are no places
+_OTHERS = re.compile(  # of columns that are not coordinates
     r"(.*(id|number|nummer|index|name|time|zeit|date|datum|stamp|code|class|colou?r|norm(al)?|intensity|ance|ivity)"
     r"|no|nos|nr|num|nbr|label|idx|key|station|sta|pkt|punkt|punto|ponto|track|line|ring|channel|beam|row|col|column"
     r"|[dfnuvw][xyz]|t|s|sec|secs|seconds?|hour|min|utc|sod|epoch|week|tow"
@@ -97,23 +97,23 @@ _TRIPLES = {
 class Places(NamedTuple):
     """Which columns are x y z."""
 
-    indices: list[Any]
-    sure: bool  # whether their names say so
+    indices: list[int]
+    sure: bool  # whether by their names
     plain: bool  # whether they are x y z by name
     degrees: bool  # whether x and y are angles
 
 
 def _words(text: str) -> list[str]:
-    """Return the words of a name that say something, in lower case and without accents."""
+    """Return the words of a name but fillers, in lower case and without accents."""
     text = unicodedata.normalize("NFKD", text.translate(LETTERS)).encode("ascii", "ignore").decode()
     text = _JOINED.sub(" ", re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text).lower())
     return [word for word in re.findall(r"[a-z0-9]+", text) if not _FILLERS.fullmatch(word)]
 
 
 def _place(name: str) -> str:
-    """Return the word of a name that tells its axis, such as x of POINT_X, empty if there is none.
+    """Return the word of a name for its axis, such as x of POINT_X, empty if there is none.
 
-    What stands in brackets is most often a unit, but may tell it better: Y (Rechtswert).
+    Brackets mostly hold a unit, but may name it better: Y (Rechtswert).
     """
     words = _words(_BRACKETS.sub(" ", name))
     words += [word for word in _words(" ".join(re.findall(r"[\[(<{]([^\])>}]*)", name))) if word in _ANY]
@@ -121,24 +121,24 @@ def _place(name: str) -> str:
 
 
 def _hint(name: str) -> str:
-    """Return the only word of a name that could tell its axis, beside others that are not known: Shape_X."""
+    """Return the only word of a name that may name its axis, beside unknown ones: Shape_X."""
     words = [word for word in _words(_BRACKETS.sub(" ", name)) if word in _ANY]
     return words[0] if len(words) == 1 and not is_other(name) else ""
 
 
 def is_other(name: str) -> bool:
-    """Tell whether a name is known as one of what is no place: a number, a time, a color and so on."""
+    """Whether a name is known as that of another column than coordinates: a number, a time, a color and so on."""
     words = _words(_BRACKETS.sub(" ", name))
     return not words or (not _place(name) and any(_OTHERS.fullmatch(word) for word in words))
 
 
 def is_place(name: str) -> bool:
-    """Tell whether a name is a word for a coordinate."""
+    """Whether a name is a word for a coordinate."""
     return bool(_place(name))
 
 
 def is_known(name: str) -> bool:
-    """Tell whether a name is a word for what files of points hold."""
+    """Whether a name is a known word for a column of a file of points."""
     return bool(_place(name)) or (bool(_words(name)) and is_other(name))
 
 
@@ -173,7 +173,7 @@ def find_places(names: Sequence[str | None], numeric: list[int]) -> Places | Non
 
 
 def _find_system(words: dict[int, str]) -> Places | None:
-    """Find columns of x y z by words that tell their axes, by index."""
+    """Find columns of x y z by the words for their axes, by index."""
     for system, x, y in _pairs(words):
         z = next((z for z in (_first(words, kind) for kind in system.z) if z is not None), None)
         if z is not None:
@@ -191,7 +191,7 @@ def _pairs(words: dict[int, str]) -> Iterator[tuple[_System, int, int]]:
 
 
 def standard_names(names: dict[str, Array]) -> dict[str, str]:
-    """Return new names for columns of colors and normals that are called otherwise, such as colorRed or NormalX."""
+    """Return new names for columns of colors and normals with other names, such as colorRed or NormalX."""
     found: dict[str, str] = {}
     for name in names:
         words = [word for word in _words(name) if word not in _ABOUT_COLORS]
@@ -206,4 +206,5 @@ def standard_names(names: dict[str, Array]) -> dict[str, str]:
 
 
 def _first(words: dict[int, str], kind: set[str]) -> int | None:
+    """Return the first index of a word of a kind."""
     return next((index for index, word in words.items() if word in kind), None)

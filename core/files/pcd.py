@@ -1,4 +1,4 @@
-"""PCD, the point files of the Point Cloud Library: text, binary, or packed by LZF."""
+"""PCD, the point files of the Point Cloud Library: text, binary, or compressed by LZF."""
 
 import struct
 from pathlib import Path
@@ -53,7 +53,7 @@ def read_pcd(path: Path) -> PointTable:
             break
     table = from_columns(columns, path)
     if left_out:
-        table.notices.append(f"{path.name}: left out {brief(', '.join(left_out))}, with several numbers a point.")
+        table.notices.append(f"{path.name}: left out {brief(', '.join(left_out))}, with several numbers per point.")
     return table
 
 
@@ -76,8 +76,7 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[list[_Field], int, str]:
                 return *_read_fields(found, path), words[0]
             case _:
                 raise InvalidPointsError(
-                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PCD file. Export it"
-                    " again."
+                    f"{path}, line {number}: {line[:60]!r} is not valid in the header of a PCD file. Export it again."
                 )
     raise InvalidPointsError(f"{path} has no header of a PCD file that ends with DATA. Export it again.")
 
@@ -87,7 +86,7 @@ def _is_count(word: str) -> bool:
 
 
 def _read_fields(found: dict[str, list[str]], path: Path) -> tuple[list[_Field], int]:
-    """Return the fields and the number of points that the lines of a header tell."""
+    """Return the fields and the number of points that the lines of a header state."""
     names, sizes, types = (found.get(key, []) for key in ("FIELDS", "SIZE", "TYPE"))
     counts = found.get("COUNT", ["1"] * len(names))
     width, height = (int(found.get(key, [usual])[0]) for key, usual in (("WIDTH", "0"), ("HEIGHT", "1")))
@@ -121,7 +120,7 @@ def _read_binary(file: BinaryIO, fields: list[_Field], count: int, path: Path) -
 
 
 def _read_packed(file: BinaryIO, fields: list[_Field], count: int, path: Path) -> list[Array | None]:
-    """Read data packed as a whole: all values of the first field, then all of the next one."""
+    """Read data compressed as a whole: all values of the first field, then all of the next one."""
     head = file.read(8)
     packed, length = struct.unpack("<II", head) if len(head) == 8 else (0, 0)
     begin, size = file.tell(), file.seek(0, 2)
@@ -138,8 +137,8 @@ def _read_packed(file: BinaryIO, fields: list[_Field], count: int, path: Path) -
 
 
 def _unpack(data: bytes, length: int) -> bytearray:
-    """Undo LZF: runs of bytes as they are, and repetitions of bytes before; only one after another can be undone."""
-    part: bytes | bytearray
+    """Decompress LZF: runs of literal bytes, and repetitions of bytes before, one after another."""
+    block: bytes | bytearray
     result = bytearray(length)
     place = done = 0
     try:
@@ -148,7 +147,7 @@ def _unpack(data: bytes, length: int) -> bytearray:
             place += 1
             if control < 32:
                 run = control + 1
-                part = data[place : place + run]
+                block = data[place : place + run]
                 place += run
             else:
                 run = control >> 5
@@ -159,24 +158,24 @@ def _unpack(data: bytes, length: int) -> bytearray:
                 first = done - ((control & 31) << 8) - data[place] - 1
                 place += 1
                 if first < 0:
-                    raise ValueError("its packed data repeat what is not there")
-                part = result[first : min(first + run, done)]
-                if len(part) < run:  # it repeats itself, too
-                    part = (part * (run // len(part) + 1))[:run]
-            if len(part) != run or done + run > length:
-                raise ValueError("its packed data are longer than its header says, or cut off")
-            result[done : done + run] = part
+                    raise ValueError("its compressed data refer to bytes before the start")
+                block = result[first : min(first + run, done)]
+                if len(block) < run:  # it repeats itself, too
+                    block = (block * (run // len(block) + 1))[:run]
+            if len(block) != run or done + run > length:
+                raise ValueError("its compressed data are longer than its header states, or truncated")
+            result[done : done + run] = block
             done += run
     except IndexError as error:
-        raise ValueError("its packed data are cut off") from error
+        raise ValueError("its compressed data are truncated") from error
     if done != length:
-        raise ValueError("its packed data are shorter than its header says")
+        raise ValueError("its compressed data are shorter than its header states")
     return result
 
 
 def _split_color(column: Array, alpha: bool) -> dict[str, Array]:
     """Return the columns of a color whose bytes are alpha, red, green and blue of a whole number, or of a float."""
     bits = column.astype(np.float32).view(np.uint32) if column.dtype.kind == "f" else column.astype(np.uint32)
-    parts = {name: (bits >> shift).astype(np.uint8) for name, shift in (("red", 16), ("green", 8), ("blue", 0))}
+    channels = {name: (bits >> shift).astype(np.uint8) for name, shift in (("red", 16), ("green", 8), ("blue", 0))}
     opacity = (bits >> 24).astype(np.uint8)
-    return parts | ({"alpha": opacity} if alpha and opacity.any() else {})
+    return channels | ({"alpha": opacity} if alpha and opacity.any() else {})

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ..errors import InvalidPointsError
 from ..types import Array, Ints
 from .ascii_words import ascii_words
 from .lines import brief
-from .ply_lists import end_of_records, read_fixed
+from .ply_lists import Code, end_of_records, read_fixed
 from .polygons import triangles
 from .rows import read_records, read_rows
 from .table import PointTable, from_columns, to_columns
@@ -28,17 +28,22 @@ _MOST_DIGITS = 15  # of a count
 class _Element(NamedTuple):
     name: str
     count: int  # type: ignore[assignment]  # in place of the method of tuples
-    names: list[Any]  # of the properties
-    types: list[Any]  # numpy's codes; a pair for a list: of its length and of its items
+    names: list[str]  # of the properties
+    types: list[Code]
 
     @property
     def lists(self) -> list[str]:
         """Names of the properties that are lists."""
-        return [name for name, code in zip(self.names, self.types, strict=True) if isinstance(code, tuple)]
+        return [name for name, code in zip(self.names, self.codes, strict=True) if code is None]
+
+    @property
+    def codes(self) -> list[str | None]:
+        """numpy's codes of the properties, None for lists."""
+        return [None if isinstance(code, tuple) else code for code in self.types]
 
 
 class PlyVertices(NamedTuple):
-    """The vertices of a PLY file as they stand there.
+    """The vertices of a PLY file, in its types.
 
     Attributes
     ----------
@@ -47,12 +52,12 @@ class PlyVertices(NamedTuple):
     order : str or None
         "<" or ">", the order of bytes; None for text.
     comments : list of str
-        Lines of the header that say nothing about the data.
+        Lines of the header that do not describe the data.
     notices : list of str
-        What was left out.
+        Which elements and lists were left out.
     """
 
-    columns: dict[str, Any]
+    columns: dict[str, Array]
     order: str | None
     comments: list[str]
     notices: list[str]
@@ -73,7 +78,7 @@ def read_ply(path: Path) -> PointTable:
 
 
 def read_vertex_columns(path: Path) -> PlyVertices:
-    """Read the vertices of a PLY file as they stand there; errors as of `read_ply`."""
+    """Read the vertices of a PLY file in its types; errors as of `read_ply`."""
     with open(path, "rb") as file:
         order, elements, comments = _read_header(file, path)
         names = [element.name for element in elements]
@@ -84,8 +89,7 @@ def read_vertex_columns(path: Path) -> PlyVertices:
         vertex = elements[names.index("vertex")]
         before = [element for element in elements[: names.index("vertex")] if element.count]
         if order is None:
-            types = [None if isinstance(code, tuple) else code for code in vertex.types]
-            columns = read_rows(file, types, vertex.count, path, sum(element.count for element in before))
+            columns = read_rows(file, vertex.codes, vertex.count, path, sum(element.count for element in before))
         else:
             columns = _read_binary(file, order, before, vertex, path)
     single = [name for name in vertex.names if name not in vertex.lists]
@@ -107,7 +111,7 @@ def read_vertex_names(path: Path) -> list[str]:
 
 
 def read_elements(path: Path) -> tuple[str | None, list[str], dict[str, dict[str, Array]]]:
-    """Read all elements of a PLY file that has no lists, as they stand there; errors as of `read_ply`.
+    """Read all elements of a PLY file without lists, in its types; errors as of `read_ply`.
 
     Returns
     -------
@@ -124,13 +128,13 @@ def read_elements(path: Path) -> tuple[str | None, list[str], dict[str, dict[str
         order, elements, comments = _read_header(file, path)
         begin = file.tell()
         for element in elements:
-            if None in element.types:
+            if element.lists:
                 raise InvalidPointsError(
                     f"{path} has lists in its element {brief(element.name)}. Save it again without."
                 )
             file.seek(begin)
             if order is None:
-                columns = read_rows(file, element.types, element.count, path, sum(each.count for each in before))
+                columns = read_rows(file, element.codes, element.count, path, sum(each.count for each in before))
             else:
                 columns = _read_binary(file, order, before, element, path)
             found[element.name] = dict(zip(element.names, columns, strict=True))
@@ -150,7 +154,7 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element]
         match line.split():
             case ["end_header"]:
                 if order == "":
-                    raise InvalidPointsError(f"{path} does not say whether it is text or binary. Export it again.")
+                    raise InvalidPointsError(f"{path} does not state whether it is text or binary. Export it again.")
                 return order, elements, comments
             case ["format", kind, *_] if kind in _ORDERS:
                 order = _ORDERS[kind]
@@ -166,26 +170,25 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element]
                 elements[-1].types.append(_TYPES[kind])
             case _:
                 raise InvalidPointsError(
-                    f"{path}, line {number}: {line[:60]!r} does not belong into the header of a PLY file. Export it"
-                    " again."
+                    f"{path}, line {number}: {line[:60]!r} is not valid in the header of a PLY file. Export it again."
                 )
     raise InvalidPointsError(f"{path} has a header without an end. Export it again.")
 
 
 def _read_binary(file: BinaryIO, order: str, before: list[_Element], vertex: _Element, path: Path) -> list[Array]:
+    """Read the columns of an element after those before it."""
     begin = file.tell()
     for element in before:
         begin = end_of_records(file, begin, order, element.types, element.count, path)
     if vertex.lists:
         return read_fixed(file, begin, order, vertex.types, vertex.count, path)
-    record = np.dtype([(f"f{index}", order + code) for index, code in enumerate(vertex.types)])
+    codes = [code for code in vertex.codes if code is not None]
+    record = np.dtype([(f"f{index}", order + code) for index, code in enumerate(codes)])
     rows = read_records(file, begin, record, vertex.count, path)
-    return [rows[f"f{index}"].astype(code) for index, code in enumerate(vertex.types)]
+    return [rows[f"f{index}"].astype(code) for index, code in enumerate(codes)]
 
 
-def write_ply(
-    path: Path, table: PointTable, double: bool = True, faces: list[Ints] | tuple[Any, ...] = ()
-) -> list[str]:
+def write_ply(path: Path, table: PointTable, double: bool = True, faces: Sequence[Ints] = ()) -> list[str]:
     """Write a table as a binary PLY file, and return notices; see `write_vertex_columns`.
 
     Parameters
@@ -229,12 +232,12 @@ def write_vertex_columns(
     Returns
     -------
     list of str
-        What is written otherwise than it was given.
+        Notices of differences between what was given and what is written.
     """
     columns, notices = _with_types(columns)
     names = dict(zip(columns, ascii_words(list(columns)), strict=True))
-    parts = [part for part in faces if len(part)]
-    faces = parts if len(parts) < 2 else [_all_triangles(parts, columns)]
+    polygons = [corners for corners in faces if len(corners)]
+    faces = polygons if len(polygons) < 2 else [_all_triangles(polygons, columns)]
     count = len(next(iter(columns.values())))
     rows = np.empty(count, [(names[name], order + values.dtype.str[1:]) for name, values in columns.items()])
     for name, values in columns.items():
@@ -251,22 +254,23 @@ def write_vertex_columns(
             lists = np.empty(len(corners), [("count", "u1"), ("corners", order + "i4", corners.shape[1])])
             lists["count"], lists["corners"] = corners.shape[1], corners
             lists.tofile(file)
-    if len(parts) > 1:
+    if len(polygons) > 1:
         notices.append(
             "Quads were divided into triangles, since some programs read no PLY file with both. No point is lost."
         )
     renamed = ", ".join(f"{name} as {word}" for name, word in names.items() if name != word)
     if renamed:
-        notices.append(f"PLY takes words of ASCII alone: wrote {brief(renamed)}.")
+        notices.append(f"PLY permits ASCII names without spaces only: wrote {brief(renamed)}.")
     return notices
 
 
 def _all_triangles(faces: list[Ints], columns: dict[str, Array]) -> Ints:
-    places = np.stack([columns[axis] for axis in "xyz"], axis=1)
-    return np.concatenate([triangles(part, places) for part in faces])
+    """Return faces of any numbers of corners as triangles."""
+    points = np.stack([columns[axis] for axis in "xyz"], axis=1)
+    return np.concatenate([triangles(corners, points) for corners in faces])
 
 
-def _with_types(columns: dict[str, Array]) -> tuple[dict[str, Array], list[Any]]:
+def _with_types(columns: dict[str, Array]) -> tuple[dict[str, Array], list[str]]:
     """Return columns in types that PLY has, and notices of those that became two."""
     result, notices = {}, []
     for name, values in columns.items():

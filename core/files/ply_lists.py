@@ -1,4 +1,4 @@
-"""Records of binary PLY files that hold lists, which are passed over: each is a number of items, and these."""
+"""Records of binary PLY files with lists, which are skipped: each is a number of items, and these."""
 
 import os
 import struct
@@ -102,7 +102,7 @@ def _equal_records(data: bytes, order: str, types: Sequence[Code], count: int) -
 
 
 def _divide(types: Sequence[Code]) -> list[Part]:
-    """Divide properties behind each list: codes of those before it, and its own, which are None behind the last one."""
+    """Divide properties after each list: codes of those before it, and its own; None after the last list."""
     parts: list[Part] = [([], None)]
     for code in types:
         if isinstance(code, tuple):
@@ -114,7 +114,7 @@ def _divide(types: Sequence[Code]) -> list[Part]:
 
 
 def _reader(data: bytes, order: str, code: str) -> Callable[[int], int]:
-    """Return a function of a place in a file that gives the number there."""
+    """Return a function that reads the number at an offset."""
     if code == "u1":
         return data.__getitem__
     read = struct.Struct(order + np.dtype(code).char).unpack_from
@@ -124,12 +124,12 @@ def _reader(data: bytes, order: str, code: str) -> Callable[[int], int]:
 def _walk(
     data: bytes, place: int, order: str, parts: list[Part], count: int, path: Path, progress: tuple[int, int]
 ) -> tuple[Ints, int]:
-    """Go through records one by one, since where one begins depends on all before: in .8 s for a million of two lists.
+    """Find records one by one, since the offset of each depends on all before.
 
     Returns
     -------
     ndarray, (count, parts) int64
-        Where the properties before each list begin, and those behind the last one.
+        Where the properties before each list begin, and those after the last one.
     int
         Where the next record begins.
     """

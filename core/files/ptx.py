@@ -1,9 +1,8 @@
-"""PTX, rasters of rays as scanners by Leica export them: scans one after another, each with its place and matrix."""
+"""PTX, rasters of rays of scanners by Leica: scans one after another, each with its position and matrix."""
 
 from collections.abc import Iterator
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from ..types import Bools, Floats
 from .lines import brief, is_number, read_text
 from .table import SCANNER, PointTable, from_columns
 
-_HEAD = 10  # lines: columns, rows, the scanner's place and axes, and four rows of a matrix
+_HEAD = 10  # lines: columns, rows, the scanner's position and axes, and four rows of a matrix
 _MOST_DIGITS = 9  # of a number of columns or rows
 _NAMES = ("x", "y", "z", "intensity", "r", "g", "b")
 _WIDTHS = (3, 4, 6, 7)  # numbers of a point
@@ -21,15 +20,16 @@ _ROUNDED = 1e-6  # ... but for rounding
 _UNKNOWN = 0.5  # intensity of rays that hit nothing
 
 
-def holds_ptx(blocks: Iterator[Any]) -> bool:
-    """Tell whether a text begins as PTX does, whatever the file is called."""
-    return _parse([*islice(_filled(blocks), _HEAD)]) is not None
+def holds_ptx(blocks: Iterator[list[str]]) -> bool:
+    """Whether a text begins as PTX does, whatever the file is called."""
+    lines = filter(_is_filled, chain.from_iterable(blocks))
+    return _parse([*islice(lines, _HEAD)]) is not None
 
 
 def read_ptx(path: Path) -> PointTable:
-    """Read a PTX file: the points of all scans, where their matrices put them, without rays that hit nothing.
+    """Read a PTX file: the points of all scans, transformed by their matrices, without rays that hit nothing.
 
-    Each point gets the place of its scanner as a vector, and the number of its scan, if there are several.
+    Each point gets the position of its scanner as a vector, and the number of its scan, if there are several.
 
     Returns
     -------
@@ -51,17 +51,13 @@ def read_ptx(path: Path) -> PointTable:
     return _join(scans, missed, path)
 
 
-def _filled(blocks: Iterator[Any]) -> Any:
-    return filter(_is_filled, chain.from_iterable(blocks))
-
-
 def _is_filled(line: str) -> bool:
-    """Tell whether a line is neither empty nor a comment, as some programs write before the first scan."""
+    """Whether a line is neither empty nor a comment, as some programs write before the first scan."""
     return bool(line.strip()) and not line.lstrip().startswith(("#", "//"))
 
 
 def _parse(lines: list[str]) -> tuple[int, Floats, Floats] | None:
-    """Return the number of points, the scanner's place and the matrix that the first lines of a scan tell, or None."""
+    """Return the number of points, the scanner's position and the matrix in the first lines of a scan, or None."""
     words = [line.split() for line in lines]
     if [len(row) for row in words] != [1, 1, 3, 3, 3, 3, 4, 4, 4, 4]:
         return None
@@ -73,7 +69,7 @@ def _parse(lines: list[str]) -> tuple[int, Floats, Floats] | None:
     matrix = np.array(words[6:], dtype=np.float64)
     if not np.isfinite(matrix).all():
         return None
-    if matrix[3].tolist() == _LAST and matrix[:, 3].tolist() != _LAST:  # its columns are rows
+    if matrix[3].tolist() == _LAST and matrix[:, 3].tolist() != _LAST:  # it is transposed
         matrix = matrix.T
     if not np.allclose(matrix[:, 3], _LAST, rtol=0.0, atol=_ROUNDED):
         return None
@@ -81,18 +77,18 @@ def _parse(lines: list[str]) -> tuple[int, Floats, Floats] | None:
 
 
 def _read_scan(
-    lines: Iterator[Any], head: list[tuple[int, str]], number: int, path: Path
+    lines: Iterator[tuple[int, str]], head: list[tuple[int, str]], number: int, path: Path
 ) -> tuple[Floats, Floats, int]:
-    """Read a scan: its points, (n, k), where its matrix puts them, the scanner's place, the number of missed rays."""
+    """Read a scan: its points, (n, k), transformed by its matrix, the scanner's position, the number of missed rays."""
     found = _parse([line for _, line in head])
     if found is None and number:
         raise InvalidPointsError(
-            f"{path}, line {head[0][0]}: {brief(head[0][1])!r} begins no scan: scan {number} has more points than its"
-            " columns and rows announce, or the file is cut off. Export it again."
+            f"{path}, line {head[0][0]}: {brief(head[0][1])!r} does not begin a scan: scan {number} has more points"
+            " than its columns and rows announce, or the file is truncated. Export it again."
         )
     if found is None:
         raise InvalidPointsError(
-            f"{path} is no PTX file: it does not begin with two counts, the scanner's place and axes, and a matrix"
+            f"{path} is no PTX file: it does not begin with two counts, the scanner's position and axes, and a matrix"
             " of 4 rows. Export it again."
         )
     count, place, matrix = found
@@ -104,7 +100,7 @@ def _read_scan(
 
 
 def _missed(values: Floats) -> Bools:
-    """Tell which rays hit nothing: those at 0 0 0, except a single one that has an intensity."""
+    """Return which rays hit nothing: those at 0 0 0, except a single one that has an intensity."""
     missed = (values[:, :3] == 0.0).all(axis=1)
     if values.shape[1] in (4, 7):
         measured = missed & (values[:, 3] != 0.0) & (values[:, 3] != _UNKNOWN)
@@ -113,7 +109,8 @@ def _missed(values: Floats) -> Bools:
     return missed
 
 
-def _read_rows(lines: Iterator[Any], count: int, number: int, path: Path) -> Floats:
+def _read_rows(lines: Iterator[tuple[int, str]], count: int, number: int, path: Path) -> Floats:
+    """Read the rows of a scan."""
     seen = [0]  # the line that numpy read last
 
     def rows() -> Iterator[str]:
@@ -133,15 +130,15 @@ def _read_rows(lines: Iterator[Any], count: int, number: int, path: Path) -> Flo
         )
     if values.shape[1] not in _WIDTHS:
         raise InvalidPointsError(
-            f"{path} has {values.shape[1]} numbers a point in scan {number + 1}. PTX has x y z, intensity, and r g b."
+            f"{path} has {values.shape[1]} numbers per point in scan {number + 1}. PTX has x y z, intensity, and r g b."
         )
     return values
 
 
 def _center(points: Floats, place: Floats, matrix: Floats) -> Floats:
-    """Return where the scanner stood: the origin of its own coordinates, which the matrix moves.
+    """Return the position of the scanner: the origin of its own coordinates, transformed by the matrix.
 
-    Programs that have moved the points themselves write a matrix that does nothing.
+    Programs that have transformed the points themselves write the identity.
     """
     moved = matrix[3, :3]
     if (matrix == np.eye(4)).all() and len(points):
@@ -151,7 +148,7 @@ def _center(points: Floats, place: Floats, matrix: Floats) -> Floats:
 
 
 def _join(scans: list[tuple[Floats, Floats]], missed: int, path: Path) -> PointTable:
-    """Return one table of all scans; what a scan lacks is zero, its colors white."""
+    """Return one table of all scans; attributes that a scan lacks are zero, colors white."""
     counts = [len(values) for values, _ in scans]
     total = sum(counts)
     columns: dict[str, Floats] = {}

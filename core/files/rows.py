@@ -14,6 +14,8 @@ from .lines import brief, is_number, read_blocks
 
 _LONG = ("i8", "u8")
 _EXACT = 2.0**53  # beyond this, doubles are no longer all whole numbers
+_RATIO = 100  # of unpacked to packed bytes; files of points have 1 to 20 ...
+_HARMLESS = 64e6  # ... or fewer bytes than this
 
 
 def read_records(file: BinaryIO, begin: int, record: np.dtype[Any], count: int, path: Path) -> Array:
@@ -44,7 +46,7 @@ def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Pat
     file : file object
         Of bytes.
     types : list of str or None
-        numpy's code of each column, as the header names it; None for a list of numbers, which is passed over.
+        numpy's code of each column, as the header names it; None for a list of numbers, which is skipped.
     count : int
         How many rows the header names.
     path : pathlib.Path
@@ -59,7 +61,7 @@ def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Pat
     """
     begin, codes = file.tell(), [code for code in types if code is not None]
 
-    def rows() -> Any:
+    def rows() -> Iterator[bytes]:
         """Return the lines of the points from the first on; there may be fewer than the header names."""
         file.seek(begin)
         filled = filter(bytes.strip, chain.from_iterable(read_blocks(file, path)))
@@ -86,7 +88,7 @@ def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Pat
     ]
 
 
-def _without_lists(lines: Any, types: Sequence[str | None], path: Path) -> Iterator[bytes]:
+def _without_lists(lines: Iterator[bytes], types: Sequence[str | None], path: Path) -> Iterator[bytes]:
     """Yield lines without their lists: each is a number of numbers, and these."""
     steps = [(len([*run]), is_list) for is_list, run in groupby(code is None for code in types)]
     for number, line in enumerate(lines, start=1):
@@ -115,15 +117,15 @@ def _is_long(column: Floats, code: str) -> bool:
     return float(limits.min) <= column.min() and _EXACT <= np.abs(column).max() < float(limits.max)
 
 
-def _load_whole(lines: Any, index: int, code: str) -> Ints:
+def _load_whole(lines: Iterator[bytes], index: int, code: str) -> Ints:
     """Read a column of whole numbers as such."""
     return np.loadtxt(lines, code, usecols=index, ndmin=1, comments=None, encoding="ascii")
 
 
 def _typed(column: Floats, code: str) -> Array:
-    """Give numbers of text the type that the header names, unless that would lose what the text holds.
+    """Convert numbers of text to the type that the header names, unless that would lose digits of the text.
 
-    It may hold more digits than the float of the header, and numbers that are no whole ones, or too large.
+    It may hold more digits than the float of the header, and numbers that are not whole, or too large.
     """
     if code[0] != "f" and len(column):
         limits = np.iinfo(code)
@@ -133,6 +135,11 @@ def _typed(column: Floats, code: str) -> Array:
     return column.astype("f8")
 
 
+def unpacks_too_far(unpacked: float, packed: float) -> bool:
+    """Whether data would unpack to more bytes than those of points ever do, as in files made to exhaust the memory."""
+    return unpacked > max(_RATIO * packed, _HARMLESS)
+
+
 def too_short(path: Path, found: int, count: int) -> InvalidPointsError:
     """Return the error of a file with fewer points than its header names."""
     return InvalidPointsError(
@@ -140,8 +147,8 @@ def too_short(path: Path, found: int, count: int) -> InvalidPointsError:
     )
 
 
-def _refuse_row(lines: Any, width: int, path: Path) -> None:
-    """Say which of some lines does not hold so many numbers."""
+def _refuse_row(lines: Iterator[bytes], width: int, path: Path) -> None:
+    """Report which of some lines does not hold so many numbers."""
     for number, line in enumerate(lines, start=1):
         words = line.decode("ascii", errors="replace").split()
         odd = next((word for word in words if not is_number(word)), None)

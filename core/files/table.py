@@ -1,4 +1,4 @@
-"""What a point file holds: a place, and other values, for each point."""
+"""The contents of a point file: coordinates, and other values, of each point."""
 
 import re
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from ..types import Array, Floats
 from .lines import brief
 
 NORMAL = "normal"  # the attribute that files call nx ny nz
-SCANNER = "scanner"  # the attribute of places, where the scanner stood that saw a point, which move with the points
+SCANNER = "scanner"  # the attribute of positions of the scanner that measured a point, which move with the points
 _NORMALS = ("nx", "ny", "nz")
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _ALPHAS = (("alpha",), ("diffuse_alpha",), ("a",))
@@ -38,7 +38,7 @@ class PointTable:
     degrees : bool
         Whether x and y are known to be longitude and latitude.
     notices : list of str
-        What was left out.
+        Which data were left out.
     """
 
     points: Floats
@@ -74,23 +74,23 @@ def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
             return None
         return [left.pop(named[name]) for name in names]
 
-    places = [left.pop(named[axis]) for axis in _AXES]
-    table = PointTable(np.stack(places, axis=1, dtype=np.float64))
-    table.single = any(place.dtype == np.float32 for place in places)
+    coordinates = [left.pop(named[axis]) for axis in _AXES]
+    table = PointTable(np.stack(coordinates, axis=1, dtype=np.float64))
+    table.single = any(values.dtype == np.float32 for values in coordinates)
     channels = next(filter(None, map(take, _COLORS)), None)
     if channels is not None:
         alpha = next(filter(None, map(take, _ALPHAS)), None)
         colors = np.stack(channels, axis=1)
         table.colors = unit_colors(colors, alpha[0] if alpha else None)
-        table.notices += told_depth(colors, path)
+        table.notices += depth_notices(colors, path)
     normals = take(_NORMALS)
     if normals is not None:
         table.attributes[NORMAL] = np.stack(normals, axis=1)
     for name in columns:
         match = re.fullmatch(r"(.+)_x", name)
         vector = [f"{match[1]}_{axis}" for axis in _AXES] if match else []
-        if match and all(part in left for part in vector):
-            table.attributes[match[1]] = np.stack([left.pop(part) for part in vector], axis=1)
+        if match and all(component in left for component in vector):
+            table.attributes[match[1]] = np.stack([left.pop(component) for component in vector], axis=1)
         elif name in left:
             table.attributes[name] = left.pop(name)
     return table
@@ -111,15 +111,15 @@ def unit_colors(colors: Array, alpha: Floats | None = None) -> Array:
     ndarray, (n, 4) float32
     """
     result = np.ones((len(colors), 4), np.float32)
-    for part, given in ((result[:, :3], colors), (result[:, 3], alpha)):
+    for unit, given in ((result[:, :3], colors), (result[:, 3], alpha)):
         if given is not None:
-            given = given.view(np.uint8) if given.dtype == np.int8 else given  # which programs take for bytes
-            np.divide(given, np.float32(full_color(given)), out=part, casting="same_kind")
+            given = given.view(np.uint8) if given.dtype == np.int8 else given  # which programs use as bytes
+            np.divide(given, np.float32(full_color(given)), out=unit, casting="same_kind")
     return np.fmin(np.fmax(result, 0.0, out=result), 1.0, out=result)  # NaN becomes 0
 
 
 def full_color(values: Array) -> float:
-    """Return the number that stands for a full color: by the type of bytes, which is told, otherwise by the numbers.
+    """Return the number of a full color: 255 for types of one byte, otherwise by the largest value.
 
     Programs write 8, 10 or 12 bits in types of 16, and from 0 to 1 in whole numbers where all colors are pure.
     """
@@ -132,11 +132,11 @@ def full_color(values: Array) -> float:
     return next((2.0**bits - 1.0 for bits in _DEPTHS if largest < 2.0**bits), 1.0)
 
 
-def told_depth(colors: Array, path: Path) -> Iterator[str]:
-    """Yield of what depth colors are, where that is not usual."""
+def depth_notices(colors: Array, path: Path) -> Iterator[str]:
+    """Report the depth of colors, where it is unusual."""
     full = full_color(colors)
     if full in (1023.0, 4095.0):
-        yield f"{path.name}: no color is above {full:g}, so that these are taken for colors from 0 to {full:g}."
+        yield f"{path.name}: no color is above {full:g}, so the range is taken as 0 to {full:g}."
 
 
 def to_columns(table: PointTable) -> dict[str, Array]:
@@ -149,7 +149,7 @@ def to_columns(table: PointTable) -> dict[str, Array]:
         values = np.round(255.0 * table.colors).astype(np.uint8)
         columns.update(zip(("red", "green", "blue", "alpha"), values.T, strict=True))
     for name, values in attributes.items():
-        columns.update((_free_name(part, columns), numbers) for part, numbers in split_columns(name, values).items())
+        columns.update((_free_name(new, columns), numbers) for new, numbers in split_columns(name, values).items())
     return columns
 
 
@@ -157,7 +157,7 @@ def split_columns(name: str, values: Array) -> dict[str, Array]:
     """Return an attribute as columns of numbers by their names: vectors as one of each axis."""
     if values.ndim == 1:
         return {name: values}
-    return {f"{name}_{axis}": part for axis, part in zip(_AXES[: len(values.T)], values.T, strict=True)}
+    return {f"{name}_{axis}": column for axis, column in zip(_AXES[: len(values.T)], values.T, strict=True)}
 
 
 def _free_name(name: str, columns: dict[str, Array]) -> str:
@@ -167,14 +167,14 @@ def _free_name(name: str, columns: dict[str, Array]) -> str:
 
 
 def without_missed(table: PointTable, path: Path) -> PointTable:
-    """Return a table without the points that have no place: sensors with a raster of rays write NaN where they miss.
+    """Return a table without the points that have no valid coordinates: sensors write NaN for rays without a hit.
 
-    Other programs write the largest number there is.
+    Other programs write the largest number.
 
     Parameters
     ----------
     table : PointTable
-        Gets a notice, and loses what is left out itself.
+        Modified in place, and gets a notice.
     path : pathlib.Path
         The file, for the texts.
     """
@@ -183,28 +183,30 @@ def without_missed(table: PointTable, path: Path) -> PointTable:
     far = np.isfinite(table.points).all(axis=1) & ~kept
     if not missed or far.all():
         return table
-    what = "NaN or infinity" if np.isinf(table.points).any() else "NaN"
-    what = f"{what}, or beyond {FARTHEST:g}" if far.any() else what
+    values = "NaN or infinity" if np.isinf(table.points).any() else "NaN"
+    values = f"{values}, or beyond {FARTHEST:g}" if far.any() else values
     if missed == len(kept):
-        raise TooFewPointsError(f"{path} has no points: all {missed} are without a place ({what}). Export it again.")
+        raise TooFewPointsError(
+            f"{path} has no points: all {missed} have no valid coordinates ({values}). Export it again."
+        )
     table.points = table.points[kept]
     table.attributes = {name: values[kept] for name, values in table.attributes.items()}
     table.colors = None if table.colors is None else table.colors[kept]
-    table.notices.append(f"{path.name}: left out {missed} points that the sensor missed ({what}).")
+    table.notices.append(f"{path.name}: left out {missed} points that the sensor missed ({values}).")
     return table
 
 
 def check_places(points: Floats, path: Path) -> float:
-    """Refuse a file without points, or with coordinates that are no places, and return the largest coordinate."""
+    """Refuse a file without points, or with coordinates that are not finite or too large, and return the largest."""
     if len(points) == 0:
         raise TooFewPointsError(f"{path} has no points. Give a file with points.")
     largest = float(np.abs(points).max())
     if largest <= FARTHEST:
         return largest
-    bad, what = np.flatnonzero(~np.isfinite(points).all(axis=1)), "not finite (NaN or infinity)"
+    bad, fault = np.flatnonzero(~np.isfinite(points).all(axis=1)), "not finite (NaN or infinity)"
     if len(bad) == 0:
-        bad, what = np.flatnonzero((np.abs(points) > FARTHEST).any(axis=1)), f"beyond {FARTHEST:g}"
+        bad, fault = np.flatnonzero((np.abs(points) > FARTHEST).any(axis=1)), f"beyond {FARTHEST:g}"
     raise InvalidPointsError(
-        f"{path}: {len(bad)} of {len(points)} points have coordinates that are {what}, the first of them is"
+        f"{path}: {len(bad)} of {len(points)} points have coordinates that are {fault}, the first of them is"
         f" point {bad[0] + 1}. Delete these points from the file."
     )

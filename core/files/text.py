@@ -1,17 +1,16 @@
 """Columns of numbers as text: XYZ, CSV, PTS, and the vertices of OBJ files."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidPointsError
 from ..types import Array, Floats
-from .cells import Rows, find_rows, load, load_whole
+from .cells import Blocks, Rows, find_rows, load, load_whole
 from .digits import shortest
 from .guess import guess_names
 from .layout import find_layout, given_layout
@@ -21,9 +20,9 @@ from .ptx import holds_ptx, read_ptx
 from .table import PointTable, from_columns, to_columns
 
 _BLOCK = 10_000  # lines that are written at once
-_SAMPLE = 100  # vertices that tell what they hold
+_SAMPLE = 100  # vertices by which their columns are decided
 _MOST_DIGITS = 15  # of a number of points; no file has so many
-_SKIPPED = ("#", "//")  # how lines begin that may be of any length
+_SKIPPED = ("#", "//")  # prefixes of lines that may be of any length
 _EXACT = 2.0**53  # from here on doubles skip whole numbers
 _SCAN_NAMES = {  # of the columns of PTS files
     4: ("x", "y", "z", "intensity"),
@@ -54,9 +53,7 @@ def read_scan(path: Path, columns: str = "") -> PointTable:
     return _read_text(lambda: _without_counts(read_text(path, _SKIPPED), path), path, columns, _SCAN_NAMES)
 
 
-def _read_text(
-    blocks: Callable[..., Any], path: Path, columns: str, usual: dict[int, tuple[str, ...]] | None = None
-) -> PointTable:
+def _read_text(blocks: Blocks, path: Path, columns: str, usual: dict[int, tuple[str, ...]] | None = None) -> PointTable:
     """Read rows of numbers, in which columns without names have the usual ones for their number."""
     columns = columns.strip()
     if not columns and holds_ptx(read_text(path, _SKIPPED)):
@@ -74,7 +71,7 @@ def _read_text(
         behind = min(others) > max(layout.places)
         guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless, behind)
         extra = _renamed(extra, dict(zip(nameless, guessed, strict=True)))
-        notices.append(_tell_guess(path, layout.places, nameless, guessed))
+        notices.append(_guess_notice(path, layout.places, nameless, guessed))
     table = from_columns(dict(zip("xyz", values.T, strict=False)) | _renamed(extra, standard_names(extra)), path)
     table.degrees = layout.degrees
     table.notices += [*layout.notices, *notices]
@@ -92,37 +89,37 @@ def _exact(rows: Rows, index: int, values: Floats) -> tuple[Array, bool]:
 
 
 def _renamed(columns: dict[str, Array], names: dict[str, str]) -> dict[str, Array]:
-    """Return columns by new names, but for those that others have, such as the places."""
+    """Return columns by new names, but for those that others have, such as the coordinates."""
     taken = {*"xyz", *columns} - {*names}
     return {_free(names.get(name, name), name, taken): values for name, values in columns.items()}
 
 
 def _free(new: str, old: str, taken: set[str]) -> str:
-    """Return the new name of a column if it is free, otherwise the old one, which no place may have."""
+    """Return the new name of a column if it is free, otherwise the old one, unless it is that of a coordinate."""
     if new != old and new not in taken:
         return new
     return f"{old}_2" if old in ("x", "y", "z") else old
 
 
-def _tell_guess(path: Path, places: list[int], labels: list[str], names: list[str]) -> str:
-    """Tell what columns without names were taken for."""
-    parts = [
-        (what, [label for label, name in zip(labels, names, strict=True) if name in kind])
-        for what, kind in (
+def _guess_notice(path: Path, places: list[int], labels: list[str], names: list[str]) -> str:
+    """Report as what columns without names were read."""
+    groups = [
+        (kind, [label for label, name in zip(labels, names, strict=True) if name in known])
+        for kind, known in (
             ("colors", ("r", "g", "b", "alpha")),
             ("normals", ("nx", "ny", "nz")),
             ("intensity", ("intensity",)),
             ("attributes", labels),
         )
     ]
-    told = "; ".join(f"{', '.join(found)} as {what}" for what, found in parts if found)
+    others = "; ".join(f"{', '.join(found)} as {kind}" for kind, found in groups if found)
     return (
         f"{path.name}: not all columns have names. Read {', '.join(f'column_{i + 1}' for i in places)} as x y z;"
-        f" {told}. If that is wrong, give their names in Columns at the import."
+        f" {others}. If that is wrong, give their names in Columns at the import."
     )
 
 
-def _without_counts(blocks: Iterator[Any], path: Path) -> Iterator[list[str]]:
+def _without_counts(blocks: Iterator[list[str]], path: Path) -> Iterator[list[str]]:
     """Yield the lines of a PTS file, empty ones for the numbers of points, which must be right if there are any."""
     count = missing = passed = 0
     counted = None  # whether the first line was a number of points
@@ -152,7 +149,7 @@ def _without_counts(blocks: Iterator[Any], path: Path) -> Iterator[list[str]]:
 
 
 def _holds_numbers(line: str) -> bool:
-    """Tell whether a line is a point, and not one of names after a number of points."""
+    """Whether a line is a point, and not one of names after a number of points."""
     return any(map(is_number, re.split(r"[\s,;]+", line)))
 
 
@@ -200,7 +197,7 @@ def write_columns(path: Path, table: PointTable, delimiter: str = " ", double: b
     path : pathlib.Path
     table : PointTable
     delimiter : str
-        With white space the line of names begins with #, which readers of XYZ files pass over.
+        With white space the line of names begins with #, which readers of XYZ files skip.
     double : bool
         Whether coordinates are written with the digits of double precision.
     """
@@ -215,16 +212,16 @@ def write_columns(path: Path, table: PointTable, delimiter: str = " ", double: b
         names = [name.replace(delimiter, "_") for name in columns]
         file.write(("# " if delimiter.isspace() else "") + delimiter.join(names) + "\n")
         line = delimiter.join(formats) + "\n"
-        for start in range(0, len(table.points), _BLOCK):  # some rows at a time take a third of the time of savetxt
-            parts = [values[start : start + _BLOCK] for values in columns.values()]
-            rows = np.empty((len(parts[0]), len(parts)), object)  # doubles would round whole numbers of 64 bits
-            for index, part in enumerate(parts):
-                rows[:, index] = part
+        for start in range(0, len(table.points), _BLOCK):  # blocks of rows take a third of the time of savetxt
+            block = [values[start : start + _BLOCK] for values in columns.values()]
+            rows = np.empty((len(block[0]), len(block)), object)  # doubles would round whole numbers of 64 bits
+            for index, values in enumerate(block):
+                rows[:, index] = values
             file.write((line * len(rows)) % tuple(rows.reshape(-1).tolist()))
 
 
 def _text_format(values: Array) -> str:
-    """Return how numbers are written so that they are the same when they are read again, in as few digits."""
+    """Return the shortest format in which numbers are read back exactly."""
     if values.dtype.kind in "biu":
         return "%d"
     if values.dtype.itemsize < 8:

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files written completely or not at all."""
 
 import os
 from collections.abc import Iterator
@@ -10,9 +10,9 @@ from ..errors import PointCloudError
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give the name of a file beside this one to write to, and put it in its place at the end.
+    """Provide a temporary file beside this one to write to, which replaces it at the end.
 
-    If writing fails, what was there before stays. The folder is made if it is missing.
+    If writing fails, an older file stays. The folder is created if it is missing.
 
     Parameters
     ----------
@@ -21,21 +21,21 @@ def replacing(path: Path) -> Iterator[Path]:
     Yields
     ------
     pathlib.Path
-        With the same suffix, which numpy goes by.
+        With the same suffix.
 
     Raises
     ------
     PointCloudError
         The file or its folder cannot be written to.
     """
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.unlink(missing_ok=True)  # of a writer that was killed; a link there would lead elsewhere
+        temporary.unlink(missing_ok=True)  # of a writer that was killed; a link there would lead elsewhere
         try:
-            yield part
-            os.replace(part, path)
+            yield temporary
+            os.replace(temporary, path)
         finally:
-            part.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
     except OSError as error:
         raise PointCloudError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error

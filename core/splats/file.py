@@ -14,12 +14,12 @@ from ..files import (
     PointTable,
     check_places,
     is_coarse,
+    precision_notices,
     read_points,
     read_vertex_columns,
     read_vertex_names,
     reading,
     replacing,
-    told_steps,
     write_vertex_columns,
 )
 from ..types import Array, FilePath, Floats
@@ -178,7 +178,7 @@ def _from_vertices(vertices: PlyVertices, path: Path) -> Splats:
     check_places(positions, path)
     rest, odd = _harmonic_columns(columns, path)
     single = [columns[axis].dtype == np.float32 for axis in PLACES]
-    wide = told_steps(positions[:, single], path) if any(single) else ()
+    wide = precision_notices(positions[:, single], path) if any(single) else ()
     return Splats(
         positions=positions,
         scales=decode_scales(stack(columns, SCALES)),

@@ -123,7 +123,7 @@ class TestExtendDirection:
     def test_a_direction_out_of_the_surface(self, strip):
         add_group(strip, "Source", [0])
         before = everything(strip)
-        with pytest.raises(RuntimeError, match="stand at a right angle to the surface"):
+        with pytest.raises(RuntimeError, match="are zero or normal to the surface"):
             run("extend_direction")
         assert everything(strip) == before
 

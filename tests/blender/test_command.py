@@ -265,7 +265,7 @@ def test_text_far_from_the_origin_keeps_its_precision(run, tmp_path):
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("1 2 nan\n" * 200, "all 200 are without a place"),
+        ("1 2 nan\n" * 200, "all 200 have no valid coordinates"),
         ("1 2 3\n1 2 x\n", "columns of numbers"),
         ("\0\1\2 binary", "columns of numbers"),
     ],

@@ -419,11 +419,11 @@ def test_laser_scans_are_imported(extension, tmp_path, name):
         ("missing.ply", None, "There is no file"),
         ("a.laz", b"LASF", "is no LAS file: it does not begin with the header of one. Export it again"),
         ("a.e57", b"ASTM-E57", "is no E57 file: it does not begin with the header of one. Export it again"),
-        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n", "line 5: '' does not belong"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n", "line 5: '' is not valid"),
         ("a.xyz", b"", "there are none"),
         ("a.csv", b"x,y,z\n", "there are none"),
         ("a.pts", b"5\n1 2 3\n", "announces 5 points, but 1 lines follow"),
-        ("a.obj", b"v 1 2 nan\n", "all 1 are without a place"),
+        ("a.obj", b"v 1 2 nan\n", "all 1 have no valid coordinates"),
     ],
 )
 def test_broken_files_leave_nothing(tmp_path, name, data, text):

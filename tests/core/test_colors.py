@@ -131,7 +131,7 @@ def test_colors_of_ten_and_twelve_bits_are_bright_and_told(tmp_path, ending, bit
     {"ply": write_ply, "pcd": write_pcd, "las": write_las, "csv": write_text}[ending](path, colors)
     table = read_points(path)
     assert_allclose(table.colors[:, :3], colors / full, atol=1e-6)
-    assert any(f"colors from 0 to {full}" in notice for notice in table.notices)
+    assert any(f"range is taken as 0 to {full}" in notice for notice in table.notices)
 
 
 @pytest.mark.parametrize(

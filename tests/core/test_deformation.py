@@ -267,7 +267,7 @@ def test_parts_that_nothing_holds_stay():
     assert np.isfinite(result).all()
     assert np.linalg.norm(result[:400] - points[:400], axis=1).min() > 0.0
     assert len(deformer.notices) == 2
-    assert deformer.notices[0].startswith("2 points belong to no surface")
+    assert deformer.notices[0].startswith("2 points are on no surface")
     assert deformer.notices[1].startswith("1 components with 600 points")
     lone = core.Deformer(laplacian, [1101]).solve([[9.0, 9.0, 9.0]])
     np.testing.assert_array_equal(lone[:1101], points[:1101])

@@ -257,7 +257,7 @@ def test_names_of_surveys(tmp_path, survey, delimiter):
         assert_allclose(table.attributes["GPS_Time"], TIMES, rtol=1e-15)
         assert "left out Code, which holds text" in told(table)
         first = names[0].replace(" (", "(") if delimiter == "spaces" else names[0]
-        assert (f"took {first}, " in told(table)) == named
+        assert (f"used {first}, " in told(table)) == named
         assert ("degrees" in told(table)) == ("degrees" in survey)
 
 
@@ -275,7 +275,7 @@ def test_lines_of_numbers_before_the_points_are_told(tmp_path, head, passed):
     cells = [whole(range(COUNT)), *PLAIN]
     table = read_points(write(tmp_path / "a.csv", [head, *lines_of(Columns([], cells), "commas")[1]]))
     assert_allclose(table.points, PLACES, rtol=0.0, atol=1e-9)
-    assert ("passed over" in told(table)) == passed
+    assert ("skipped" in told(table)) == passed
 
 
 @pytest.mark.parametrize("row", [0, 150])
@@ -306,7 +306,7 @@ def test_names_in_any_encoding(tmp_path, encoding):
     lines = ["Rechtswert;Hochwert;Höhe", *lines_of(Columns([], xyz(FAR)), "decimal commas")[1]]
     table = read_points(write(tmp_path / "a.csv", lines, "\r\n", encoding))
     assert_allclose(table.points, FAR, rtol=0.0, atol=1e-9)
-    assert table.notices == ["a.csv: took Rechtswert, Hochwert, Höhe for x y z."]
+    assert table.notices == ["a.csv: used Rechtswert, Hochwert, Höhe for x y z."]
 
 
 @pytest.mark.parametrize("word", ["", "NA", "N/A", "#N/A", "null", "None", "-", '""'])
@@ -367,7 +367,7 @@ def test_names_that_are_no_places(tmp_path, names, taken):
     rows = [",".join(f"{value:.3f}" for value in row) for row in RANDOM.uniform(2.0, 5.0, (COUNT, 4))]
     path = write(tmp_path / "a.csv", [names, *rows])
     if taken:
-        assert f"Took {taken} for them" in told(read_points(path))
+        assert f"Used {taken}." in told(read_points(path))
     else:
         with pytest.raises(ValueError, match=f"has no x y z among its columns {names[:3].replace(',', ', ')}"):
             read_points(path)

@@ -126,7 +126,7 @@ def test_columns_that_a_maker_added(tmp_path):
     table = read_points(tmp_path / "a.laz")
     assert table.attributes["wave"].shape == (COUNT, 3)
     assert table.attributes["two lines"].dtype == np.uint16
-    assert table.notices == ["a.laz: left out four, which has 4 numbers a point."]
+    assert table.notices == ["a.laz: left out four, which has 4 numbers per point."]
 
 
 def test_a_scan_becomes_a_ply_with_all_digits(tmp_path):
@@ -184,17 +184,17 @@ def items_of(path):
 
 
 BROKEN = {  # what is written where in a LAZ file of format 7, and what the error says
-    "points": (lambda path: 247, "<Q", 2**40, "too short for the 1,099,511,627,776 points .* Copy it again"),
-    "records": (lambda path: 100, "<I", 2**32 - 1, "no room for what its header names: 4294967295 records"),
-    "begin": (lambda path: 96, "<I", 2**32 - 1, "no room for what its header names"),
-    "header": (lambda path: 94, "<H", 65535, "no room for what its header names"),
-    "table far": (begin_of, "<q", 2**62, "packed points are not where it says"),
-    "table before": (begin_of, "<q", -2, "packed points are not where it says"),
-    "chunks": (lambda path: table_of(path) + 4, "<I", 2**32 - 1, "packed points are not where it says"),
-    "layer": (lambda path: begin_of(path) + 8 + 40 + 4, "<I", 2**32 - 1, "packed points are not where it says"),
-    "kind": (items_of, "<H", 1, "packed in a way that is not known"),
-    "item": (lambda path: items_of(path) + 36, "<H", 65535, "packed in a way that is not known"),
-    "item kind": (lambda path: items_of(path) + 34, "<H", 99, "packed in a way that is not known"),
+    "points": (lambda path: 247, "<Q", 2**40, "shorter than the 1,099,511,627,776 points .* Copy it again"),
+    "records": (lambda path: 100, "<I", 2**32 - 1, "shorter than its header states: 4294967295 records"),
+    "begin": (lambda path: 96, "<I", 2**32 - 1, "shorter than its header states"),
+    "header": (lambda path: 94, "<H", 65535, "shorter than its header states"),
+    "table far": (begin_of, "<q", 2**62, "compressed points do not match its header"),
+    "table before": (begin_of, "<q", -2, "compressed points do not match its header"),
+    "chunks": (lambda path: table_of(path) + 4, "<I", 2**32 - 1, "compressed points do not match its header"),
+    "layer": (lambda path: begin_of(path) + 8 + 40 + 4, "<I", 2**32 - 1, "compressed points do not match its header"),
+    "kind": (items_of, "<H", 1, "uses an unknown compression"),
+    "item": (lambda path: items_of(path) + 36, "<H", 65535, "uses an unknown compression"),
+    "item kind": (lambda path: items_of(path) + 34, "<H", 99, "uses an unknown compression"),
     "items": (lambda path: items_of(path) + 32, "<H", 65535, "is broken"),
 }
 

@@ -144,9 +144,9 @@ def test_high_modes_are_not_all_taken_for_one():
 @pytest.mark.parametrize(
     ("change", "error", "text"),
     [
-        ({"areas": np.ones(3)}, core.InvalidPointsError, "areas of the shape"),
+        ({"areas": np.ones(3)}, core.InvalidPointsError, "each of 1500 points"),
         ({"points": np.full((1500, 3), np.nan)}, core.InvalidPointsError, "not finite"),
-        ({"points_before": np.eye(3)}, core.InvalidPointsError, "points before"),
+        ({"points_before": np.eye(3)}, core.InvalidPointsError, "earlier frame"),
         ({"spectrum_before": Spectrum(np.zeros(2), np.zeros((1500, 2)))}, core.PointCloudError, "Compute as many"),
         ({"tolerance": 1.0}, core.PointCloudError, "tolerance"),
     ],

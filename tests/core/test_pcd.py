@@ -143,7 +143,7 @@ def test_fields_of_several_numbers_and_those_that_fill(tmp_path, kind):
     table = read_points(tmp_path / "a.pcd")
     assert_array_equal(table.points, POINTS)
     assert_array_equal(table.attributes["after"], np.arange(COUNT))
-    assert table.notices == ["a.pcd: left out fpfh, with several numbers a point."]
+    assert table.notices == ["a.pcd: left out fpfh, with several numbers per point."]
 
 
 def test_without_counts_and_with_a_raster(tmp_path):
@@ -179,31 +179,31 @@ def claim(packed, length, data=b""):
         (b"", "no header of a PCD file"),
         (b"# .PCD\n", "no header of a PCD file"),
         (b"\n" * 500, "no header of a PCD file"),
-        (b"ply\n", "line 1: 'ply' does not belong into the header of a PCD file"),
+        (b"ply\n", "line 1: 'ply' is not valid in the header of a PCD file"),
         (GOOD.replace(b"SIZE 8 8 8", b"SIZE 8 8"), "FIELDS, SIZE, TYPE and COUNT do not fit"),
         (GOOD.replace(b"SIZE 8 8 8", b"SIZE 8 8 3"), "do not fit"),
         (GOOD.replace(b"TYPE F F F", b"TYPE F F Q"), "do not fit"),
         (GOOD.replace(b"COUNT 1 1 1", b"COUNT 1 1 999999999"), "do not fit"),
         (GOOD.replace(b"COUNT 1 1 1", b"COUNT 1 1 -1"), "do not fit"),
         (GOOD.replace(b"FIELDS x y z", b"FIELDS x y w"), "has no z among its columns"),
-        (GOOD.replace(b"POINTS 300", b"POINTS 3e2"), "line 10: 'POINTS 3e2' does not belong"),
+        (GOOD.replace(b"POINTS 300", b"POINTS 3e2"), "line 10: 'POINTS 3e2' is not valid"),
         (GOOD.replace(b"POINTS 300", b"POINTS 301"), "of the 301 points"),
         (GOOD.replace(b"POINTS 300", b"POINTS 0").replace(b"binary_compressed", b"binary"), "has no points"),
         (GOOD.replace(b"POINTS 300", b"POINTS 0").replace(b"binary_compressed", b"ascii"), "has no points"),
-        (GOOD.replace(b"binary_compressed", b"zip"), "'DATA zip' does not belong"),
+        (GOOD.replace(b"binary_compressed", b"zip"), "'DATA zip' is not valid"),
         (GOOD[:-1], "of the 300 points"),
         (GOOD[:AT], "ends after 0 of the 300 points"),
         (claim(2**32 - 1, 7200), "of the 300 points"),
         (claim(9, 7200, bytes(9)), "of the 300 points"),
-        (claim(200, 7200, bytes(200)), "is broken: its packed data are shorter"),
-        (claim(200, 7200, b"\xff" * 200), "is broken: its packed data repeat what is not there"),
-        (claim(200, 7200, bytes(198) + b"\x1f\0"), "is broken: its packed data are longer .* or cut off"),
-        (claim(200, 7200, bytes(198) + b"\xe0\x09"), "is broken: its packed data are cut off"),
-        (claim(200, 7200, bytes(2) + b"\xe0\xff\x00" * 66), "is broken: its packed data are longer"),
+        (claim(200, 7200, bytes(200)), "is broken: its compressed data are shorter"),
+        (claim(200, 7200, b"\xff" * 200), "is broken: its compressed data refer to bytes before the start"),
+        (claim(200, 7200, bytes(198) + b"\x1f\0"), "is broken: its compressed data are longer .* or truncated"),
+        (claim(200, 7200, bytes(198) + b"\xe0\x09"), "is broken: its compressed data are truncated"),
+        (claim(200, 7200, bytes(2) + b"\xe0\xff\x00" * 66), "is broken: its compressed data are longer"),
         (make_pcd("ascii", xyz())[:-400], "point 29.: . numbers where|ends after"),
         (make_pcd("binary", xyz())[:-1], "ends after 299 of the 300 points"),
         (make_pcd("binary", xyz(points=np.full((9, 3), np.nan))), "has no points"),
-        (make_pcd("binary", xyz(points=np.full((9, 3), np.inf))), "all 9 are without a place .NaN or inf"),
+        (make_pcd("binary", xyz(points=np.full((9, 3), np.inf))), "all 9 have no valid coordinates .NaN or inf"),
     ],
 )
 def test_broken_files(tmp_path, data, text):

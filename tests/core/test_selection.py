@@ -153,7 +153,7 @@ class TestFrontPoint:
             assert core.front_point(slant, slant[index] + [0.0, 0.0, 5.0], [0.0, 0.0, -2.0], 0.1) == index
 
     def test_a_direction_of_no_length(self):
-        with pytest.raises(core.PointCloudError, match="has no length"):
+        with pytest.raises(core.PointCloudError, match="has zero length"):
             core.front_point([[0.0, 0.0, 1.0]], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
 
     def test_nothing_behind_the_eye_far_from_the_ray_or_without_a_place(self):

@@ -276,7 +276,7 @@ def test_normals_that_do_not_point_outwards_enclose_no_volume(ellipsoid, signs):
 
 
 def test_a_size_that_is_lost_cannot_be_kept(ellipsoid):
-    with pytest.raises(core.SolverError, match="lose too much"):
+    with pytest.raises(core.SolverError, match="lose so much"):
         core.smooth_points(ellipsoid, core.exponential(5.0), keep="area")
 
 
