@@ -109,7 +109,7 @@ def _heights(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:
 
 
 def _let_go(nearest: Nearest, surface: Quadrics, rows: Ints) -> tuple[Quadrics, Floats]:
-    """Fit the quadrics of some points, (k,) int, again without the neighbours off them, and tell how these scatter.
+    """Fit the quadrics of some points, (k,) int, again without the neighbours off them, and measure how these scatter.
 
     Returns
     -------

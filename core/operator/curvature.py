@@ -67,8 +67,7 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
 
     See Also
     --------
-    LaplaceBeltrami.quadric_mean_curvature : The same by local quadrics through the nearest points; see there how far
-        they differ.
+    LaplaceBeltrami.quadric_mean_curvature : That of local quadrics, and how far the two differ.
     LaplaceBeltrami.apply : What it is computed by.
     principal_curvatures : Both curvatures that it is the mean of.
     estimate_normals : The normals alone.
