@@ -208,7 +208,7 @@ def _band(surface: ImplicitSurface, report: Callable[..., Any]) -> tuple[_Grid, 
         normals = surface.normals[rows]
         squared = -2.0 * shift @ steps.T + (steps * steps).sum(axis=1) + (shift * shift).sum(axis=1)[:, None]
         height = normals @ steps.T - np.einsum("ij,ij->i", normals, shift)[:, None]
-        bend = surface.bend(rows)[:, None] * squared
+        bend = surface.half_curvature(rows)[:, None] * squared
         held = (np.abs(height) < _BAND + bend) & (squared < (reach[rows] ** 2 + _BAND**2)[:, None])
         row, step = np.nonzero(held)
         return np.unique(grid.keys(corner)[row] + (steps @ grid.steps)[step])
@@ -238,10 +238,10 @@ def _cuts(
     first, second, axis = (np.concatenate(part) for part in zip(*edges, strict=True))
     wrong = np.zeros(len(surface.points), dtype=bool)
     for around in True, False:
-        surface.turn(wrong)  # as they were
+        surface.flip(wrong)  # as they were
         side = find_sides(surface, there, corners, first, second, around)
         wrong = np.bincount(there.nearest, side * there.height, len(surface.points)) < 0.0
-        surface.turn(wrong)
+        surface.flip(wrong)
         edge, cut, belongs = _between(surface, corners, first, second, axis, side, report)
         # Ways around that lead through what is no thin part but a gap take the surface between with them.
         if _bare(surface, cut[belongs]) <= _BARE:
