@@ -87,8 +87,8 @@ def orient_normals(
     bound the work the dipoles of at most 4,000 clumps of points stand for the points, of at most 32,000 between clumps
     that are near, and r is smoothed by their size.
     The volume that each part encloses decides which side is outside; of a sheet that hardly bulges nor overhangs, up is
-    outside. At last, for 'viewpoint' too, single points flip as long as that improves the energy among the nearest 40
-    of each: noise gave them a sign that others do not share.
+    outside. At last, for 'viewpoint' too, single points, to which noise gave the wrong sign, are flipped as long as
+    that lowers the energy among the nearest 40 of each.
 
     References
     ----------
