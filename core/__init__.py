@@ -36,7 +36,7 @@ __all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    """Import what holds a public name, or a package, the first time that one asks for it: scipy takes a second."""
+    """Import the module of a public name, or a package, when it is first used: scipy takes a second."""
     if name not in _HOMES and name not in _PACKAGES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = _HOMES.get(name, name)
@@ -52,7 +52,7 @@ def __dir__() -> list[str]:
 
 
 def _import(name: str) -> ModuleType:
-    """Import a module or package of core; tell what it means where scipy, or what that asks of numpy, does not load."""
+    """Import a module or package of core; explain an error where scipy, or its use of numpy, does not load."""
     try:
         return importlib.import_module(f".{name}", __name__)
     except ImportError as error:

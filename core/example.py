@@ -1,4 +1,4 @@
-"""Points to try things with."""
+"""Points for examples."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from .types import Floats
 
 
 def example_sphere(count: int = 800) -> Floats:
-    """Return points evenly on the unit sphere, where answers are known: the shape of the examples in all docstrings.
+    """Return points evenly on the unit sphere, where results are known: those of the examples in all docstrings.
 
     Parameters
     ----------
@@ -16,7 +16,7 @@ def example_sphere(count: int = 800) -> Floats:
     Returns
     -------
     ndarray, (count, 3) float64
-        From the north pole to the south, along a spiral whose turns advance by the golden angle.
+        From the north pole to the south, along a spiral whose steps rotate by the golden angle.
 
     See Also
     --------
@@ -30,7 +30,7 @@ def example_sphere(count: int = 800) -> Floats:
     >>> print(points.shape, np.allclose(np.linalg.norm(points, axis=1), 1.0))
     (800, 3) True
     """
-    turn = 2.39996 * np.arange(count)
+    angle = 2.39996 * np.arange(count)
     z = 1.0 - (np.arange(count) + 0.5) * (2.0 / count)
     ring = np.sqrt(1.0 - z**2)
-    return np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
+    return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])

@@ -71,10 +71,10 @@ def symbol(t: ArrayLike) -> Floats:
     Returns
     -------
     ndarray
-        ``-4 pi * integral_0^3 W_1'(r) (1 - J0(t r)) dr``, by Gauss-Legendre quadrature on the three polynomial pieces.
+        ``-4 pi * integral_0^3 W_1'(r) (1 - J0(t r)) dr``, by Gauss-Legendre quadrature on the spline's three intervals.
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
-    radii = np.concatenate([(nodes + 1.0) / 2.0 + piece for piece in range(3)])
+    radii = np.concatenate([(nodes + 1.0) / 2.0 + start for start in range(3)])
     weights = np.tile(weights / 2.0, 3) * kernel_derivative(radii)
     t = np.asarray(t, dtype=np.float64)
     return -4.0 * np.pi * ((1.0 - j0(t[..., None] * radii)) @ weights)

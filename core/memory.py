@@ -1,4 +1,4 @@
-"""What an operator takes of the machine's memory, told before the start: Blender must not be ended by the system."""
+"""The memory that an operator needs, estimated before the start: or the system may end Blender."""
 
 import ctypes
 import os
@@ -14,7 +14,7 @@ _PER_NEIGHBOR = 42
 _ALONE = 43  # neighbours that would take as much as what each point needs for itself
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
 _ADAPTIVE = 0.13  # neighbours of "adaptive" kernels against "local" ones on random points, which have the most
-_SHARE = 0.8  # of the free memory, for what else goes on meanwhile
+_SHARE = 0.8  # of the free memory, to leave some for other programs
 _CGROUP = Path("/sys/fs/cgroup")
 
 
@@ -51,7 +51,7 @@ def points_that_fit(options: LaplacianOptions, modes: int = 0) -> int | None:
     Returns
     -------
     int or None
-        None where the machine does not tell how much memory is free.
+        None where the free memory is unknown.
     """
     free = available_memory()
     return None if free is None else int(_SHARE * free / needed_memory(1, options, modes))
@@ -116,7 +116,7 @@ def _rounded(count: int) -> int:
 
 
 def available_memory() -> int | None:
-    """Return the bytes of memory that can be had without the system ending programs; None where it does not tell."""
+    """Return the bytes of memory available without the system ending programs; None where unknown."""
     if sys.platform == "win32":
         return _windows_memory()
     if sys.platform == "darwin":  # it calls memory used that it gives at once when asked: half of all is taken as free
@@ -132,12 +132,12 @@ def _linux_memory(path: Path = Path("/proc/meminfo")) -> int | None:
 
 
 def _container_memory(root: Path = _CGROUP) -> int | None:
-    """Return what the limit of a container leaves, None where there is none; files that were read are given back."""
+    """Return the memory below the limit of a container, None without one; cached files count as free."""
     limit, used, kinds = (root / name for name in ("memory.max", "memory.current", "memory.stat"))
     if not (limit.exists() and used.exists() and kinds.exists()) or limit.read_text().strip() == "max":
         return None
-    given_back = _numbers(kinds.read_text()).get("inactive_file", 0)
-    return max(int(limit.read_text()) - int(used.read_text()) + given_back, 0)
+    cached = _numbers(kinds.read_text()).get("inactive_file", 0)
+    return max(int(limit.read_text()) - int(used.read_text()) + cached, 0)
 
 
 def _numbers(text: str) -> dict[str, int]:

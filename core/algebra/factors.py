@@ -60,7 +60,7 @@ def dissect(matrix: sparse.sparray, points: Floats, report: Report = lambda: Non
                 least[better] = length[better]
                 chosen = rows[better[own]]
                 side[chosen], cut[chosen] = beyond[chosen], border[chosen]
-        # One digit for each level, the highest first: near side, far side, cut; what is in a cut keeps a zero behind.
+        # One digit for each level, the highest first: near side, far side, cut; a cut is followed by zeros.
         place = 3 * place + np.where(open_, np.where(cut, 2, side), 0)
         open_ &= ~cut
         kept = open_[first] & open_[second] & (side[first] == side[second])

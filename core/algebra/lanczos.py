@@ -22,7 +22,7 @@ def lift_lowest(
 
     The polynomial lifts the eigenvalues below a cut and keeps all others within [-1, 1]. Lanczos then needs a sixth of
     the steps for about the same products, and the work between products, which would be half of the time, shrinks as
-    much. Where a wanted eigenvalue turns out to lie above the cut, the cut is raised.
+    much. Where a wanted eigenvalue lies above the cut, the cut is raised.
 
     Parameters
     ----------

@@ -209,7 +209,7 @@ def _band(surface: ImplicitSurface, report: Callable[[], None]) -> tuple[_Grid, 
         normals = surface.normals[rows]
         squared = -2.0 * shift @ steps.T + (steps * steps).sum(axis=1) + (shift * shift).sum(axis=1)[:, None]
         height = normals @ steps.T - np.einsum("ij,ij->i", normals, shift)[:, None]
-        bend = surface.bend(rows)[:, None] * squared
+        bend = surface.half_curvature(rows)[:, None] * squared
         inside = (np.abs(height) < _BAND + bend) & (squared < (reach[rows] ** 2 + _BAND**2)[:, None])
         row, step = np.nonzero(inside)
         return np.unique(grid.keys(corner)[row] + (steps @ grid.steps)[step])
@@ -239,10 +239,10 @@ def _cuts(
     first, second, axis = (np.concatenate(part) for part in zip(*edges, strict=True))
     wrong = np.zeros(len(surface.points), dtype=bool)
     for around in True, False:
-        surface.turn(wrong)  # as they were
+        surface.flip(wrong)  # as they were
         side = find_sides(surface, there, corners, first, second, around)
         wrong = np.bincount(there.nearest, side * there.height, len(surface.points)) < 0.0
-        surface.turn(wrong)
+        surface.flip(wrong)
         edge, cut, belongs = _between(surface, corners, first, second, axis, side, report)
         # Paths around that lead through a gap instead of around a thin part lose the surface between.
         if _bare(surface, cut[belongs]) <= _BARE:

@@ -1,4 +1,4 @@
-"""What the points tell: neighbourhoods, components, normals, boundary, bandwidth and pairs; `cloud` runs the stages."""
+"""Measurements on the points: neighbourhoods, components, normals, boundary, pairs; `cloud` runs the stages."""
 
 from .boundary import Boundary
 from .cloud import Cloud, Discs, estimate_normals, read_cloud, surface_discs

@@ -20,7 +20,7 @@ _BLOCK = 1 << 13  # points looked at at one time
 _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 _FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
-_BESIDE = 16  # the nearest of them tell what faces elsewhere: on coarse balls more reach around
+_BESIDE = 16  # the nearest of them, by which those that face elsewhere are found: on coarse balls more lie behind
 _LINK = 6.0  # gaps between candidates of the same boundary
 _SHORTEST = 16  # candidates of a boundary that is found
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
@@ -44,7 +44,7 @@ class Boundary:
     ----------
     at_boundary : ndarray, (m,) bool
     distance : ndarray, (m, 2)
-        Distance to the boundary along the surface; infinite where there is none near.
+        Distance to the boundary along the surface; infinite far from any.
     curvature : ndarray, (m, 2)
         Geodesic curvature of the boundary there: 1 / R for a disc of radius R, negative around a hole.
     outward : ndarray, (m, 2, 3)
@@ -184,7 +184,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
         block = close[part]
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
-        # Near candidates tell best, but none whose course turns at a corner while there are others.
+        # Near candidates are best, but not those at a corner of the boundary while there are others.
         doubt = (near + _FURTHER * spacing) * np.where(course.kinked[seen], 10.0, 1.0)
         distance, curvature = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
@@ -205,11 +205,11 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
             if side == 0:
-                # Around a corner that the surface fills, the second boundary turns away and lies inside the first.
+                # Around a corner that the surface fills, the second boundary lies inside the first, across it.
                 chosen = seen[every, best][:, None]
                 apart, expected = course.ahead(nearest.points, chosen, seen)
-                turned = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _STRAIGHT
-                eligible = turned & (apart < ON * spacing) & (near < reach[block, None])
+                other = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _STRAIGHT
+                eligible = other & (apart < ON * spacing) & (near < reach[block, None])
                 eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > SMOOTH
 
     on_all_cores(measure, blocks(len(close), _BLOCK))
@@ -296,7 +296,7 @@ def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
 
 
 def _on_sheet(nearest: Nearest, normals: Floats, rows: Ints, other: Ints, distance: Floats) -> Bools:
-    """Tell which of other points lie on the sheet of some points, and face the same way, (k, views) each."""
+    """Return which of other points lie on the sheet of some points, and face the same way, (k, views) each."""
     same, cosine = on_sheet(nearest, normals, rows, other, distance)
     return same & (cosine > 0.0)
 
@@ -328,7 +328,7 @@ def given_boundary(nearest: Nearest, normals: Floats, distance: Floats) -> Bound
     normals : ndarray, (m, 3)
         Unit normals.
     distance : ndarray, (m,)
-        Distance to the boundary along the surface; infinite where there is none near.
+        Distance to the boundary along the surface; infinite far from any.
 
     Returns
     -------

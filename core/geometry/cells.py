@@ -1,4 +1,4 @@
-"""Voronoi cells of the points within the surface: what area is nearest to each, and how far the cell reaches."""
+"""Voronoi cells of the points within the surface: their areas and radii."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _BLOCK = 1 << 12
 _WIDER = 1, 4, 16  # times the 40 neighbours are looked at where a cell is open: a jump of density has them on one side
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
-_BENT = -0.5  # least Gaussian curvature times the squared radius, where the fit is poor
+_CURVED = -0.5  # least Gaussian curvature times the squared radius, where the fit is poor
 _OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
 _CLOSEST = 1e-6  # spacings that a cut lies off its point, at least: by `_SAME`, a longer one hides the others
@@ -129,11 +129,11 @@ def _cuts(
     other = np.where(cosine < 0.0, -1.0, 1.0)[:, :, None] * other
     left, right = np.einsum("ikc,ic->ik", chord, own), np.einsum("ikc,ikc->ik", chord, other)
     squared = arc_squared(distance**2, left, right, np.abs(cosine))
-    # The arc leaves the point along the chord, bent away from it by a third of the turn.
-    way = (chord + ((right - left) / 6.0)[:, :, None] * other) @ frame
+    # The direction of the arc at the point, from its chord and a third of the angle between the normals.
+    step = (chord + ((right - left) / 6.0)[:, :, None] * other) @ frame
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -0.25, 0.25))
     length = np.maximum(length, _CLOSEST * nearest.spacing[rows, None])
-    cuts = way * (counted / (np.maximum(np.linalg.norm(way, axis=2), 1e-300) * length))[:, :, None]
+    cuts = step * (counted / (np.maximum(np.linalg.norm(step, axis=2), 1e-300) * length))[:, :, None]
     inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])
     outward = np.einsum("iac,ick->iak", boundary.outward[rows], frame) / inside[:, :, None]
     return np.concatenate([cuts, outward], axis=1), np.sqrt(squared[:, -1])
@@ -149,10 +149,10 @@ def _caps(cuts: Floats, size: Floats) -> Floats:
 
 
 def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | float) -> tuple[Floats, Floats, Bools]:
-    """Return the area of what no cut takes away, how far it reaches, and whether it is closed and no larger, (k,) each.
+    """Return the area inside all cuts, its radius, and whether it is closed and no larger, (k,) each.
 
     Its corners are the edges of the convex hull of the cuts, which is wrapped around the origin from the longest cut
-    on; an edge that ends in the origin is a way out.
+    on; an edge that ends in the origin is open.
     """
     count = len(cuts)
     cuts = np.concatenate([cuts, np.zeros((count, 1, 2))], axis=1)
@@ -164,13 +164,13 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
     start = corner = np.zeros((0, 2))
     rows = np.arange(count)
     for _ in range(cuts.shape[1] + 1):
-        way = cuts[rows] - here[:, None]
-        length = np.linalg.norm(way, axis=2)
+        step = cuts[rows] - here[:, None]
+        length = np.linalg.norm(step, axis=2)
         other = length > same[:, None]
-        along = np.einsum("ikc,ic->ik", way, ahead) / np.where(other, length, 1.0)
+        along = np.einsum("ikc,ic->ik", step, ahead) / np.where(other, length, 1.0)
         chosen = np.where(other, along, -np.inf).argmax(axis=1)
         every = np.arange(len(rows))
-        there, ahead = cuts[rows, chosen], way[every, chosen] / length[every, chosen, None]
+        there, ahead = cuts[rows, chosen], step[every, chosen] / length[every, chosen, None]
         across = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
         out = across <= _SAME * np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
         before = corner
@@ -196,5 +196,7 @@ def _triangles(corner: Floats, other: Floats, gaussian_curvature: Floats) -> Flo
     """Return the areas of triangles with one corner at the point, on a surface of that curvature."""
     plane = 0.5 * (corner[:, 0] * other[:, 1] - corner[:, 1] * other[:, 0])
     squared = np.einsum("ic,ic->i", corner, corner) + np.einsum("ic,ic->i", other, corner + other)
-    bent = np.maximum(gaussian_curvature * squared / 3.0, _BENT) + 1e-12  # of the mean squared distance along the edge
-    return plane * 2.0 * (1.0 - 1.0 / np.sqrt(1.0 + bent)) / bent
+    curved = (
+        np.maximum(gaussian_curvature * squared / 3.0, _CURVED) + 1e-12
+    )  # of the mean squared distance along the edge
+    return plane * 2.0 * (1.0 - 1.0 / np.sqrt(1.0 + curved)) / curved

@@ -12,7 +12,7 @@ from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, fit_quadrics
 
 COUNT = 41  # the point itself and 40 others
-ROUNDS = 9  # of averaging over neighbours, after which what is left is of the place and not of single points
+ROUNDS = 9  # of averaging over neighbours, after which values vary with the place and not from point to point
 ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
 _MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second

@@ -8,14 +8,14 @@ from ..types import Floats, Ints
 from .nearest import Nearest, fading_weights
 from .quadrics import fit_quadrics
 
-_FEW = 20  # neighbours of the fit that tells noise from shape, by that to all 40
+_FEW = 20  # neighbours of the fit that separates noise from shape, compared with that to all 40
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
 _ROUNDS = 4  # of averaging over the neighbourhood
 _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
-_NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round what is shape
+_NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
 
 

@@ -21,7 +21,7 @@ METHODS = ("outside", "viewpoint", "winding")
 _CERTAIN = 0.9  # cosine of a link that carries a sign without doubt: 26 degrees from a circular arc
 _PATCHES = 200  # that a surface is divided into at most
 _CLUMPS = 4000  # of points, each a dipole; pairs of them are summed in blocks
-_FINE = 32_000  # clumps that stand for the points where they are near, so that close sheets are told apart
+_FINE = 32_000  # clumps that stand for the points where they are near, so that close sheets are separated
 _NEAR = 3.0  # sizes of a clump
 _BLOCK = 250
 _PAIRS = 1_000_000  # of fine clumps that are summed at once
@@ -86,9 +86,9 @@ def orient_normals(
     sides: the signs with the least integral are looked for, from the propagated ones by flipping patches one by one. To
     bound the work the dipoles of at most 4,000 clumps of points stand for the points, of at most 32,000 between clumps
     that are near, and r is smoothed by their size.
-    The volume that each part encloses tells outside from inside; of a sheet that hardly bulges nor overhangs, up is
-    outside. At last, for 'viewpoint' too, single points flip as long as that improves the energy among the nearest 40
-    of each: noise gave them a sign that others do not share.
+    The volume that each part encloses decides which side is outside; of a sheet that hardly bulges nor overhangs, up is
+    outside. At last, for 'viewpoint' too, single points, to which noise gave the wrong sign, are flipped as long as
+    that lowers the energy among the nearest 40 of each.
 
     References
     ----------
@@ -149,7 +149,7 @@ def toward(normals: Floats, directions: Floats) -> Floats:
 
 def _directions(points: Floats, given: Array) -> Floats:
     """Return the unit vectors from points to where they were seen from; zero where that is the point itself."""
-    advice = f"Give one place of three numbers, or one for each of {len(points)} points."
+    advice = f"Give one position of three numbers, or one for each of {len(points)} points."
     check_finite(check_array(given, "Viewpoints", [(3,), points.shape], advice).reshape(-1, 3), "viewpoints", advice)
     directions = as_doubles(given) - points
     directions /= np.maximum(np.abs(directions).max(axis=1, keepdims=True), np.finfo(float).tiny)
@@ -165,7 +165,7 @@ def _checked_areas(areas: ArrayLike, count: int) -> Floats:
 
 
 def _seen(offset: Floats) -> Bools:
-    """Tell which points are not hidden by others, (m,) bool, by their places as seen from the viewpoint, (m, 3).
+    """Return which points are not hidden by others, (m,) bool, by their places as seen from the viewpoint, (m, 3).
 
     Points mirrored in a large sphere about the viewpoint lie on the convex hull where they are seen (Katz, Tal, Basri
     2007. Direct visibility of point sets).

@@ -20,10 +20,10 @@ def find_outliers(nearest: Nearest) -> Bools:
     """Find points that lie off the surfaces of nearly all of their neighbours.
 
     Twelve neighbours are the witnesses of a point. Each of them describes the surface by a quadric through its own
-    neighbours, which lets go of those off it. The point is on the surface where three of these pass by it: nearer than
-    a share of its spacing and what the witness' own neighbours scatter. (The spacing of a point far off is half its
-    distance from the surface, so that the rule holds at any height.) Outliers are no witnesses; nor are, for
-    sparse points, those whose neighbours fill a volume.
+    neighbours, without those that turn out to lie off it. The point is on the surface where three of these pass nearer
+    than a share of its spacing and the scatter of the witness' own neighbours. (The spacing of a point far off is half
+    its distance from the surface, so that the rule holds at any height.) Outliers are no witnesses; nor are, for sparse
+    points, those whose neighbours fill a volume.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def find_outliers(nearest: Nearest) -> Bools:
     """
     surface, result = nearest.quadrics, np.zeros(len(nearest.points), dtype=bool)
     alone = _Alone(nearest, surface)
-    # The first search finds most outliers, each other one what these had hidden.
+    # The first search finds most outliers, each further one those that they had hidden.
     while (new := _off_surface(nearest, surface, alone, result) & ~result).any():
         result |= new
         # The quadrics around them go on without them.
@@ -109,7 +109,7 @@ def _heights(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:
 
 
 def _let_go(nearest: Nearest, surface: Quadrics, rows: Ints) -> tuple[Quadrics, Floats]:
-    """Fit the quadrics of some points, (k,) int, again without the neighbours off them, and tell how these scatter.
+    """Fit the quadrics of some points, (k,) int, again without the neighbours off them, and measure how these scatter.
 
     Returns
     -------

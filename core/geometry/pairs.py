@@ -54,7 +54,7 @@ class Pairs:
         return sparse.csr_array((values, self.second, self.start), shape=(len(self.points),) * 2)
 
     def over_ends(self, values: Callable[[Patch], Ends], count: int, report: Report = lambda: None) -> Floats:
-        """Return the sums over the pairs of each point of what they have at that end, (count, m).
+        """Return the sums over the pairs of each point of their quantities at that end, (count, m).
 
         Parameters
         ----------

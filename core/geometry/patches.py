@@ -1,4 +1,4 @@
-"""Pairs by blocks that fit the cache: what pairs have from the points at their ends, and the sums at these."""
+"""Pairs by blocks that fit the cache: gather from the points at their ends, and scatter to these."""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -14,7 +14,7 @@ from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
 from ..types import Array, Bools, Floats, Ints
 
 FEWEST = 5  # points of a boundary that is given
-_SAME = 1e-9  # of the scale: no closer points are told apart, as areas between them would drown in rounding
+_SAME = 1e-9  # of the scale: closer points count as one, as areas between them would drown in rounding
 _LARGEST = 1e60  # coordinates [L], and its inverse the least extent: further powers of lengths must be numbers, too
 
 
@@ -34,7 +34,7 @@ def check_points(points: ArrayLike) -> Floats:
     Raises
     ------
     InvalidPointsError
-        Not (n, 3) real numbers, not finite, or so far from the origin that their type no longer tells them apart.
+        Not (n, 3) real numbers, not finite, or so far from the origin that their type does not resolve them.
     TooFewPointsError
         No points at all.
     """
@@ -50,19 +50,19 @@ def check_points(points: ArrayLike) -> Floats:
     largest = np.abs(result).max()
     if largest > _LARGEST:
         raise InvalidPointsError(
-            f"Some of the {len(result)} points lie {largest:.3g} from the origin: what has the size of squares would"
-            f" be no numbers there. Delete these points, or scale the points to less than {_LARGEST:g}."
+            f"Some of the {len(result)} points lie {largest:.3g} from the origin: squared lengths would"
+            f" overflow. Delete these points, or scale the points to less than {_LARGEST:g}."
         )
     extent = np.ptp(result, axis=0).max()
     if 0.0 < extent < 1.0 / _LARGEST:
         raise InvalidPointsError(
-            f"The {len(result)} points span only {extent:.3g}: what has the size of squares would be no numbers there."
+            f"The {len(result)} points span only {extent:.3g}: squared lengths would underflow."
             f" Scale the points to more than {1.0 / _LARGEST:g}."
         )
     if given.dtype.kind == "f" and extent < 8192.0 * np.finfo(given.dtype).eps * largest:
         raise InvalidPointsError(
             f"The {len(result)} points lie {largest:.3g} from the origin but span only {extent:.3g}:"
-            f" {given.dtype} coordinates cannot tell them apart there. Move them to the origin before they are"
+            f" {given.dtype} coordinates do not resolve them there. Shift them to the origin before they are"
             " stored."
         )
     return result

@@ -1,4 +1,4 @@
-"""From some points to all: what was computed on a subset is carried to the points between."""
+"""Prolongation of quantities from a subset to all points."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,7 +90,7 @@ class Prolongation:
                 f"Normals have the shape {normals.shape}, components {component.shape}, and there are {len(chosen)}"
                 " points in the subset. Give one row per point of it."
             )
-        unit = float(np.ldexp(1.0, np.frexp(np.ptp(points, axis=0).max())[1]))  # squares in huge units are no numbers
+        unit = float(np.ldexp(1.0, np.frexp(np.ptp(points, axis=0).max())[1]))  # squares in huge units would overflow
         points, chosen = points / unit, chosen / unit
         tree, width = cKDTree(chosen), min(_NEIGHBORS, len(chosen))
         low, extent = points.min(axis=0), np.ptp(points, axis=0).max()

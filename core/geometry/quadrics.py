@@ -1,4 +1,4 @@
-"""What the cloud tells about the surface around each point: normal and curvature, from local quadrics."""
+"""Local quadrics around each point: normal and curvature of the surface."""
 
 from dataclasses import dataclass, fields
 
@@ -28,11 +28,11 @@ class Quadrics:
         From the point to the quadric, across it [L].
     shape_operator : ndarray, (m, 3, 3)
         Second fundamental form: ``t . shape_operator t`` is the curvature along the unit tangent t, positive where the
-        surface bends away from the normal.
+        surface curves away from the normal.
     misfit : ndarray, (m,)
         Root mean square distance of the neighbours from the quadric [L].
     curved : ndarray, (m,) bool
-        The neighbours lie along a curve, so that they tell no normal.
+        The neighbours lie along a curve, so that they have no normal.
     """
 
     normals: Floats
@@ -100,7 +100,7 @@ def fit_quadrics(
             frame = frames(normals[block])
         unit = 3.0 * np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))  # makes the equations well scaled
         z, v, u = (
-            sum(way * side[:, None] for way, side in zip(offset, axis.T / unit, strict=True))
+            sum(step * side[:, None] for step, side in zip(offset, axis.T / unit, strict=True))
             for axis in np.moveaxis(frame, 2, 0)
         )
         basis = np.ones_like(u), u, v, u * u, u * v, v * v
@@ -131,8 +131,8 @@ def fit_quadrics(
 def _covariance(offset: list[Floats], share: Floats) -> Floats:
     """Return the covariance of offsets, three of (k, neighbors), whose shares sum to one, (k, 3, 3)."""
     result = np.empty((len(share), 3, 3))
-    centered = [way - _sums(share, way)[:, None] for way in offset]
-    for row, weighted in enumerate(share * way for way in centered):
+    centered = [step - _sums(share, step)[:, None] for step in offset]
+    for row, weighted in enumerate(share * step for step in centered):
         for column in range(row + 1):
             result[:, row, column] = result[:, column, row] = _sums(weighted, centered[column])
     return result
@@ -177,9 +177,9 @@ def heights_over(quadrics: Quadrics, points: Floats, rows: Ints, other: Ints) ->
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = (
         [quadrics.shape_operator[:, row, column][rows] for column in range(3)] for row in range(3)
     )
-    bend = 0.5 * (xx * x**2 + yy * y**2 + zz * z**2) + xy * x * y + xz * x * z + yz * y * z
+    square = 0.5 * (xx * x**2 + yy * y**2 + zz * z**2) + xy * x * y + xz * x * z + yz * y * z
     a, b, c = (quadrics.normals[:, axis][rows] for axis in range(3))
-    return a * x + b * y + c * z + bend
+    return a * x + b * y + c * z + square
 
 
 def frames(normals: Floats) -> Floats:

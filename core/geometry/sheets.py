@@ -1,4 +1,4 @@
-"""Keep close sheets of a surface apart: which points lie on the same sheet, told by normals and by ways along it."""
+"""Keep close sheets of a surface apart: which points lie on the same sheet, by normals and by paths along it."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -21,8 +21,8 @@ _LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
 _BLOCK = 1 << 11
 _SECTORS = 8  # directions in which a sheet is followed from every point
-_AROUND = 1.5  # way along a sheet over the chord, at most: across a right angle; points that many spacings apart touch
-_SOURCES = 1 << 7  # points from which ways are followed at one time
+_AROUND = 1.5  # path along a sheet over the chord, at most: across a right angle; points that many spacings apart touch
+_SOURCES = 1 << 7  # points from which paths are followed at once
 
 
 def same_sheet(
@@ -92,7 +92,7 @@ class Sheets(NamedTuple):
     mixed : Quadrics
         Through all neighbours.
     planes : ndarray, (m, 3)
-        Unit normals by which neighbours on other sheets were told.
+        Unit normals by which neighbours on other sheets were found.
     """
 
     quadrics: Quadrics
@@ -106,7 +106,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
 
     Where the quadric of all neighbours misses them, a plane is looked for among those through the point and two of its
     nearest neighbours that has most neighbours near it, and moved to fit these best. With these normals neighbours on
-    other sheets are told from those on the point's own, and left out of its quadric.
+    other sheets are separated from those on the point's own, and left out of its quadric.
 
     Parameters
     ----------
@@ -239,8 +239,8 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
 def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
     """Leave out the pairs whose ends lie on different sheets, which face each other across a gap.
 
-    Normals tell it of most pairs. Where they leave a doubt, two points lie on one sheet if a way of short steps leads
-    from one to the other along it that is not much longer than their distance.
+    Normals decide it for most pairs. Where they leave a doubt, two points lie on one sheet if a path of short steps
+    joins them along it that is not much longer than their distance.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def step_lengths(nearest: Nearest, oriented: Floats) -> sparse.csr_array:
 
 
 def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints, longest: Floats) -> Floats:
-    """Return the length of the shortest way along steps between the ends of pairs, (k,); infinite if it is longer.
+    """Return the length of the shortest path along steps between the ends of pairs, (k,); infinite if it is longer.
 
     Parameters
     ----------
@@ -330,7 +330,7 @@ def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints
         Of the m points.
     first, second : ndarray, (k,) int
     longest : ndarray, (k,)
-        How long the way may be.
+        Greatest length of the path.
     """
     # Ways start at the end with more pairs, so that fewer are followed; starts near each other share a neighbourhood.
     often = np.bincount(first, minlength=tree.n) + np.bincount(second, minlength=tree.n)

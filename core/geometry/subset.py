@@ -16,7 +16,7 @@ _FINEST = 2**21 - 1  # voxels along each axis: three numbers of 21 bits share on
 _DISCS = 0.7  # points a squared radius that discs in random order leave on an area of one
 _VOXELS = 1.5  # voxels that a surface of area one meets for each squared edge, on average over its directions
 _FEW = 0.9  # of the points wanted, which are enough
-_SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that tell of the area
+_SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that give the area
 _TRIALS = 8  # of voxels, or of radii
 
 

@@ -56,7 +56,7 @@ def connection_laplacian(
     -------
     csr_array, (n, n) complex
         Hermitian positive semi-definite: without a mass, ``x* K x`` is the sum over pairs of
-        ``w |x_i - r_ij x_j|^2``, where r_ij is the smallest rotation that turns the tangent plane of j into that of i.
+        ``w |x_i - r_ij x_j|^2``, where r_ij is the smallest rotation from the tangent plane of j to that of i.
         Where all frames are parallel it is the stiffness itself. Pairs whose normals point to opposite sides have no
         such rotation, and are left out.
 
@@ -77,7 +77,7 @@ def connection_laplacian(
         cosine = _dot(left, right)
         # The smallest rotation takes a vector v at right angles to a to v - (v . b) / (1 + a . b) (a + b).
         across = _dot(axis, left) / np.where(cosine > 0.0, 1.0 + cosine, 1.0)
-        axis -= across * right  # what it has along the other normal, the frame does not see
+        axis -= across * right  # the frame has no component along the other normal
         x, y = _dot(axis, real.take(i, axis=1)), _dot(axis, imaginary.take(i, axis=1))
         size = np.where(cosine > 0.0, -weight[block] / np.maximum(np.hypot(x, y), 1e-300), 0.0)
         entries[block].real, entries[block].imag = size * x, size * y

@@ -14,7 +14,7 @@ from ..types import Floats
 if TYPE_CHECKING:
     from .laplacian import LaplaceBeltrami
 
-_UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which it is known
+_UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which the expansion holds
 _LARGEST = 0.3  # most that curvature may change an area or a weight, where the fit is poor
 
 
@@ -23,7 +23,7 @@ def kernel_integral(lengths: Floats, gaussian: Floats) -> Floats:
 
     Clipped, as all terms of curvature here.
     """
-    return _bent(lengths, gaussian, -SECOND_MOMENT / 6.0)
+    return _curved(lengths, gaussian, -SECOND_MOMENT / 6.0)
 
 
 def weight_factor(lengths: Floats, gaussian: Floats) -> Floats:
@@ -31,7 +31,7 @@ def weight_factor(lengths: Floats, gaussian: Floats) -> Floats:
 
     With it slow functions have the right Laplacian. A pair takes its ends' mean.
     """
-    return _bent(lengths, gaussian, SECOND_MOMENT / 4.0)
+    return _curved(lengths, gaussian, SECOND_MOMENT / 4.0)
 
 
 def second_moment(lengths: Floats, gaussian: Floats) -> Floats:
@@ -39,15 +39,15 @@ def second_moment(lengths: Floats, gaussian: Floats) -> Floats:
 
     The factor times ``1 - mu2 h^2 K / 3``.
     """
-    return weight_factor(lengths, gaussian) * _bent(lengths, gaussian, -SECOND_MOMENT / 3.0)
+    return weight_factor(lengths, gaussian) * _curved(lengths, gaussian, -SECOND_MOMENT / 3.0)
 
 
-def _bent(lengths: Floats, gaussian: Floats, factor: float) -> Floats:
+def _curved(lengths: Floats, gaussian: Floats, factor: float) -> Floats:
     return 1.0 + np.clip(factor * lengths**2 * gaussian, -_LARGEST, _LARGEST)
 
 
 def uneven(excess: Floats) -> Floats:
-    """Return what an integral of the kernel gains where h varies, next to nothing where it varies too fast to tell."""
+    """Return the gain of an integral of the kernel where h varies, damped where it varies too fast for that."""
     return excess / (1.0 + (excess / _UNEVEN) ** 2)
 
 
@@ -67,8 +67,7 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
 
     See Also
     --------
-    LaplaceBeltrami.quadric_mean_curvature : The same by local quadrics through the nearest points; see there how far
-        they differ.
+    LaplaceBeltrami.quadric_mean_curvature : That of local quadrics, and how far the two differ.
     LaplaceBeltrami.apply : What it is computed by.
     principal_curvatures : Both curvatures that it is the mean of.
     estimate_normals : The normals alone.

@@ -1,4 +1,4 @@
-"""The surface that points lie on, as the zero of a function around them: the mean of what near quadrics tell."""
+"""The surface that points lie on, as the zero of a function around them: the mean height above near quadrics."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Heights(NamedTuple):
 class ImplicitSurface:
     """The surface of points with quadrics, as the zero of a signed height: implicit moving least squares.
 
-    Of the nearest points of a place, those of the same sheet as the very nearest one each tell how far the place is
+    Of the nearest points of a place, those of the same sheet as the very nearest one each give how far the place is
     above their quadric; the mean of that, weighted by distance, is its height. So sharp edges stay sharp.
 
     Parameters
@@ -107,19 +107,19 @@ class ImplicitSurface:
         """Return the number of the point that is nearest to each place, (k,) int."""
         return self._tree.query(places, workers=-1)[1]
 
-    def bend(self, rows: Ints) -> Floats:
-        """Return half a curvature of some points, (k,): how fast the surface leaves their tangent planes."""
+    def half_curvature(self, rows: Ints) -> Floats:
+        """Return half the norm of the shape operator of some points, (k,): how fast the surface leaves their planes."""
         forms = self._shape_operator[rows]
         return 0.5 * np.sqrt(np.einsum("iab,iab->i", forms, forms))
 
     def over(self, rows: Ints, places: Floats) -> Floats:
-        """Return how far places, (k, 3), are above the quadrics of some points, (k,) int; no others are asked."""
+        """Return how far places, (k, 3), are above the quadrics of some points, (k,) int."""
         offset = places - self.points[rows]
-        bent = np.einsum("icd,id->ic", self._shape_operator[rows], offset)
-        return np.einsum("ic,ic->i", offset, self.normals[rows] + 0.5 * bent)
+        slope = np.einsum("icd,id->ic", self._shape_operator[rows], offset)
+        return np.einsum("ic,ic->i", offset, self.normals[rows] + 0.5 * slope)
 
-    def turn(self, rows: Bools) -> None:
-        """Turn the normals of some points, (k,) int or (m,) bool, around."""
+    def flip(self, rows: Bools) -> None:
+        """Reverse the normals of some points, (k,) int or (m,) bool."""
         self.normals[rows] *= -1.0
         self._shape_operator[rows] *= -1.0
 
@@ -130,7 +130,7 @@ class ImplicitSurface:
         ----------
         places : ndarray, (k, 3)
         report : callable
-            Called again and again; may raise `Cancelled`.
+            Called after each block; may raise `Cancelled`.
 
         Returns
         -------
@@ -155,14 +155,14 @@ class ImplicitSurface:
         spacing = self.spacing[first]
         same = np.einsum("ikc,ic->ik", normals, normals[:, 0]) > SMOOTH
         same &= self._component[index] == self._component[first, None]
-        # Of a place far off the surface all points are about as far: what counts is by how much they are further.
+        # Far off the surface all points are at about the same distance: weights follow the excess over the nearest.
         weight = np.where(same, np.exp((distance[:, :1] ** 2 - distance**2) / spacing[:, None] ** 2), 0.0)
         weight /= weight.sum(axis=1, keepdims=True)
         offset = places[:, None] - self.points[index]
-        bent = np.einsum("ikcd,ikd->ikc", self._shape_operator[index], offset)
-        above = np.einsum("ikc,ikc->ik", offset, normals + 0.5 * bent)
+        slope = np.einsum("ikcd,ikd->ikc", self._shape_operator[index], offset)
+        above = np.einsum("ikc,ikc->ik", offset, normals + 0.5 * slope)
         height = np.einsum("ik,ik->i", weight, above)
-        normal = _units(np.einsum("ik,ikc->ic", weight, normals + bent))
+        normal = _units(np.einsum("ik,ikc->ic", weight, normals + slope))
 
         inside, outward = self._inside[index], self._outward[index]
         near = np.where(np.isfinite(inside[:, :1]), weight * np.isfinite(inside), 0.0)

@@ -17,7 +17,7 @@ from .weights import balance_weights
 
 @dataclass(frozen=True)
 class Stiffness:
-    """The weak form of the operator, and what is known of its weights.
+    """The weak form of the operator, and measures of its weights.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class _Images:
         Whose image each is: a pair's or a point's. A row has up to three of them.
     weights : ndarray, (k,)
     fourth : ndarray, (k,)
-        What the fourth moment of the weight is, less what it would be at the distance of the pair itself.
+        Fourth moment of the weight, less that at the distance of the pair itself.
     once : ndarray, (k,) bool
         Those in one boundary; others are images of images.
     """
@@ -109,7 +109,7 @@ def stiffness_matrix(scaled: ScaledPoints, pairs: Pairs, weights: Floats, own: F
     weights : ndarray, (p,)
         Of the pairs; overwritten.
     own : ndarray, (m,)
-        Of each point with itself: what points at the same place, which share its area, couple by.
+        Of each point with itself: the coupling of points at the same place, which share its area.
     """
     if scaled.shared:
         whole = _symmetric(scaled, pairs.first, pairs.second, weights, own)
@@ -120,7 +120,7 @@ def stiffness_matrix(scaled: ScaledPoints, pairs: Pairs, weights: Floats, own: F
 
 
 def _kernel_weights(cloud: Cloud, distance: Floats, areas: Floats) -> tuple[Floats, Floats, _Images, _Images]:
-    """Return what the kernel makes of pairs, and of points with themselves.
+    """Return the weights of the kernel for pairs, and for points with themselves.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def _kernel_weights(cloud: Cloud, distance: Floats, areas: Floats) -> tuple[Floa
 def _widths(pairs: Pairs, distance: Floats, areas: Floats, weights: Floats, images: _Images, alone: _Images) -> Floats:
     """Return the smoothing length of the kernel whose fourth moment, 8 mu2 h^2 of the area, the weights have, (m,).
 
-    It is a mean over the neighbours, as the operator would make much of what differs from point to point by chance.
+    It is a mean over the neighbours, as the operator would amplify random differences from point to point.
     """
 
     def moments(patch: Patch) -> list[list[Floats]]:
@@ -186,7 +186,7 @@ def _widths(pairs: Pairs, distance: Floats, areas: Floats, weights: Floats, imag
 def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, own: Array) -> sparse.csr_array:
     """Return the symmetric matrix, (n, n), of quantities of pairs and of points with themselves, columns sorted.
 
-    Points at the same place share what theirs has.
+    Points at the same place share its weights.
     """
     n, m = len(scaled.inverse), len(own)
     if scaled.shared:
