@@ -241,7 +241,9 @@ def test_a_byte_that_changed_is_found(tmp_path, name):
         changed = bytearray(data)
         changed[place] ^= 64
         path.write_bytes(changed)
-        with pytest.raises(PointCloudError, match=f"checksum of its page {place // 1024 + 1} of 1024 bytes does not match"):
+        with pytest.raises(
+            PointCloudError, match=f"checksum of its page {place // 1024 + 1} of 1024 bytes does not match"
+        ):
             read_points(path)
 
 

@@ -280,7 +280,11 @@ HUGE = 2 * ("element camera 999999999999999\n" + 400 * "property double a\n")
         ("a.ply", ply_head("ascii", 1) + b"1_0 2 3\n", "point 1: could not convert string to float: '1_0'"),
         ("a.ply", ply_head("ascii", 2) + b"1 2 3\n1 2 \0\n", "point 2: could not convert"),
         ("a.ply", ply_head("ascii", 1) + b"1 2 " + b"9" * 300 + b"x\n", "'9{100}...'. Correct"),
-        ("a.ply", ply_head("ascii", 1) + b"1 " * 100_000, "line of 100,000 characters or more, which is not a point. Exp"),
+        (
+            "a.ply",
+            ply_head("ascii", 1) + b"1 " * 100_000,
+            "characters or more, which is not a point. Exp",
+        ),
         ("a.ply", ply_head("ascii", 1) + b"1 2 1e300\n", "1 of 1 points .* beyond 1e.30, the first of them is point 1"),
         (
             "a.ply",
