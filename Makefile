@@ -8,7 +8,7 @@ BOOT := $(shell for python in "$(PYTHON)" python3.11 python3.13 python3 python "
 	"$$python" -c "import sys; sys.exit(sys.version_info < (3, 8))" >/dev/null 2>&1 && echo "$$python" && break; done)
 run = $(if $(BOOT),"$(BOOT)",$(error No Python is found: install Python 3.11 or 3.13, or name it by PYTHON=...)) -B scripts/
 
-.PHONY: help demo test test-all test-gui build validate audit lint benchmark pictures clean
+.PHONY: help demo test test-all test-gui build validate audit lint benchmark index pictures clean
 
 help: ## Show this list (default)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,6 +41,9 @@ lint: ## Check style, format and the types of core
 
 benchmark: ## Compute the tables and figures of the paper and the peers
 	@$(run)environments.py benchmark -m benchmarks.run $(ARGUMENTS)
+
+index: ## Renew the table of operators in docs/manual.md from the registered tools
+	@$(run)in_blender.py manual_index.py
 
 pictures: ## Render the pictures of the manual, or some: ARGUMENTS="smooth rim"; those of scans from MESHFREE_SCANS=folder
 	@$(run)in_blender.py pictures.py $(ARGUMENTS)

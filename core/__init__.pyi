@@ -48,6 +48,7 @@ from .applications.smoothing import smoothing_base as smoothing_base
 from .applications.transport import Transport as Transport
 from .applications.transport import logarithmic_map as logarithmic_map
 from .applications.transport import transport as transport
+from .applications.variation import surface_variation as surface_variation
 from .errors import AreaError as AreaError
 from .errors import BrokenLibraryError as BrokenLibraryError
 from .errors import Cancelled as Cancelled

@@ -1,4 +1,4 @@
-"""What callers give as numbers, switches and arrays, read so that nothing else than a check can fail on it."""
+"""Checks of the numbers, switches and arrays that callers give, and their conversion."""
 
 from collections.abc import Sequence
 from numbers import Integral, Real
@@ -16,7 +16,7 @@ _HUGE = 1e100  # of a coordinate, so that no product overflows
 
 
 def real(given: Any) -> float:
-    """Return a real number as a float; NaN, which no comparison lets pass, for what is none."""
+    """Return a real number as a float; NaN, which no comparison lets pass, for anything else."""
     number = given[()] if isinstance(given, np.ndarray) and given.ndim == 0 else given
     if isinstance(number, bool) or not isinstance(number, Real):
         return np.nan
@@ -27,7 +27,7 @@ def real(given: Any) -> float:
 
 
 def whole(given: Any) -> float:
-    """Return a whole number as an int; NaN, which no comparison lets pass, for what is none."""
+    """Return a whole number as an int; NaN, which no comparison lets pass, for anything else."""
     if isinstance(given, Integral) and not isinstance(given, bool):
         return int(given)
     number = real(given)
@@ -53,7 +53,7 @@ def as_array(given: ArrayLike, name: str) -> Array:
     Raises
     ------
     InvalidPointsError
-        Rows of different lengths, or masked values, of which nothing is known.
+        Rows of different lengths, or masked values.
     """
     try:
         array = np.asarray(given)
@@ -120,5 +120,5 @@ def check_positions(positions: ArrayLike, count: int, name: str, singular: str) 
     """Return positions, (count, 3), in double precision."""
     wanted = f"Give x, y, z for each {singular}: {count} rows of 3 real numbers."
     given = as_doubles(check_array(positions, name.capitalize(), [(count, 3)], wanted))
-    check_finite(given, name, f"Give a place for each {singular}.", _HUGE)
+    check_finite(given, name, f"Give a position for each {singular}.", _HUGE)
     return given

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from numbers import Integral
+from typing import Any
 
 from .arguments import check_switches, real
 from .errors import PointCloudError
@@ -11,7 +12,7 @@ _CHOICES = {
     "boundary": ("auto", "off"),
     "projection": ("auto", "off", "quadric"),
 }
-_HUGE = 1e60  # whose squares are still numbers
+_HUGE = 1e60  # whose squares do not overflow
 _PAPER_CHOICES = {
     "areas": ("constrained", "regularized", "uniform"),
     "normals": ("wpca", "pca"),
@@ -25,16 +26,15 @@ class LaplacianOptions:
     Parameters
     ----------
     bandwidth : {"adaptive", "local", "global"}
-        "adaptive": a smoothing length h per point, as wide as the widest gaps between the points around demand, h_ij
+        "adaptive": a smoothing length h per point, chosen by the widest gaps between the points around, h_ij
         the mean of both ends. "local": it follows the spacing alone. "global": one for all points.
     neighbors : int
         The smoothing length is measured by the distance to this neighbour; "adaptive" ones change as its square root.
     bandwidth_factor : float
         "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on the chosen
-        length. The kernel reaches 3 h.
+        length. The radius of the kernel is 3 h.
     boundary : {"auto", "off"}
-        "auto": find where the surface ends, unless the boundary is given, and mirror the points there. "off": take the
-        surface as closed.
+        "auto": detect the boundary, unless it is given, and mirror the points there. "off": take the surface as closed.
     sheets : bool
         Keep points of close sheets, such as the two sides of a thin wall, from being neighbours.
     projection : {"auto", "off", "quadric"}
@@ -44,7 +44,7 @@ class LaplacianOptions:
     Raises
     ------
     PointCloudError
-        A choice that there is not, a number out of range, or a kernel that is too narrow for its neighbours.
+        An unknown choice, a number out of range, or a kernel that is too narrow for its neighbours.
 
     See Also
     --------
@@ -75,7 +75,7 @@ class LaplacianOptions:
     sheets: bool = True
     projection: str = "auto"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_choices(self, _CHOICES)
         check_switches(sheets=self.sheets)
         _check_neighbors(self)
@@ -96,7 +96,7 @@ class PaperOptions:
     Raises
     ------
     PointCloudError
-        A choice that there is not, or a number out of range.
+        An unknown choice, or a number out of range.
     """
 
     areas: str = "constrained"
@@ -113,32 +113,32 @@ class PaperOptions:
 
     @property
     def cloud(self) -> LaplacianOptions:
-        """How the paper takes points: one h, the mean distance to that neighbour, and none of the default's care."""
+        """One h, the mean distance to that neighbour, without boundary, separation of sheets, or denoising."""
         return LaplacianOptions(
             bandwidth="global", neighbors=self.neighbors, boundary="off", sheets=False, projection="off"
         )
 
 
-def _check_choices(options, known):
+def _check_choices(options: LaplacianOptions | PaperOptions, known: dict[str, tuple[str, ...]]) -> None:
     for name, choices in known.items():
         value = getattr(options, name)
         if not isinstance(value, str) or value not in choices:
             raise PointCloudError(f"Option {name} is {value!r}. Choose one of {', '.join(choices)}.")
 
 
-def _check_neighbors(options):
+def _check_neighbors(options: LaplacianOptions | PaperOptions) -> None:
     if not isinstance(options.neighbors, Integral) or options.neighbors < 6:
         raise PointCloudError(f"Option neighbors is {options.neighbors!r}. Use a whole number of at least 6.")
 
 
-def _make_positive(options, name):
+def _make_positive(options: LaplacianOptions | PaperOptions, name: str) -> None:
     value = real(getattr(options, name))
     if not 0.0 < value < _HUGE:
         raise PointCloudError(f"Option {name} is {getattr(options, name)!r}. Use a number above zero, below {_HUGE:g}.")
     object.__setattr__(options, name, value)
 
 
-def check_options(options):
+def check_options(options: Any) -> None:
     """Check that options are `LaplacianOptions`.
 
     Raises

@@ -12,5 +12,6 @@ Ints: TypeAlias = NDArray[np.integer[Any]]
 Bools: TypeAlias = NDArray[np.bool_]
 Array: TypeAlias = NDArray[Any]
 FilePath: TypeAlias = str | os.PathLike[str]
-Progress: TypeAlias = Callable[[str, float], Any]
+Progress: TypeAlias = Callable[[str, float], None]  # stage and fraction of it
+Report: TypeAlias = Callable[[], None]  # called between steps; may raise Cancelled
 Response: TypeAlias = Callable[[Floats], ArrayLike]  # to eigenvalues

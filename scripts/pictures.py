@@ -105,6 +105,13 @@ def roughness(path):
     single(obj, "lb_roughness", path)
 
 
+def surface_variation(path):
+    """Thin arms, and the valleys between them, are farther from planes than broad parts."""
+    obj = coral()
+    bpy.ops.meshfree.surface_variation()
+    single(obj, "lb_surface_variation", path)
+
+
 def orient(path):
     """A noisy ring whose scan has gaps all along, colored by the side that looks at the viewer, before and after."""
     around, across, places = np.random.default_rng(2).random((3, 9_000))
@@ -312,6 +319,7 @@ PICTURES = {
     "shape_index": shape_index,
     "curvature_direction": curvature_direction,
     "roughness": roughness,
+    "surface_variation": surface_variation,
     "orient": orient,
     "signature": signature,
     "distance": distance,

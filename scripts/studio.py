@@ -240,20 +240,18 @@ def add_display(obj, radius):
 
 def paint(name, color, normals=""):
     """Return a matt material of one colour."""
-    add_node = part("operators.objects.modifiers").add_node
     material = bpy.data.materials.new(name)
     tree = part("ui.materials").new_tree(material)
-    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", 2, 0)
-    diffuse.inputs["Color"].default_value = color
-    output = add_node(tree, "ShaderNodeOutputMaterial", 3, 0)
-    tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    normal = None
     if normals:
-        attribute = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=normals)
-        turned = add_node(
-            tree, "ShaderNodeVectorTransform", 1, 0, vector_type="NORMAL", convert_from="OBJECT", convert_to="WORLD"
+        normal = tree.node(
+            "ShaderNodeVectorTransform",
+            tree.node("ShaderNodeAttribute", attribute_name=normals).outputs["Vector"],
+            vector_type="NORMAL",
+            convert_from="OBJECT",
+            convert_to="WORLD",
         )
-        tree.links.new(attribute.outputs["Vector"], turned.inputs[0])
-        tree.links.new(turned.outputs[0], diffuse.inputs["Normal"])
+    tree.output("ShaderNodeOutputMaterial", tree.node("ShaderNodeBsdfDiffuse", color, Normal=normal))
     return material
 
 

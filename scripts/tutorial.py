@@ -1,7 +1,7 @@
 """docs/tutorial.md, played in a window word by word, for its test and its pictures.
 
-Every step quotes the words that tell it. Words that tell of something to do and are not played are an error, as are
-steps that the tutorial does not tell; so there is no key that one would have to guess.
+Every step quotes its instructions. Instructions that are not played are an error, as are steps that the tutorial does
+not describe; so no key has to be guessed.
 """
 
 import re
@@ -37,12 +37,12 @@ class Reader:
     """
 
     def __init__(self, text):
-        told = text.partition("\n## Go on")[0].splitlines()
-        self._text = " ".join(" ".join(line for line in told if not line.startswith(("#", "!["))).split())
+        lines = text.partition("\n## Go on")[0].splitlines()
+        self._text = " ".join(" ".join(line for line in lines if not line.startswith(("#", "!["))).split())
         self._place = 0
 
     def __call__(self, words):
-        """Go on to the words that tell what is done next."""
+        """Go on to the instruction that is played next."""
         place = self._text.find(words, self._place)
         if place < 0:
             raise WindowError(f"The tutorial does not say {words!r} after {self._text[: self._place][-80:]!r}")
@@ -59,41 +59,41 @@ class Reader:
             raise WindowError(f"Nobody plays what the tutorial says: {passed!r}")
 
 
-def import_sample(gui, told, keep):
+def import_sample(gui, quote, keep):
     """Step 1: the points in a new file, and the tab."""
-    told("Start with a new file (*File > New > General*)")
+    quote("Start with a new file (*File > New > General*)")
     for place in (_FILE, _NEW, _GENERAL):
         gui.click(*place)
     gui.wait_until("bool(bpy.context.window_manager.windows) and 'Cube' in bpy.data.objects")
     gui.python("bpy.context.scene.eevee.taa_samples = 1")  # drawn without a graphics card
-    told("delete the cube: click it")
+    quote("delete the cube: click it")
     gui.click(*gui.python("on_screen((0.0, 0.0, 0.0))"))
-    told("press Delete")
+    quote("press Delete")
     gui.key("Delete")
     gui.wait_until("'Cube' not in bpy.data.objects")
-    told("Choose *File > Import > Points*")
+    quote("Choose *File > Import > Points*")
     for place in (_FILE, _IMPORT, _last_entry(gui)):
         gui.click(*(place(gui) if callable(place) else place))
     gui.wait_until(f"{_BROWSER} is not None")
-    told("click `coral.ply` in the file browser")
+    quote("click `coral.ply` in the file browser")
     x, y, width, height = gui.region("WINDOW", "FILE_BROWSER")
     for row in range(round(y) + 35, round(y + height), 20):
         gui.click(x + 50, row)
         if gui.python(f"{_BROWSER}.spaces.active.params.filename") == SAMPLE.name:
             break
-    told("press *Import Points*")
+    quote("press *Import Points*")
     x, y, width, height = gui.region("EXECUTE", "FILE_BROWSER")
     gui.click(x + width - 70, y + 0.5 * height)
     gui.wait_until(f"'coral' in bpy.data.objects and {CORAL}.select_get() and not {WORKING}", 60)
     gui.wait_until(f"'lb_disc' in {CORAL}.data.attributes")
-    told("Move the mouse over the 3D view")
+    quote("Move the mouse over the 3D view")
     gui.point_at_view()
-    told("press N")
+    quote("press N")
     gui.key("n")
     gui.wait_until("view3d()[2].width > 50")
-    told("click the tab *Mesh-Free*")
+    quote("click the tab *Mesh-Free*")
     gui.open_tab()
-    told("*coral: 10,000 points*")
+    quote("*coral: 10,000 points*")
     gui.wait_until(f"len({CORAL}.data.vertices) == 10000")
     gui.point_at_view()
     keep("import")
@@ -113,55 +113,55 @@ def _last_entry(gui):
     return find
 
 
-def analyze(gui, told, keep):
+def analyze(gui, quote, keep):
     """Step 2: colors."""
-    told("Press *Analyze Points*")
+    quote("Press *Analyze Points*")
     gui.press("meshfree.analyze")
     gui.wait_until(f"'lb_area' in {CORAL}.data.attributes and not {WORKING}", 240)
-    told(f"{gui.python(f'{CORAL}.meshfree.total_area'):.1f} m²")
+    quote(f"{gui.python(f'{CORAL}.meshfree.total_area'):.1f} m²")
     gui.point_at_view()
     keep("colors")
     for words, name in (("Under *Display* press", "lb_area"), ("*Mean Curvature* again", "lb_mean_curvature")):
-        told(words)
+        quote(words)
         gui.press(f'meshfree.colormap(attribute="{name}"')
 
 
-def choose(gui, told, keep):
+def choose(gui, quote, keep):
     """Step 3: groups."""
     gui.python(_MEMBERS)
-    told("over the view, press Numpad 1")
+    quote("over the view, press Numpad 1")
     gui.point_at_view()
     gui.key("KP_1")
-    told("and Tab")
+    quote("and Tab")
     gui.key("Tab")
     gui.wait_until(f"{CORAL}.mode == 'EDIT'")
-    told("Open *Points and Groups*")
+    quote("Open *Points and Groups*")
     gui.open_panel("meshfree.select_grow")
-    told("switch on *Group Colors*")
+    quote("switch on *Group Colors*")
     gui.press(".meshfree.show_groups")
     gui.wait_until(f"{CORAL}.meshfree.show_groups")
-    told("press B")
+    quote("press B")
     gui.point_at_view()
     gui.key("b")
-    told("drag a box around the right half of the points")
+    quote("drag a box around the right half of the points")
     _box(gui, (0.2, -2.2), (2.2, 2.2))
-    told("Press *Assign to Anchors*")
+    quote("Press *Assign to Anchors*")
     gui.press("meshfree.group_from_selection(role='ANCHOR'")
-    told("press Alt+A")
+    quote("press Alt+A")
     gui.point_at_view()
     gui.key("alt+a")
-    told("then B")
+    quote("then B")
     gui.key("b")
-    told("drag a box around the tip of the arm at the lower left")
+    quote("drag a box around the tip of the arm at the lower left")
     _box(gui, (-2.2, -1.3), (-1.3, 0.0))
-    told("Press *Assign to Handles*")
+    quote("Press *Assign to Handles*")
     gui.press("meshfree.group_from_selection(role='HANDLE'")
     gui.point_at_view()
     keep("groups")
-    told("Switch *Group Colors* off again")
+    quote("Switch *Group Colors* off again")
     gui.press(".meshfree.show_groups")
     gui.wait_until(f"not {CORAL}.meshfree.show_groups")
-    told("press Tab")
+    quote("press Tab")
     gui.point_at_view()
     gui.key("Tab")
     gui.wait_until(f"{CORAL}.mode == 'OBJECT'")
@@ -190,63 +190,63 @@ def _find(gui, press, button):
     raise unseen
 
 
-def bend(gui, told, keep):
-    """Step 4: bind, move and turn."""
-    told("Open *Bend*")
+def bend(gui, quote, keep):
+    """Step 4: bind, move and rotate."""
+    quote("Open *Bend*")
     _find(gui, gui.open_panel, ".meshfree.deform.handles")
-    told("press *Bind*")
+    quote("press *Bind*")
     _find(gui, gui.press, "meshfree.deform_bind")
     gui.wait_until("'coral Handle' in bpy.data.objects", 240)
     gui.wait_until(f"not {WORKING}")
-    told("Click it to select it")
+    quote("Click it to select it")
     gui.click(*gui.python(f"on_screen({HANDLE}.matrix_world.translation)"))
     gui.wait_until("bpy.context.object.name == 'coral Handle'")
-    told("Press G, Z and 1, and Return")
+    quote("Press G, Z and 1, and Return")
     gui.key("g", "z", "1", "Return")
     gui.wait_until(f"{MOVED} > 0.9")
-    told("Press R, Y and 60, and Return")
+    quote("Press R, Y and 60, and Return")
     gui.key("r", "y", "6", "0", "Return")
     gui.wait_until(f"{CORAL}.data['lb_pose'][0] == 1.0", 60)
     gui.settle()
     keep("bent")
 
 
-def color(gui, told, keep):
+def color(gui, quote, keep):
     """Step 5: how far the points went, and what the bent shape is like."""
-    told("Click the coral")
+    quote("Click the coral")
     gui.click(*gui.python("on_screen((0.0, 0.0, 0.3))"))
     gui.wait_until("bpy.context.object.name == 'coral'")
-    told("press *Displacement* under *Display*")
+    quote("press *Displacement* under *Display*")
     _find(gui, gui.press, 'meshfree.colormap(attribute="lb_displacement"')
     gui.point_at_view()
     keep("display")
-    told("Press *Apply* under *Bend*")
+    quote("Press *Apply* under *Bend*")
     _find(gui, gui.press, "meshfree.deform_apply")
     gui.wait_until(f"{MOVED} == 0.0")
-    told("then *Analyze Points* at the top")
+    quote("then *Analyze Points* at the top")
     _find(gui, gui.press, "meshfree.analyze")
     gui.wait_until(WORKING)
     gui.wait_until(f"not {WORKING}", 240)
-    told("and *Mean Curvature* under *Display*")
+    quote("and *Mean Curvature* under *Display*")
     _find(gui, gui.press, 'meshfree.colormap(attribute="lb_mean_curvature"')
 
 
-def render(gui, told, keep):
+def render(gui, quote, keep):
     """Step 6: a picture by the camera."""
     gui.python("rendered = []; bpy.app.handlers.render_complete.append(lambda *_: rendered.append(True))")
-    told("Look at the coral from where you like, with room around it")
+    quote("Look at the coral from where you like, with room around it")
     x, y = gui.view_center()
     gui.drag((x, y), (x + 60, y - 20), "middle")
     for _ in range(4):
         gui.click(x, y, "wheel down")
-    told("press Ctrl+Alt+Numpad 0")
+    quote("press Ctrl+Alt+Numpad 0")
     gui.key("ctrl+alt+KP_0")
     gui.wait_until("view3d()[0].spaces.active.region_3d.view_perspective == 'CAMERA'")
-    told("set *Standard* right there")
+    quote("set *Standard* right there")
     _find(gui, lambda button: _choose_standard(gui, button), ".view_settings.view_transform")
-    told("Press *Legend in Renders*")
+    quote("Press *Legend in Renders*")
     _find(gui, gui.press, "meshfree.legend")
-    told("then F12")
+    quote("then F12")
     gui.point_at_view()
     gui.key("F12")
     gui.wait_until("rendered", 240)
@@ -273,7 +273,7 @@ def play(gui, keep):
     gui.new_file()
     gui.python("bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'")
     (gui.folder / SAMPLE.name).write_bytes(SAMPLE.read_bytes())  # where the file browser opens
-    told = Reader((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"))
+    quote = Reader((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"))
     for step in STEPS:
-        step(gui, told, keep)
-    told.end()
+        step(gui, quote, keep)
+    quote.end()

@@ -15,13 +15,13 @@ class ToolPanel(ReadyPanel):
 
 
 class MESHFREE_PT_measure(ToolPanel, bpy.types.Panel):
-    """What can be told of each point: how the surface bends, how rough it is, how far it is to others"""
+    """Quantities at each point: curvature, roughness, distances, fields"""
 
     bl_label = "Measure"
 
 
 class MESHFREE_PT_clean(ToolPanel, bpy.types.Panel):
-    """Removing noise and other filters of the shape, and which side normals point to"""
+    """Denoising and other filters of the shape, and the orientation of normals"""
 
     bl_label = "Clean"
 

@@ -14,7 +14,7 @@ from .show import look_at, show_attribute, show_in_solid, show_own_material, use
 
 
 class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
-    """Show an attribute as colors on the points: numbers, vectors, or colors that they have"""
+    """Show an attribute as colors on the points: numbers, vectors, or their own colors"""
 
     bl_idname = "meshfree.colormap"
     bl_label = "Show as Colors"

@@ -47,7 +47,7 @@ def search_group(layout, settings, name: str, obj):
 def _instead(obj, group):
     """Say what counts where a group is missing that is to be assigned."""
     if group != SOURCE:
-        return "Uses the boundaries that are found" if group == FIXED else "No points assigned yet"
+        return "Uses the detected boundaries" if group == FIXED else "No points assigned yet"
     count = int(selection(obj).sum())
     if count == 0:
         return "Select a point in Edit Mode first"
@@ -66,8 +66,8 @@ def _draw_apply(operator, context):
     if keyed_empties(operator.subject(context)):  # which it asks about; afterwards they are gone
         column = operator.layout.column(align=True)
         column.label(text=f"The shape of frame {context.scene.frame_current} will be at rest.", icon="INFO")
-        column.label(text="Keyframes of its handles would bend it once", icon="BLANK1")
-        column.label(text="more, so they are removed. Bake keeps motion.", icon="BLANK1")
+        column.label(text="Keyframes of its handles would deform it", icon="BLANK1")
+        column.label(text="again, so they are removed. Bake keeps motion.", icon="BLANK1")
     operator.layout.prop(operator, "keep_keyframes")
 
 

@@ -17,7 +17,7 @@ _UNKNOWN = 1e-6  # share of points without a value, from which on a place has no
 
 
 class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
-    """Make a curve object of the iso lines of what is shown, at the same values, on the faces or through the points"""
+    """Make a curve object of the displayed iso lines"""
 
     bl_idname = "meshfree.iso_lines_to_curves"
     bl_label = "Iso Lines to Curves"
@@ -27,8 +27,8 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
 
     count: IntProperty(
         name="Iso Lines",
-        description="How many even steps of the color range have a line in their middle; 0 for as many as are shown,"
-        f" or {_COUNT} where none are",
+        description="Number of lines, in the middle of as many even steps of the color range; 0 for as many as are"
+        f" shown, or {_COUNT} where none are",
         default=0,
         min=0,
         soft_max=50,
@@ -58,8 +58,8 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
             lines = core.iso_lines(vertices, faces, carried, levels)
             if not lines:
                 raise core.PointCloudError(
-                    f"{label(name)} has no lines at {count} values from {levels[0]:g} to {levels[-1]:g}. Let the"
-                    " range reach over the values, or raise the number of lines."
+                    f"{label(name)} has no lines at {count} values from {levels[0]:g} to {levels[-1]:g}. Extend"
+                    " the range to the values, or raise the number of lines."
                 )
             return lines
 

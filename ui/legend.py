@@ -6,9 +6,8 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..core import PointCloudError
-from ..operators.objects.modifiers import add_node
 from ..operators.registration import Registration, Row
-from ..operators.running.ready import ReadyOperator
+from ..operators.running.ready import ReadyOperator, reporting
 from .canvas import PLATE_CORNERS
 from .colormaps import to_linear
 from .display import shown_attribute
@@ -100,30 +99,27 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
     bl_label = "Legend in Renders"
     works_in = ("OBJECT", "EDIT")
 
-    show: BoolProperty(name="Show", description="Put the legend there; otherwise take it away", default=True)
+    show: BoolProperty(name="Show", description="Add the legend; otherwise remove it", default=True)
     title: StringProperty(
         name="Title",
         description="Text above the colors, whatever is shown; empty for the name of the attribute",
         options={"SKIP_SAVE"},
     )
 
+    @reporting
     def execute(self, context):
         obj, scene = context.object, context.scene
-        try:
-            if not self.show:
-                legend = find_legend(scene, obj)
-                if legend is None:
-                    raise PointCloudError(f'There is no legend of "{obj.name}" in this scene to take away.')
-                remove_legend(scene, legend)
-                return {"FINISHED"}
-            if scene.camera is None:
-                raise PointCloudError("The scene has no camera to put a legend in front of. Add one with Add > Camera.")
-            if shown_scale(obj, scene) is None:
-                what = "its own colors, which stand for no values" if shown_attribute(obj) else "no colors yet"
-                raise PointCloudError(f'"{obj.name}" shows {what}. Choose what to see under Display first.')
-        except PointCloudError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        if not self.show:
+            legend = find_legend(scene, obj)
+            if legend is None:
+                raise PointCloudError(f'There is no legend of "{obj.name}" in this scene to remove.')
+            remove_legend(scene, legend)
+            return {"FINISHED"}
+        if scene.camera is None:
+            raise PointCloudError("The scene has no camera to put a legend in front of. Add one with Add > Camera.")
+        if shown_scale(obj, scene) is None:
+            what = "its own colors, which are not values" if shown_attribute(obj) else "no colors yet"
+            raise PointCloudError(f'"{obj.name}" shows {what}. Choose what to see under Display first.')
         make_legend(scene, obj, scene.camera, self.title)
         return {"FINISHED"}
 
@@ -247,13 +243,8 @@ def _material(name, attribute):
         return material
     material = bpy.data.materials.new(name)
     tree = new_tree(material)
-    emission = add_node(tree, "ShaderNodeEmission", 1, 0)
-    emission.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    output = add_node(tree, "ShaderNodeOutputMaterial", 2, 0)
-    tree.links.new(emission.outputs[0], output.inputs["Surface"])
-    if attribute:
-        source = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=attribute)
-        tree.links.new(source.outputs["Color"], emission.inputs["Color"])
+    source = tree.node("ShaderNodeAttribute", attribute_name=attribute) if attribute else (1.0, 1.0, 1.0, 1.0)
+    tree.output("ShaderNodeOutputMaterial", tree.node("ShaderNodeEmission", source))
     return material
 
 

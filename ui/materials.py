@@ -3,7 +3,7 @@
 import bpy
 
 from ..operators.objects.attributes import DISC, RISE
-from ..operators.objects.modifiers import add_math, add_node
+from ..operators.objects.node_trees import TreeBuilder
 from ..operators.objects.splats import BASE
 from . import colormaps
 from .nodes import DEVIATIONS
@@ -38,10 +38,7 @@ def stroke_material():
     material[_INK_TAG] = True
     material.diffuse_color = _INK  # in Solid
     tree = new_tree(material)
-    emission = add_node(tree, "ShaderNodeEmission", 0, 0)
-    emission.inputs["Color"].default_value = _INK
-    output = add_node(tree, "ShaderNodeOutputMaterial", 1, 0)
-    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    tree.output("ShaderNodeOutputMaterial", tree.node("ShaderNodeEmission", _INK))
     return material
 
 
@@ -53,9 +50,10 @@ def color_plain(material, groups):
         or material.node_tree is None
         or not {BACK, LIT} <= set(material.node_tree.nodes.keys())
     ):
-        gray = add_node(new_tree(material), "ShaderNodeRGB", 0, 0)
+        tree = new_tree(material)
+        gray = tree.node("ShaderNodeRGB")
         gray.outputs[0].default_value = _GRAY
-        _shine(material.node_tree, gray.outputs[0], groups)
+        _shine(tree, gray, groups)
         material[_KIND] = kind
 
 
@@ -64,40 +62,18 @@ def color_splats(material):
     if material.get(_KIND) == _SPLATTED and material.node_tree is not None:
         return
     tree = new_tree(material)
-    base = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=BASE, name="Splats")  # no result on show
-    color = add_node(tree, "ShaderNodeVectorMath", 1, 0, operation="MULTIPLY_ADD")
-    color.inputs[1].default_value, color.inputs[2].default_value = (_CONSTANT,) * 3, (0.5,) * 3
-    above = add_node(tree, "ShaderNodeVectorMath", 2, 0, operation="MAXIMUM")
-    above.inputs[1].default_value = 0.0, 0.0, 0.0
-    linear = add_node(tree, "ShaderNodeGamma", 3, 0)
-    linear.inputs["Gamma"].default_value = _GAMMA  # splats are trained in sRGB
-    light = add_node(tree, "ShaderNodeEmission", 4, 0)
+    base = tree.node("ShaderNodeAttribute", attribute_name=BASE, name="Splats").outputs  # no result on show
+    color = tree.vector("MULTIPLY_ADD", base["Vector"], (_CONSTANT,) * 3, (0.5,) * 3)
+    linear = tree.node("ShaderNodeGamma", tree.vector("MAXIMUM", color, (0.0,) * 3), _GAMMA)  # splats are of sRGB
     # A ray that passes the middle of a ball at the share b of its radius meets it at an angle whose sine is b.
-    place = add_node(tree, "ShaderNodeNewGeometry", 0, -300)
-    facing = add_node(tree, "ShaderNodeVectorMath", 1, -300, operation="DOT_PRODUCT")
-    squared = add_math(tree, 2, -300, "MULTIPLY", facing.outputs["Value"], facing.outputs["Value"])
-    passed = add_math(tree, 3, -300, "SUBTRACT", 1.0, squared)
-    fading = add_math(tree, 4, -300, "EXPONENT", add_math(tree, 3, -500, "MULTIPLY", passed, -0.5 * DEVIATIONS**2))
-    front = add_math(tree, 4, -500, "SUBTRACT", 1.0, place.outputs["Backfacing"])
-    alpha = add_math(
-        tree, 5, -300, "MULTIPLY", add_math(tree, 5, -500, "MULTIPLY", fading, base.outputs["Alpha"]), front
-    )
-    through = add_node(tree, "ShaderNodeBsdfTransparent", 5, 200)
-    mixed = add_node(tree, "ShaderNodeMixShader", 6, 0)
-    output = add_node(tree, "ShaderNodeOutputMaterial", 7, 0)
-    for source, target in (
-        (base.outputs["Vector"], color.inputs[0]),
-        (color.outputs[0], above.inputs[0]),
-        (above.outputs[0], linear.inputs["Color"]),
-        (linear.outputs[0], light.inputs["Color"]),
-        (place.outputs["Normal"], facing.inputs[0]),
-        (place.outputs["Incoming"], facing.inputs[1]),
-        (alpha, mixed.inputs[0]),
-        (through.outputs[0], mixed.inputs[1]),
-        (light.outputs[0], mixed.inputs[2]),
-        (mixed.outputs[0], output.inputs["Surface"]),
-    ):
-        tree.links.new(source, target)
+    place = tree.node("ShaderNodeNewGeometry").outputs
+    facing = tree.vector("DOT_PRODUCT", place["Normal"], place["Incoming"])
+    passed = tree.math("SUBTRACT", 1.0, tree.math("MULTIPLY", facing, facing))
+    fading = tree.math("EXPONENT", tree.math("MULTIPLY", passed, -0.5 * DEVIATIONS**2))
+    front = tree.math("SUBTRACT", 1.0, place["Backfacing"])
+    alpha = tree.math("MULTIPLY", tree.math("MULTIPLY", fading, base["Alpha"]), front)
+    through, light = tree.node("ShaderNodeBsdfTransparent"), tree.node("ShaderNodeEmission", linear)
+    tree.output("ShaderNodeOutputMaterial", tree.node("ShaderNodeMixShader", alpha, through, light))
     material[_KIND] = _SPLATTED
 
 
@@ -118,33 +94,23 @@ def is_plain(material) -> bool:
 
 def color_by_direction(material, name, groups):
     """Let a material show the directions of an attribute of vectors, and groups as in `color_by_number`."""
-    if _begin(material, name, f"DIRECTION {groups}"):
-        tree = material.node_tree
+    if tree := _begin(material, name, f"DIRECTION {groups}"):
         _shine(tree, _direction_color(tree, tree.nodes[ATTRIBUTE].outputs["Vector"]), groups)
 
 
 def color_by_checker(material, name, groups):
     """Let a material show texture coordinates as a checkerboard, and groups as in `color_by_number`."""
-    if _begin(material, name, f"{_CHECKERED} {groups}"):
-        tree = material.node_tree
-        checker = add_node(tree, "ShaderNodeTexChecker", 1, 0)
-        checker.inputs["Scale"].default_value = _CHECKS
-        checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = CHECKER.values()
+    if tree := _begin(material, name, f"{_CHECKERED} {groups}"):
+        place = tree.vector("ADD", tree.nodes[ATTRIBUTE].outputs["Vector"], _rise(tree))
         # Across the planes between checks rounding would decide.
-        level = add_node(tree, "ShaderNodeVectorMath", 1, -300, operation="ADD")
-        level.inputs[1].default_value = 0.0, 0.0, 0.5 / _CHECKS
-        rising = add_node(tree, "ShaderNodeVectorMath", 1, -500, operation="ADD")
-        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], rising.inputs[0])
-        tree.links.new(_rise(tree).outputs["Vector"], rising.inputs[1])
-        tree.links.new(rising.outputs[0], level.inputs[0])
-        tree.links.new(level.outputs[0], checker.inputs["Vector"])
-        _shine(tree, checker.outputs["Color"], groups)
+        level = tree.vector("ADD", place, (0.0, 0.0, 0.5 / _CHECKS))
+        _shine(tree, tree.node("ShaderNodeTexChecker", level, *CHECKER.values(), _CHECKS), groups)
 
 
 def color_by_own(material, name, groups):
     """Let a material show the colors that an attribute holds, and groups as in `color_by_number`."""
-    if _begin(material, name, f"{_COLORED} {groups}"):
-        _shine(material.node_tree, material.node_tree.nodes[ATTRIBUTE].outputs["Color"], groups)
+    if tree := _begin(material, name, f"{_COLORED} {groups}"):
+        _shine(tree, tree.nodes[ATTRIBUTE], groups)
 
 
 def shows_own(material) -> bool:
@@ -153,8 +119,8 @@ def shows_own(material) -> bool:
 
 
 def _rise(tree):
-    """Add the node that reads by how much what is shown rises within a disc; zero where nothing does."""
-    return add_node(tree, "ShaderNodeAttribute", 0, -500, attribute_name=RISE, name="Rise")
+    """Add the node that reads by how much what is shown rises within a disc, zero where nothing does; return that."""
+    return tree.node("ShaderNodeAttribute", attribute_name=RISE, name="Rise").outputs["Vector"]
 
 
 def is_checkered(material) -> bool:
@@ -186,8 +152,8 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
     stepped = color_map in STEPPED
     repeated, hiding = color_map == "CATEGORICAL", settings.outside == "HIDE"
     needed = (RANGE, COLORS, LINES, EVEN, BELOW, ABOVE, *(() if hiding else (GRAY,)))
-    if _begin(material, name, f"{component} {repeated} {hiding} {groups}", needed):
-        _build_number_tree(material.node_tree, component, repeated, hiding, groups)
+    if tree := _begin(material, name, f"{component} {repeated} {hiding} {groups}", needed):
+        _build_number_tree(tree, component, repeated, hiding, groups)
     nodes = material.node_tree.nodes
     colors = colormaps.colors(color_map, settings.reverse)
     # Of a stepped map each number is in the middle of its colour, and the last one as wide as the others.
@@ -205,57 +171,48 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
 
 
 def _begin(material, name, kind, needed=()):
-    """Let a material read an attribute; return whether it is empty but for that.
+    """Let a material read an attribute; return the builder of its nodes if it has none but for that, otherwise None.
 
     So it is where its nodes were of another kind, or somebody has deleted one that is needed.
     """
-    fits = material.get(_KIND) == kind and {ATTRIBUTE, BACK, LIT, *needed} <= set(material.node_tree.nodes.keys())
-    if not fits:
-        add_node(new_tree(material), "ShaderNodeAttribute", 0, 0, name=ATTRIBUTE)
+    tree = None
+    if material.get(_KIND) != kind or not {ATTRIBUTE, BACK, LIT, *needed} <= set(material.node_tree.nodes.keys()):
+        tree = new_tree(material)
+        tree.node("ShaderNodeAttribute", name=ATTRIBUTE)
         material[_KIND] = kind
     attribute = material.node_tree.nodes[ATTRIBUTE]
     if attribute.attribute_name != name:
         attribute.attribute_name = name
-    return not fits
+    return tree
 
 
 def _build_number_tree(tree, component, repeated, hiding, groups):
     """Add the nodes from a number to its colour: range, map, iso lines, and what lies beyond the range."""
-    number = tree.nodes[ATTRIBUTE].outputs["Fac"]
+    source = tree.nodes[ATTRIBUTE].outputs
+    number = source["Fac"]
     if component == "LENGTH":
-        length = add_node(tree, "ShaderNodeVectorMath", 1, 0, operation="LENGTH")
-        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], length.inputs[0])
-        number = length.outputs["Value"]
+        number = tree.vector("LENGTH", source["Vector"])
     elif component:
-        separate = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0)
-        tree.links.new(tree.nodes[ATTRIBUTE].outputs["Vector"], separate.inputs[0])
-        number = separate.outputs[component]
-    rise = add_node(tree, "ShaderNodeSeparateXYZ", 1, -500)
-    tree.links.new(_rise(tree).outputs["Vector"], rise.inputs[0])
-    place = number = add_math(tree, 2, 0, "ADD", number, rise.outputs["X"])
+        number = tree.node("ShaderNodeSeparateXYZ", source["Vector"]).outputs[component]
+    rise, steep, known = tree.node("ShaderNodeSeparateXYZ", _rise(tree)).outputs
+    place = number = tree.math("ADD", number, rise)
     if repeated:  # -1 and below have one colour, 0 and above repeat; on discs Cycles gives a little less than 7 for 7
-        whole = add_math(tree, 1, 400, "ROUND", number)
-        place = add_math(tree, 2, 200, "MODULO", add_math(tree, 1, 200, "MAXIMUM", whole, -1.0), CLASSES)
-    bounds = add_node(tree, "ShaderNodeMapRange", 3, 0, name=RANGE)
-    ramp = add_node(tree, "ShaderNodeValToRGB", 4, 0, name=COLORS)
-    tree.links.new(place, bounds.inputs["Value"])
-    tree.links.new(bounds.outputs["Result"], ramp.inputs[0])
+        place = tree.math("MODULO", tree.math("MAXIMUM", tree.math("ROUND", number), -1.0), CLASSES)
+    bounds = tree.node("ShaderNodeMapRange", place, name=RANGE)
+    ramp = tree.node("ShaderNodeValToRGB", bounds, name=COLORS)
     # Lines in the middle of so many even steps of the range, where values beyond it end.
-    part = add_math(tree, 5, -300, "FRACT", add_math(tree, 4, -300, "MULTIPLY", bounds.outputs["Result"], name=LINES))
-    even = add_math(tree, 3, -1000, "MULTIPLY", rise.outputs["Y"], name=EVEN)
-    even = add_math(tree, 4, -1000, "MINIMUM", even, _BROADEST)
-    unknown = add_math(tree, 3, -1200, "SUBTRACT", 1.0, rise.outputs["Z"])
-    share = add_math(tree, 4, -1200, "MULTIPLY", unknown, 0.5 * _LINE)
-    line = add_math(tree, 6, -300, "COMPARE", part, 0.5)
-    tree.links.new(add_math(tree, 5, -1000, "ADD", even, share), line.node.inputs[2])
-    color = _mix(tree, 7, line, ramp.outputs["Color"], _DARK)
-    below = add_math(tree, 4, -600, "LESS_THAN", number, name=BELOW)
-    above = add_math(tree, 4, -800, "GREATER_THAN", number, name=ABOVE)
-    beyond = add_math(tree, 5, -600, "ADD", below, above)
+    part = tree.math("FRACT", tree.math("MULTIPLY", bounds, name=LINES))
+    even = tree.math("MINIMUM", tree.math("MULTIPLY", steep, name=EVEN), _BROADEST)
+    share = tree.math("MULTIPLY", tree.math("SUBTRACT", 1.0, known), 0.5 * _LINE)
+    line = tree.math("COMPARE", part, 0.5, tree.math("ADD", even, share))
+    color = _mix(tree, line, ramp, _DARK)
+    below = tree.math("LESS_THAN", number, name=BELOW)
+    above = tree.math("GREATER_THAN", number, name=ABOVE)
+    beyond = tree.math("ADD", below, above)
     if hiding:
         _shine(tree, color, groups, hidden=beyond)
     else:
-        _shine(tree, _mix(tree, 8, add_math(tree, 6, -600, "MULTIPLY", beyond, name=GRAY), color, BEYOND), groups)
+        _shine(tree, _mix(tree, tree.math("MULTIPLY", beyond, name=GRAY), color, BEYOND), groups)
 
 
 def _shine(tree, color, groups, hidden=None):
@@ -264,71 +221,35 @@ def _shine(tree, color, groups, hidden=None):
     By emission, so that colours read as in the legend, and by diffuse light, so that shapes show: see `shade` for their
     shares, and `dim_back` for the back side.
     """
-    column = 9
     for name, group_color in groups.items():
-        weight = add_node(tree, "ShaderNodeAttribute", column, -600, attribute_name=name, name=f"Group {name}")
-        inside = add_math(tree, column + 1, -600, "GREATER_THAN", weight.outputs["Fac"], 0.0)
-        color = _mix(tree, column + 2, inside, color, group_color)
-        column += 1
-    column += 2 if groups else 0
-    seen = add_node(tree, "ShaderNodeNewGeometry", column, -900)
-    behind = add_math(tree, column + 1, -900, "MULTIPLY", seen.outputs["Backfacing"], name=BACK)
-    color = _mix(tree, column + 2, behind, color, BEYOND)
-    column += 3
-    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", column, 100)
-    _light_discs(tree, column - 3, diffuse)
-    emission = add_node(tree, "ShaderNodeEmission", column, -100)
-    mixed = add_node(tree, "ShaderNodeMixShader", column + 1, 0, name=LIT)
-    output = add_node(tree, "ShaderNodeOutputMaterial", column + 3, 0)
-    tree.links.new(color, diffuse.inputs["Color"])
-    tree.links.new(color, emission.inputs["Color"])
-    tree.links.new(diffuse.outputs[0], mixed.inputs[1])
-    tree.links.new(emission.outputs[0], mixed.inputs[2])
+        weight = tree.node("ShaderNodeAttribute", attribute_name=name, name=f"Group {name}")
+        color = _mix(tree, tree.math("GREATER_THAN", weight.outputs["Fac"], 0.0), color, group_color)
+    seen = tree.node("ShaderNodeNewGeometry").outputs
+    color = _mix(tree, tree.math("MULTIPLY", seen["Backfacing"], 0.0, name=BACK), color, BEYOND)
+    diffuse = tree.node("ShaderNodeBsdfDiffuse", color, Normal=_disc_normal(tree, seen))
+    mixed = tree.node("ShaderNodeMixShader", None, diffuse, tree.node("ShaderNodeEmission", color), name=LIT)
     if hidden is not None:
-        nothing = add_node(tree, "ShaderNodeBsdfTransparent", column + 1, -200)
-        shown, mixed = mixed, add_node(tree, "ShaderNodeMixShader", column + 2, 0)
-        tree.links.new(hidden, mixed.inputs[0])
-        tree.links.new(shown.outputs[0], mixed.inputs[1])
-        tree.links.new(nothing.outputs[0], mixed.inputs[2])
-    tree.links.new(mixed.outputs[0], output.inputs["Surface"])
+        mixed = tree.node("ShaderNodeMixShader", hidden, mixed, tree.node("ShaderNodeBsdfTransparent"))
+    tree.output("ShaderNodeOutputMaterial", mixed)
 
 
-def _light_discs(tree, column, diffuse):
-    """Light a disc by the normal of its point, as if it were flat, on the side that is seen; all else as it is."""
-    disc = add_node(tree, "ShaderNodeAttribute", column, 500, attribute_name=DISC, name="Disc")
-    seen = add_node(tree, "ShaderNodeNewGeometry", column, 800)
-    turned = add_node(tree, "ShaderNodeVectorTransform", column + 1, 500, vector_type="VECTOR")
-    turned.convert_from, turned.convert_to = "OBJECT", "WORLD"
-    facing = add_node(tree, "ShaderNodeVectorMath", column + 1, 800, operation="DOT_PRODUCT")
-    side = add_math(
-        tree, column + 2, 800, "MULTIPLY", add_math(tree, column + 1, 1000, "SIGN", facing.outputs["Value"]), 1e6
+def _disc_normal(tree, seen):
+    """Add the nodes for the normal by which surfaces are lit; return it.
+
+    That of a disc is the one of its point, as if it were flat, on the side that is seen; all else has its own.
+    """
+    disc = tree.node("ShaderNodeAttribute", attribute_name=DISC, name="Disc").outputs["Vector"]
+    turned = tree.node(
+        "ShaderNodeVectorTransform", disc, vector_type="VECTOR", convert_from="OBJECT", convert_to="WORLD"
     )
-    scaled = add_node(tree, "ShaderNodeVectorMath", column + 2, 500, operation="SCALE")
-    summed = add_node(
-        tree, "ShaderNodeVectorMath", column + 2, 300, operation="ADD"
-    )  # its own one alone without a disc
-    unit = add_node(tree, "ShaderNodeVectorMath", column + 3, 300, operation="NORMALIZE")
-    for source, target in (
-        (disc.outputs["Vector"], turned.inputs["Vector"]),
-        (turned.outputs["Vector"], facing.inputs[0]),
-        (seen.outputs["Incoming"], facing.inputs[1]),
-        (turned.outputs["Vector"], scaled.inputs[0]),
-        (side, scaled.inputs["Scale"]),
-        (scaled.outputs[0], summed.inputs[0]),
-        (seen.outputs["Normal"], summed.inputs[1]),
-        (summed.outputs[0], unit.inputs[0]),
-        (unit.outputs[0], diffuse.inputs["Normal"]),
-    ):
-        tree.links.new(source, target)
+    side = tree.math("MULTIPLY", tree.math("SIGN", tree.vector("DOT_PRODUCT", turned, seen["Incoming"])), 1e6)
+    summed = tree.vector("ADD", tree.vector("SCALE", turned, side), seen["Normal"])  # its own one alone without a disc
+    return tree.vector("NORMALIZE", summed)
 
 
-def _mix(tree, column, share, first, second):
-    """Add a node that turns a colour into a fixed one by a share; return its result."""
-    node = add_node(tree, "ShaderNodeMixRGB", column, -300)
-    node.inputs["Color2"].default_value = second
-    tree.links.new(share, node.inputs["Fac"])
-    tree.links.new(first, node.inputs["Color1"])
-    return node.outputs["Color"]
+def _mix(tree, share, first, second):
+    """Add a node that turns a colour into a fixed one by a share; return it."""
+    return tree.node("ShaderNodeMixRGB", share, first, second)
 
 
 def _set_colors(elements, colors, last):
@@ -345,15 +266,8 @@ def _set_colors(elements, colors, last):
 
 def _direction_color(tree, vector):
     """Colour directions: red, green and blue for x, y and z, each from dark for -1 to bright for 1."""
-    unit = add_node(tree, "ShaderNodeVectorMath", 1, 0, operation="NORMALIZE")
-    shifted = add_node(tree, "ShaderNodeVectorMath", 2, 0, operation="MULTIPLY_ADD")
-    shifted.inputs[1].default_value = shifted.inputs[2].default_value = (0.5, 0.5, 0.5)
-    gamma = add_node(tree, "ShaderNodeGamma", 3, 0)
-    gamma.inputs["Gamma"].default_value = _GAMMA
-    tree.links.new(vector, unit.inputs[0])
-    tree.links.new(unit.outputs[0], shifted.inputs[0])
-    tree.links.new(shifted.outputs[0], gamma.inputs["Color"])
-    return gamma.outputs["Color"]
+    shifted = tree.vector("MULTIPLY_ADD", tree.vector("NORMALIZE", vector), (0.5,) * 3, (0.5,) * 3)
+    return tree.node("ShaderNodeGamma", shifted, _GAMMA)
 
 
 def direction_color(direction):
@@ -362,8 +276,8 @@ def direction_color(direction):
 
 
 def new_tree(material):
-    """Return the node tree of a material, emptied."""
+    """Remove the nodes of a material; return the builder of new ones."""
     if material.node_tree is None:
         material.use_nodes = True
     material.node_tree.nodes.clear()
-    return material.node_tree
+    return TreeBuilder(material.node_tree)

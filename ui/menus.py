@@ -19,7 +19,7 @@ class MESHFREE_MT_object(bpy.types.Menu):
 
 
 class MESHFREE_MT_points(bpy.types.Menu):
-    """Selecting points, and the groups that the tools take"""
+    """Selecting points, and the groups that the tools use"""
 
     bl_label = "Mesh-Free"
 

@@ -138,14 +138,14 @@ class Placed(NamedTuple):
     size: tuple
 
     def corner(self, shares):
-        """Return the lower left corner by the shares of the way from left to right and from bottom to top."""
-        return tuple(self.room[axis] + share * self._way(axis) for axis, share in enumerate(shares))
+        """Return the lower left corner for a relative position in the room, from 0 to 1 along both axes."""
+        return tuple(self.room[axis] + share * self._free(axis) for axis, share in enumerate(shares))
 
     def shares(self, corner):
-        """Return the shares of a lower left corner, from 0 to 1."""
-        return [min(max((corner[axis] - self.room[axis]) / self._way(axis), 0.0), 1.0) for axis in (0, 1)]
+        """Return the relative position of a lower left corner, from 0 to 1."""
+        return [min(max((corner[axis] - self.room[axis]) / self._free(axis), 0.0), 1.0) for axis in (0, 1)]
 
-    def _way(self, axis):
+    def _free(self, axis):
         return max(self.room[axis + 2] - self.room[axis] - self.size[axis], 1.0)
 
 

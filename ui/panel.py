@@ -86,8 +86,8 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
         if reason and handled != obj:
             column = layout.column(align=True)
             draw_text(column, context, f'Handle of "{handled.name}"', "OUTLINER_OB_EMPTY")
-            draw_text(column, context, "G moves it, R turns it", "BLANK1")
-            return  # the panel of the deformation tells more
+            draw_text(column, context, "G moves it, R rotates it", "BLANK1")
+            return  # more is in the panel of the deformation
         if reason:
             column = layout.column(align=True)
             for sentence in (reason if obstacle(obj, ("EDIT",)) else _EDITING).split(". "):
@@ -133,7 +133,7 @@ def draw_tasks(layout):
 
 
 def _draw_job(layout, context, job):
-    """Draw what is computed, how far it is, and how to stop it."""
+    """Draw the running job, its progress, and the button that stops it."""
     column = layout.column(align=True)
     draw_text(column, context, f"{job.label} (Esc to Stop)")
     row = column.row(align=True)
@@ -142,7 +142,7 @@ def _draw_job(layout, context, job):
 
 
 def _draw_compared(layout, context, obj):
-    """Draw what an object was compared with, and what turns that round."""
+    """Draw what an object was compared with, and the button that exchanges both."""
     kept = obj.meshfree
     if kept.compared_with is None or DEVIATION not in obj.data.attributes:
         return
@@ -153,15 +153,15 @@ def _draw_compared(layout, context, obj):
 
 
 def _draw_notices(layout, context, obj):
-    """Draw what tools told of an object, each with a cross that dismisses it: the last lines of the status bar."""
+    """Draw the notices of an object, each with a button that dismisses it."""
     notices = obj.meshfree.notices if obj is not None else ()
     if not len(notices):
         return
     box = layout.box().column()
-    for index, told in list(enumerate(notices))[:_NOTICES]:
+    for index, notice in list(enumerate(notices))[:_NOTICES]:
         row = box.row(align=True)
-        icon = "ERROR" if told.level == "WARNING" else "INFO"
-        draw_text(row, context, f"{told.tool}: {told.text}", icon, taken=_CROSS)
+        icon = "ERROR" if notice.level == "WARNING" else "INFO"
+        draw_text(row, context, f"{notice.tool}: {notice.text}", icon, taken=_CROSS)
         row.operator("meshfree.dismiss", text="", icon="X").index = index
     if len(notices) > _NOTICES:
         draw_text(box, context, f"and {len(notices) - _NOTICES} more, seen when these are dismissed")
@@ -170,7 +170,7 @@ def _draw_notices(layout, context, obj):
 
 
 def _draw_result(layout, context, result):
-    """Draw the total area, and of components, boundaries and points left out what is worth telling."""
+    """Draw the total area, and the numbers of components, boundary points and points left out where not trivial."""
     lines = [("Total Area", area_text(result.total_area))]
     if result.subset_count:
         lines.append(("Analyzed Points", f"{result.subset_count:,}"))
@@ -352,7 +352,7 @@ class MESHFREE_PT_display_properties(Display, PropertiesPanel, bpy.types.Panel):
 
 
 def _draw_legend(layout, context, obj):
-    """Draw what tells the values of the colors on show, and what makes them differ from it."""
+    """Draw the settings of the legend, and the view transform where it changes colors."""
     column = layout.column(align=True, heading="Show")
     column.prop(obj.meshfree, "legend")
     column.prop(obj.meshfree, "histogram")
@@ -386,7 +386,7 @@ def _draw_colors(layout, context, obj):
         draw_text(column, context, "All values are zero", "INFO")
     elif settings.range_mode == "LOCKED" or not step_colors(obj):
         bounds = column.column(align=True)
-        bounds.enabled = settings.range_mode == "LOCKED"  # in other modes they tell what the range came to
+        bounds.enabled = settings.range_mode == "LOCKED"  # in other modes they show the resulting range
         bounds.prop(settings, "range_low")
         bounds.prop(settings, "range_high")
     column = layout.column(align=True)

@@ -35,7 +35,7 @@ _swatches = []  # the collection of Blender that holds them
 
 
 class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
-    """Selecting points, and the groups that the tools take"""
+    """Selecting points, and the groups that the tools use"""
 
     bl_label = "Points and Groups"
     bl_parent_id = "MESHFREE_PT_main"

@@ -10,7 +10,7 @@ from .display import label, shown_attribute, shown_range, shown_values
 
 
 class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
-    """Select the points whose values on show lie in a range"""
+    """Select the points whose displayed values lie in a range"""
 
     bl_idname = "meshfree.select_by_range"
     bl_label = "Select by Range"

@@ -123,7 +123,7 @@ def _add_display(obj):
 
 
 def viewport_points() -> int:
-    """How many points the viewport is to draw at most, so that it can be turned; 0 for all."""
+    """How many points the viewport is to draw at most, so that it can be orbited smoothly; 0 for all."""
     return _MOST_WITHOUT_CARD if _without_card() else 0
 
 
@@ -340,7 +340,7 @@ def _measure(obj):
 
 
 def reshape(obj):
-    """Draw discs and strokes where chosen and known; strokes not while handles move the points, as they do not turn.
+    """Draw discs and strokes where chosen and known; no strokes while handles move the points, as they do not rotate.
 
     Dots would hide which points are selected in Edit Mode, and Blender 5.2 draws all of them as selected. So there they
     are only seen with the colors of groups, and where they show what handles move.
@@ -351,19 +351,19 @@ def reshape(obj):
     if modifier is not None:
         group, known = modifier.node_group, DISC in obj.data.attributes
         formed = obj.meshfree.point_shape == "DISCS"
-        turned = known and formed and (deform is None or turns_discs(deform))
+        discs = known and formed and (deform is None or turns_discs(deform))
         if has_input(group, DISCS):
-            set_input(modifier, DISCS, turned)
+            set_input(modifier, DISCS, discs)
         if has_input(group, FILLED):
             set_input(modifier, FILLED, known and formed)
-        if has_input(group, SMOOTH):  # slopes do not turn
-            sloping_now = turned and deform is None and obj.meshfree.slopes_of != ""
+        if has_input(group, SMOOTH):  # gradients are not rotated
+            sloping_now = discs and deform is None and obj.meshfree.slopes_of != ""
             set_input(modifier, SMOOTH, shown_attribute(obj) if sloping_now else "")
         if has_input(group, SOLID_NAME) and not shown_attribute(obj):
             set_input(modifier, SOLID_NAME, "")
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
-        dots, bound = not (turned and draws_discs(obj)), deform is not None
+        dots, bound = not (discs and draws_discs(obj)), deform is not None
         modifier.show_in_editmode = obj.type != "MESH" or not dots or bound or obj.meshfree.show_groups
         if has_input(group, STROKES):
             stroked = known and deform is None and _has_strokes(obj)
@@ -406,7 +406,8 @@ def _color(obj, name, values):
         chosen = [settings.color_map, settings.range_mode]
         if quantity(name).color_range == "symmetric":  # zero is what it is all about, even where all of it has one sign
             chosen = [
-                way if way != "AUTO" else zero for way, zero in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
+                choice if choice != "AUTO" else auto
+                for choice, auto in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
             ]
         counted = without_unreached(name, shown)
         color_map, low, high = fit_range(counted, *chosen, settings.coverage, locked, is_distance(name, values, part))
@@ -514,7 +515,7 @@ _HANDLERS = {
 
 
 def attach():
-    """Begin to show what settings and tools tell of."""
+    """Begin to show what events ask for."""
     add_handlers(_HANDLERS)
 
 

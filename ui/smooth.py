@@ -10,8 +10,10 @@ from ..operators.objects.attributes import (
     SLOPE,
     SLOPE_2,
     SLOPE_OF,
+    has_vectors,
     own_positions,
     read_attribute,
+    remove_attributes,
     write_attribute,
 )
 from ..operators.objects.reading import sharing_objects
@@ -37,17 +39,18 @@ def follow(obj, name, part, columns, spacing):
     if not _is_writable(data):  # as in Edit Mode: those from before are of use for what was shown before
         kept.slopes_of = kept.slopes_of if columns and kept.slopes_of.startswith(f"{part} {name} ") else ""
         return
-    discs, points = _discs(data), own_positions(data)
-    if not columns or discs is None or not np.isfinite(points).all():
+    points = own_positions(data)
+    if not columns or not has_vectors(data, DISC) or not np.isfinite(points).all():
         kept.slopes_of = ""
         if not any(other.meshfree.slopes_of for other in sharing_objects(obj)):
-            _remove(data, (SLOPE, SLOPE_2, SLOPE_OF))
+            remove_attributes(data, SLOPE, SLOPE_2, SLOPE_OF)
         return
+    discs = read_attribute(data, DISC)
     wanted = f"{part} {name} {_checksum(points, discs, *columns)} {spacing:.6g}"
     holders = [other for other in (obj, *sharing_objects(obj)) if other.meshfree.slopes_of == wanted]
     if not holders or SLOPE not in data.attributes:
         slopes = cache.fetch(cache.content("slopes", points, discs, spacing), lambda: _slopes(points, discs, spacing))
-        _remove(data, (SLOPE, SLOPE_2)[len(columns) :])
+        remove_attributes(data, *(SLOPE, SLOPE_2)[len(columns) :])
         for kind, values in zip((SLOPE, SLOPE_2), columns, strict=False):
             write_attribute(data, kind, np.clip(slopes.of(values), *_BOUNDS))
         write_attribute(data, SLOPE_OF, _as_number(read_attribute(data, name)))
@@ -58,13 +61,6 @@ def follow(obj, name, part, columns, spacing):
 
 def _is_writable(data):
     return data.is_editable and data.override_library is None and not getattr(data, "is_editmode", False)
-
-
-def _discs(data):
-    """Read the discs of points, (n, 3), in spacings; None where there are none."""
-    layer = data.attributes.get(DISC)
-    known = layer is not None and (layer.data_type, layer.domain) == ("FLOAT_VECTOR", "POINT")
-    return read_attribute(data, DISC) if known else None
 
 
 def _checksum(*arrays):
@@ -85,9 +81,3 @@ def _slopes(points, discs, spacing):
 def _as_number(values):
     """Return values as Blender takes them for numbers: the means of vectors, in single precision."""
     return values if values.ndim == 1 else sum(values.T) / np.float32(values.shape[1])
-
-
-def _remove(data, names):
-    for name in names:
-        if name in data.attributes:
-            data.attributes.remove(data.attributes[name])

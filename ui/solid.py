@@ -11,6 +11,7 @@ from ..operators.objects.attributes import (
     in_edit_mesh,
     point_count,
     read_attribute,
+    remove_attributes,
     write_attribute,
 )
 from . import colormaps
@@ -69,13 +70,13 @@ def follow(obj, values, colors_of, radius):
     if obj.type != "MESH" or in_edit_mesh(obj) or not data.is_editable or data.override_library is not None:
         return ""
     if colors_of is None or not np.isfinite(values).all():
-        _remove(data, SOLID, TILT)
+        remove_attributes(data, SOLID, TILT)
         return ""
     write_attribute(data, SOLID, colors_of(values), "FLOAT_COLOR")
     if SLOPE in data.attributes and SLOPE_2 not in data.attributes and values.ndim == 1:
         write_attribute(data, TILT, _tilts(data, values, colors_of, radius))
     else:
-        _remove(data, TILT)
+        remove_attributes(data, TILT)
     if not data.color_attributes.active_color_name:
         data.color_attributes.active_color_name = SOLID
     return data.color_attributes.active_color_name
@@ -91,9 +92,3 @@ def _tilts(data, values, colors_of, radius):
     tilts = np.zeros((point_count(data), 3))
     tilts[some] = (colors_of(high) - colors_of(low))[:, :3] / (high - low)[:, None]
     return tilts
-
-
-def _remove(data, *names):
-    for name in names:
-        if name in data.attributes:
-            data.attributes.remove(data.attributes[name])

@@ -1,21 +1,30 @@
 """Work in blocks that fit the cache, on all cores: numpy and scipy let other threads run while they work on arrays."""
 
 import os
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from ..types import Report
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
 
 
-def blocks(count, size):
+def blocks(count: int, size: int) -> list[slice]:
     """Return the slices that divide a number of rows into blocks of one size."""
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def on_all_cores(function, parts, report=lambda: None, most=None):
+def on_all_cores(
+    function: Callable[[Part], Result], parts: Sequence[Part], report: Report = lambda: None, most: int | None = None
+) -> list[Result]:
     """Call a function with each of some parts, on all cores.
 
     Parameters
     ----------
     function : callable
-        Writes to places of its own for each part, so that results do not depend on the number of cores.
+        Writes to other entries for each part, so that results do not depend on the number of cores.
     parts : sequence
     report : callable
         Called before the first part and after each; may raise `Cancelled`, after which no further part is begun.

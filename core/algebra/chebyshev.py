@@ -1,7 +1,11 @@
 """Polynomials of a matrix, by its products."""
 
+from collections.abc import Callable, Iterator
 
-def chebyshev_terms(product, start):
+from ..types import Floats
+
+
+def chebyshev_terms(product: Callable[[Floats], Floats], start: Floats) -> Iterator[Floats]:
     """Yield ``T_0(M) y``, ``T_1(M) y`` and so on, without end, for the Chebyshev polynomials T_k.
 
     Parameters

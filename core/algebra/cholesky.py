@@ -1,5 +1,6 @@
 """Factors of sparse symmetric equations: Cholesky's, in dense fronts along a dissection."""
 
+from collections.abc import Callable, Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -7,14 +8,17 @@ from scipy import sparse
 from scipy.linalg.lapack import dpotrf, dtrtri
 
 from ..errors import SolverError
+from ..types import Floats, Ints
 from .blocks import blocks
 from .dense import product
 
-_BANDS = 6  # in which the lower half of a matrix is gone through
-_WIDEST = 512  # unknowns that are eliminated at one time, so that no step takes long
+_BANDS = 6  # in which the lower half of a matrix is added
+_WIDEST = 512  # unknowns that are eliminated at once, so that no step takes long
 
 
-def factorize(matrix, starts, report=lambda fraction: None):
+def factorize(
+    matrix: sparse.sparray, starts: Ints, report: Callable[[float], None] = lambda fraction: None
+) -> Callable[[Floats], Floats]:
     """Factorise a sparse symmetric positive definite matrix.
 
     Parameters
@@ -34,14 +38,14 @@ def factorize(matrix, starts, report=lambda fraction: None):
     Raises
     ------
     SolverError
-        The matrix is not positive definite: some component of the surface has nothing that holds it.
+        The matrix is not positive definite: no point of some component is fixed.
 
     Notes
     -----
     The multifrontal method (Duff and Reid 1983): the unknowns of a part are eliminated in a dense matrix of themselves
-    and of all later ones that they are coupled with, and what is left of it is added to that of the part after.
-    Nearly all of the work is done by dense products, in half of the time that SuperLU takes for factors of both
-    sides, and in less than half of the room.
+    and of all later ones that they are coupled with, its front, and the Schur complement is added to the front of the
+    next part. Nearly all of the work is done by dense products, in half of the time that SuperLU takes for factors of
+    both sides, and in less than half of the memory.
     """
     count = matrix.shape[0]
     bounds = _bounds(starts, count)
@@ -49,11 +53,11 @@ def factorize(matrix, starts, report=lambda fraction: None):
     report(0.0)
     coupled, parent = _coupled(lower, bounds)
     report(0.0)
-    width, size = np.diff(bounds)[:, 0], np.array([len(rows) for rows in coupled])
-    work = width * (width + size) ** 2.0
+    widths, sizes = np.diff(bounds)[:, 0], np.array([len(rows) for rows in coupled])
+    work = widths * (widths + sizes) ** 2.0
     done = np.cumsum(work) / work.sum()
     place = np.empty(count, dtype=np.intp)  # of unknowns in the front
-    children = [[] for _ in bounds]
+    children: list[list[tuple[Ints, Floats]]] = [[] for _ in bounds]
     factors = Factors(count)
     for number, ((start, end), rows) in enumerate(zip(bounds, coupled, strict=True)):
         width = end - start
@@ -62,9 +66,9 @@ def factorize(matrix, starts, report=lambda fraction: None):
         entries = slice(lower.indptr[start], lower.indptr[end])
         column = np.repeat(np.arange(width), np.diff(lower.indptr[start : end + 1]))
         front[place[lower.indices[entries]], column] = lower.data[entries]
-        for own, left in children[number]:
-            _add(front, place[own], left)
-        children[number] = None
+        for unknowns, left in children[number]:
+            _add(front, place[unknowns], left)
+        children[number].clear()
         own, info = dpotrf(front[:width, :width], lower=1, clean=1)
         if info:
             raise SolverError(
@@ -81,7 +85,7 @@ def factorize(matrix, starts, report=lambda fraction: None):
     return factors.solve
 
 
-def _bounds(starts, count):
+def _bounds(starts: Iterable[int], count: int) -> list[tuple[int, int]]:
     """Return the first unknown of each part and the one after its last, of parts that are not too wide."""
     cuts = [
         np.linspace(start, end, (end - start - 1) // _WIDEST + 2).astype(int)[:-1]
@@ -90,15 +94,16 @@ def _bounds(starts, count):
     return list(pairwise([*np.concatenate(cuts).tolist(), count]))
 
 
-def _coupled(lower, bounds):
+def _coupled(lower: sparse.csc_array, bounds: list[tuple[int, int]]) -> tuple[list[Ints], Ints]:
     """Return which later unknowns each part is coupled with once those before are eliminated, and its next part."""
     part = np.repeat(np.arange(len(bounds)), [end - start for start, end in bounds])
-    found, parent = [[] for _ in bounds], np.full(len(bounds), -1)
+    found: list[list[Ints]] = [[] for _ in bounds]
+    parent = np.full(len(bounds), -1)
     result = []
     for number, (start, end) in enumerate(bounds):
         rows = np.unique(np.concatenate([lower.indices[lower.indptr[start] : lower.indptr[end]], *found[number]]))
         rows = rows[np.searchsorted(rows, end) :]
-        found[number] = None
+        found[number].clear()
         result.append(rows)
         if len(rows):
             parent[number] = part[rows[0]]
@@ -106,8 +111,8 @@ def _coupled(lower, bounds):
     return result, parent
 
 
-def _add(front, place, left):
-    """Add the lower half of what is left of an earlier front, at its places in this one, which ascend."""
+def _add(front: Floats, place: Ints, left: Floats) -> None:
+    """Add the lower half of the Schur complement of an earlier front, at its places in this one, which ascend."""
     if place[-1] - place[0] == len(place) - 1:
         front[place[0] : place[-1] + 1, place[0] : place[-1] + 1] += left
         return
@@ -125,14 +130,15 @@ class Factors:
         Unknowns.
     """
 
-    def __init__(self, count):
-        self._count, self._parts = count, []
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._parts: list[tuple[int, int, Ints, Floats]] = []
 
-    def append(self, start, end, rows, inverse, below):
+    def append(self, start: int, end: int, rows: Ints, inverse: Floats, below: Floats) -> None:
         """Add the next part: its unknowns from start to end, the later rows, the inverse factor, and that below it."""
         self._parts.append((start, end, rows, np.concatenate([inverse, -product(below, inverse)])))
 
-    def solve(self, right):
+    def solve(self, right: Floats) -> Floats:
         """Solve for a right-hand side, (m,) or (m, k)."""
         values = np.array(np.reshape(right, (self._count, -1)).T, dtype=np.float64, order="C")
         for start, end, rows, part in self._parts:

@@ -1,28 +1,34 @@
 """Few eigenpairs of many unknowns: on coarse versions of the matrix first, then by Davidson's method in a block."""
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 from scipy.linalg import eigh
 
+from ..types import Array, Floats
 from .dense import product
-from .hierarchy import SMALL, Level, build_levels, solve_roughly
+from .hierarchy import SMALL, Known, Level, build_levels, solve_roughly
 
-_DENSE = 4000  # in ten seconds; where the coarsest version has more, this is not the way
+_DENSE = 4000  # in ten seconds; where the coarsest version has more, another solver is faster
 _BEYOND = 0.1  # how far beyond the last eigenvalue wanted, as a share of it, the block of vectors reaches
 _GUARDS = 4  # vectors that it has more, at least
 _WIDE = 32  # multiplicity up to which it holds all copies of the last eigenvalue, however few are wanted
-_RANDOM = 4  # vectors that start from random numbers, and turn into those that the coarse versions do not see
-_GUARDED = 0.1  # residual to which they are brought, so that nothing is left below those asked for
+_RANDOM = 4  # vectors that start from random numbers, and converge to those that the coarse versions miss
+_GUARDED = 0.1  # residual to which these converge, so that none below those asked for is missed
 _COARSE = 1e-2  # residual on coarse versions: finer, it would not help the next one
 _CYCLES = 2  # cycles of the approximate inverse in a step
 _STEPS, _COARSE_STEPS = 24, 8  # at most; five to ten are usual on the points, three on coarse versions
 _PATIENCE = 12  # steps after which the block of vectors is widened
 
 
-def coarse_to_fine(matrix, slowest, count, tolerance, report):
-    """Return the lowest eigenpairs, or none where coarse versions do not help.
+def coarse_to_fine(
+    matrix: sparse.csr_array, slowest: Floats, count: int, tolerance: float, report: Callable[..., None]
+) -> tuple[Floats, Floats] | None:
+    """Return the lowest eigenpairs, or None where coarse versions do not help.
 
     Parameters
     ----------
@@ -47,42 +53,57 @@ def coarse_to_fine(matrix, slowest, count, tolerance, report):
         if not levels or last.shape[0] > max(least, _DENSE):
             return None
         values, vectors = eigh(last.toarray(), mass.toarray())
-        levels.append(Level(values=values, vectors=vectors.astype(np.float32)))
+        coarsest = _known(values, vectors, mass)
         flat = np.searchsorted(values, 1e-9 * values[-1])  # as many as components
         beyond = np.searchsorted(values, (1.0 + _BEYOND) * values[min(count, len(values)) - 1])
         size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
-        for number in reversed(range(len(levels) - 1)):
+        for number in reversed(range(len(levels))):
             level, finest = levels[number], number == 0
             start = level.prolongation @ np.ascontiguousarray(vectors[:, : size if finest else 2 * size])
             start = np.column_stack([start, _random(len(start), max(_RANDOM, count + _RANDOM - start.shape[1]))])
-            goal = (count, tolerance, _STEPS) if finest else (size, _COARSE, _COARSE_STEPS)
-            values, vectors, right = refine(levels[number:], start, size, *goal, report, finest)
+            wanted, goal, limit = (count, tolerance, _STEPS) if finest else (size, _COARSE, _COARSE_STEPS)
+            values, vectors, right = refine(levels[number:], coarsest, start, size, wanted, goal, limit, report, finest)
             if not finest:
-                level.values, level.vectors = values, vectors.astype(np.float32)
-                level.duals = _weighed(level.mass, vectors).astype(np.float32)
+                level.known = _known(values, vectors, level.mass)
     return (values[:count], vectors[:, :count]) if right else None
 
 
-def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
+def _known(values: Floats, vectors: Floats, mass: sparse.csr_array | None) -> Known:
+    return Known(values, vectors.astype(np.float32), _weighed(mass, vectors).astype(np.float32))
+
+
+def refine(
+    levels: list[Level],
+    coarsest: Known,
+    vectors: Floats,
+    size: int,
+    wanted: int,
+    tolerance: float,
+    limit: int,
+    report: Callable[..., None],
+    final: bool,
+) -> tuple[Floats, Floats, bool]:
     """Improve approximate eigenvectors by Davidson's method in a block.
 
     Parameters
     ----------
     levels : list of Level
         The eigenvectors of the first are sought.
+    coarsest : Known
+        All eigenpairs of the version after the last level.
     vectors : ndarray, (n, m)
-        Approximate ones, and random ones, which turn into those that are missing.
+        Approximate ones, and random ones, which converge to those that are missing.
     size : int
         How many the coarse versions gave.
     wanted : int
-        How many residuals shall fall to the tolerance; of the others, the farther the less, to `_GUARDED`.
+        How many residuals are to fall to the tolerance; the others to a larger one, up to `_GUARDED`.
     tolerance : float
     limit : int
         Most steps.
     report : callable
         Called with the fraction done; may raise `Cancelled`.
     final : bool
-        The fractions count.
+        Report fractions: this is the last level.
 
     Returns
     -------
@@ -91,7 +112,7 @@ def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
     right : bool
         The residuals fell as far.
     """
-    level, count, worst = levels[0], vectors.shape[1], None
+    level, count, worst = levels[0], vectors.shape[1], 0.0
     rough_mass = None if level.mass is None else level.mass.astype(np.float32)
     drift = np.inf  # of the images: they are products in double precision where it is 0, and sums from step to step
     for step in range(limit + 1):
@@ -100,8 +121,8 @@ def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
             drift, count = np.inf, vectors.shape[1]
         if drift > 0.1 * tolerance:
             drift, image = 0.0, level.matrix @ vectors
-            values, turn = eigh(product(vectors.T, image), product(vectors.T, _weighed(level.mass, vectors)))
-            vectors, image = product(vectors, turn), product(image, turn)
+            values, basis = eigh(product(vectors.T, image), product(vectors.T, _weighed(level.mass, vectors)))
+            vectors, image = product(vectors, basis), product(image, basis)
         report()
         dual = _weighed(level.mass, vectors)
         residual = image - dual * values
@@ -116,7 +137,7 @@ def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
             worst = worst or 10.0 * excess
             report(1.0 - max(np.log(10.0 * excess), 0.1) / np.log(10.0 * worst) if 1.0 < excess < worst else 0.0)
         if drift == 0.0 and (excess <= 1.0 or step == limit):
-            return values, vectors, excess <= 1.0
+            break
         if excess <= 1.0 or step == limit - 1:
             drift = np.inf  # look again
             continue
@@ -127,13 +148,13 @@ def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
         residual = (residual / norms).astype(np.float32)
         load, shifts = residual[:, active], values[active].astype(np.float32)
         relative = shifts / np.float32(values[size - 1])
-        change = solve_roughly(levels, load, relative, size)
+        change = solve_roughly(levels, coarsest, load, relative, size)
         for _ in range(_CYCLES - 1):
             change -= product(found, product(dual.T, change))
             rest = level.rough @ change
             np.subtract(load, rest, out=rest)
             rest += _weighed(rough_mass, change) * shifts
-            change += solve_roughly(levels, rest, relative, size)
+            change += solve_roughly(levels, coarsest, rest, relative, size)
         change -= product(found, product(dual.T, change))
         change /= _lengths(change)
         report()
@@ -154,23 +175,24 @@ def refine(levels, vectors, size, wanted, tolerance, limit, report, final):
         image += product(changed, share)
         lost = np.linalg.norm(share[:, :wanted], axis=0).max()
         drift += np.finfo(np.float32).eps * level.top * lost / _scale(values, wanted)
+    return values, vectors, bool(excess <= 1.0)
 
 
-def _lengths(vectors):
+def _lengths(vectors: Array) -> Array:
     """Return the lengths of the columns, never zero."""
     return np.sqrt(np.maximum(np.einsum("ij,ij->j", vectors, vectors), np.finfo(np.float32).tiny))
 
 
-def _weighed(mass, vectors):
-    """Return the product with the mass; none stands for the identity."""
+def _weighed(mass: sparse.csr_array | None, vectors: Array) -> Any:
+    """Return the product with the mass; None stands for the identity."""
     return vectors if mass is None else mass @ vectors
 
 
-def _scale(values, wanted):
+def _scale(values: Floats, wanted: int) -> float:
     """Return the eigenvalue that residuals are measured by: the last one wanted, or where all are zero, the last."""
     return values[wanted - 1] if values[wanted - 1] > 1e-9 * values[-1] else max(values[-1], np.finfo(float).tiny)
 
 
-def _random(count, columns, seed=0):
+def _random(count: int, columns: int, seed: int = 0) -> Floats:
     """Return random columns, about orthonormal."""
     return np.random.default_rng(seed).standard_normal((count, columns)) / np.sqrt(count)

@@ -1,21 +1,25 @@
 """Dense matrices: products by scipy's BLAS, as numpy may be built without a fast one; inverses of many small ones."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from scipy.linalg import get_blas_funcs
 
+from ..types import Array, Floats
 from .blocks import blocks, on_all_cores
 
-_WORK = 1 << 27  # multiplications in one go: some hundredths of a second, in which nothing else in Python can run
+_WORK = 1 << 27  # multiplications in one call: some hundredths of a second, in which nothing else in Python can run
 _BLOCK = 1 << 13  # small matrices
 
 
-def product(left, right):
-    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision; quick if they lie whole in memory.
+def product(left: Array, right: Array) -> Array:
+    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision; fast if they are contiguous.
 
     Parameters
     ----------
     left, right : ndarray, (m, k) and (k, n)
-        In single or double precision. Transposed ones and rows of others cost nothing; other parts are copied.
+        In single or double precision. Transposes and slices of rows are used as they are; other slices are copied.
 
     Returns
     -------
@@ -34,18 +38,18 @@ def product(left, right):
     return result
 
 
-def _multiply(gemm, left, right, **settings):
+def _multiply(gemm: Callable[..., Array], left: Array, right: Array, **settings: Any) -> Array:
     """Compute the product as the transpose of that of the transposes, since BLAS takes columns, and numpy has rows."""
     (a, flip_a), (b, flip_b) = _in_columns(right), _in_columns(left)
     return gemm(1.0, a, b, trans_a=flip_a, trans_b=flip_b, **settings).T
 
 
-def _in_columns(matrix):
-    """Return the transpose of a matrix as it lies in memory, and whether it is to be transposed for that."""
+def _in_columns(matrix: Array) -> tuple[Array, bool]:
+    """Return a matrix, or its transpose, in the order of columns, and whether BLAS has to transpose it."""
     return (matrix.T, False) if matrix.flags.c_contiguous else (matrix, True)
 
 
-def inverses(matrices):
+def inverses(matrices: Floats) -> Floats:
     """Return the inverses of small symmetric positive definite matrices, (n, k, k), by elimination in all at once.
 
     numpy hands each of them to LAPACK, whose threads may wait for each other longer than they work: where other
@@ -53,7 +57,7 @@ def inverses(matrices):
     """
     result = np.empty(matrices.shape)
 
-    def invert(part):
+    def invert(part: slice) -> None:
         rows = np.moveaxis(matrices[part], 0, -1).astype(np.float64, order="C")
         result[part] = np.moveaxis(eliminate(rows), -1, 0)
 
@@ -61,7 +65,7 @@ def inverses(matrices):
     return result
 
 
-def eliminate(equations):
+def eliminate(equations: Floats) -> Floats:
     """Solve many small symmetric positive definite systems at one time, by elimination in place.
 
     Parameters

@@ -1,14 +1,23 @@
 """The largest eigenvalue of a symmetric matrix, by its products: bounded closely, or estimated."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..errors import SolverError
+from ..types import Floats
 
-_TOLERANCE, _ABOVE = 1e-2, 1.05  # of the Lanczos steps, and what makes a bound of what they find
+if TYPE_CHECKING:
+    from .hierarchy import Rows
+
+_TOLERANCE, _ABOVE = 1e-2, 1.05  # of the Lanczos steps, and the factor that makes their result a bound
 
 
-def largest_eigenvalue(product, size):
+def largest_eigenvalue(product: Callable[[Floats], Floats], size: int) -> float:
     """Return a close upper bound of the eigenvalues, by a few Lanczos steps.
 
     Parameters
@@ -34,10 +43,10 @@ def largest_eigenvalue(product, size):
         found = eigsh(operator, k=1, which="LA", v0=start, tol=_TOLERANCE, return_eigenvectors=False)[0]
     except ArpackNoConvergence as error:
         raise SolverError(f"The highest eigenvalue of {size} points was not found. Use fewer points.") from error
-    return _ABOVE * unit * found
+    return float(_ABOVE * unit * found)
 
 
-def rough_largest_eigenvalue(matrix, diagonal):
+def rough_largest_eigenvalue(matrix: Rows, diagonal: Floats) -> float:
     """Estimate the largest eigenvalue of a matrix over its diagonal; of raw scans, up to a fifth too low.
 
     That is enough to smooth by, where a bound from `largest_eigenvalue` would take four times as many products, for
@@ -57,4 +66,4 @@ def rough_largest_eigenvalue(matrix, diagonal):
     for _ in range(10):  # leaves less than a tenth
         y /= np.linalg.norm(y)
         y, before = (matrix @ y[:, None])[:, 0] / diagonal, y
-    return 1.1 * np.linalg.norm(y) / np.linalg.norm(before)
+    return float(1.1 * np.linalg.norm(y) / np.linalg.norm(before))

@@ -1,14 +1,16 @@
-"""Factors of sparse equations on a surface that stay small: fewer pairs, and an order by nested dissection."""
+"""What keeps the factors of sparse equations on a surface small: fewer pairs, and an order by nested dissection."""
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ..types import Floats, Ints, Report
+
 _LEAF = 120  # points that are divided no further
 _SHARES = (0.4, 0.45, 0.5, 0.55, 0.6)  # of the points on one side, from which the best cut is chosen
 
 
-def dissect(matrix, points, report=lambda: None):
+def dissect(matrix: sparse.sparray, points: Floats, report: Report = lambda: None) -> tuple[Ints, Ints]:
     """Order the unknowns of sparse equations so that their factors stay small.
 
     Every set of points is cut across its longest axis. The points at the cut that couple both sides come after these,
@@ -67,7 +69,7 @@ def dissect(matrix, points, report=lambda: None):
         part[open_] = np.unique(part[open_], return_inverse=True)[1].reshape(-1)
 
 
-def _ranks_along(points, part, size):
+def _ranks_along(points: Floats, part: Ints, size: Ints) -> Ints:
     """Rank the points of each part along its longest axis, from 0."""
     mean = np.stack([np.bincount(part, values) for values in points.T], axis=1) / size[:, None]
     offset = points - mean[part]
@@ -80,8 +82,8 @@ def _ranks_along(points, part, size):
     return rank - (np.cumsum(size) - size)[part]
 
 
-def sparsify(stiffness, share=1e-2):
-    """Leave out the pairs that hardly count, which makes factors smaller.
+def sparsify(stiffness: sparse.csr_array, share: float = 1e-2) -> sparse.csr_array:
+    """Leave out the pairs of negligible weight, which makes factors smaller.
 
     Parameters
     ----------

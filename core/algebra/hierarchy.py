@@ -1,21 +1,27 @@
 """Coarse versions of a symmetric matrix, and the approximate inverses that they make together."""
 
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import pinvh
 from scipy.sparse.linalg import LinearOperator
 
+from ..types import Array, Floats, Ints, Report
 from .dense import product
 from .eigenvalue import rough_largest_eigenvalue
 
 SMALL = 1000  # unknowns that are solved whole in a tenth of a second
-PART = 1 << 20  # entries of a matrix that are multiplied in one go: some hundredths of a second
+PART = 1 << 20  # entries of a matrix that are multiplied at once: some hundredths of a second
 STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
 # first about 20 become one, with the others fewer
-_SMOOTHED = 0.3  # smoothing takes out the errors whose eigenvalues are at least this share of the largest
+_SMOOTHED = 0.3  # smoothing reduces the errors whose eigenvalues are at least this share of the largest
+
+Result = TypeVar("Result")
 
 
 class Rows:
@@ -30,7 +36,7 @@ class Rows:
         Called without arguments after each part; may raise `Cancelled`.
     """
 
-    def __init__(self, matrix, pool, report):
+    def __init__(self, matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> None:
         self._map, self._report, self._count, self._dtype = pool.map, report, matrix.shape[0], matrix.dtype
         starts = np.append(np.arange(0, max(matrix.nnz, 1), PART), matrix.nnz)
         cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
@@ -40,27 +46,43 @@ class Rows:
             pointers = matrix.indptr[rows.start : rows.stop + 1]
             entries = slice(pointers[0], pointers[-1])
             part = sparse.csr_array((len(pointers) - 1, matrix.shape[1]), dtype=matrix.dtype)
-            # Set afterwards, for the constructor would copy what is a small part of an array.
+            # Set afterwards, for the constructor would copy a small slice of an array.
             part.data, part.indices, part.indptr = matrix.data[entries], matrix.indices[entries], pointers - pointers[0]
             self._parts.append(part)
 
-    def __matmul__(self, other):
+    def __matmul__(self, other: Any) -> Any:
         """Multiply with an array, (m, k), or a sparse one."""
         if sparse.issparse(other):
             return sparse.vstack(list(self.each(lambda rows, part: part @ other)), format="csr")
         result = np.empty((self._count, other.shape[1]), dtype=np.result_type(self._dtype, other.dtype))
 
-        def fill(rows, part):
+        def fill(rows: slice, part: sparse.csr_array) -> None:
             result[rows] = part @ other
 
         list(self.each(fill))
         return result
 
-    def each(self, function):
-        """Yield what a function makes of each slice of the rows and the part of the matrix there."""
+    def each(self, function: Callable[[slice, sparse.csr_array], Result]) -> Iterator[Result]:
+        """Yield the results of a function of each slice of the rows and the part of the matrix there."""
         for result in self._map(function, self._slices, self._parts):
             self._report()
             yield result
+
+
+@dataclass
+class Known:
+    """The lowest eigenpairs of one version of the matrix.
+
+    Attributes
+    ----------
+    values : ndarray, (q,)
+    vectors, duals : ndarray, (n, q) float32
+        The eigenvectors, and their products with the mass.
+    """
+
+    values: Floats
+    vectors: Array
+    duals: Array
 
 
 @dataclass
@@ -78,25 +100,24 @@ class Level:
     steps : list of ndarray, (n, 1) float32
         Lengths of the steps of smoothing: those of Chebyshev's polynomial over the diagonal.
     prolongation, extension, restriction : Rows, (n, m), (n, m) and (m, n)
-        What the functions of the next level are on this one, in double and single precision, and the transpose.
-    values, vectors, duals : ndarray, (q,), (n, q) and (n, q) float32, or None
-        Lowest eigenpairs, where they are known, and ``mass @ vectors``.
+        Interpolation from the next level to this one, in double and single precision, and its transpose.
+    known : Known, optional
     """
 
-    matrix: Rows | None = None
-    rough: Rows | None = None
-    mass: sparse.csr_array | None = None
-    top: float = np.inf
-    steps: list | None = None
-    prolongation: Rows | None = None
-    extension: Rows | None = None
-    restriction: Rows | None = None
-    values: np.ndarray | None = None
-    vectors: np.ndarray | None = None
-    duals: np.ndarray | None = None
+    matrix: Rows
+    rough: Rows
+    mass: sparse.csr_array | None
+    top: float
+    steps: list[Array]
+    prolongation: Rows
+    extension: Rows
+    restriction: Rows
+    known: Known | None = None
 
 
-def build_levels(matrix, slowest, least, enough, pool, report):
+def build_levels(
+    matrix: sparse.csr_array, slowest: Floats, least: int, enough: int, pool: ThreadPoolExecutor, report: Report
+) -> tuple[list[Level], sparse.csr_array, sparse.csr_array]:
     """Build ever smaller versions of a matrix by smoothed aggregation (Vanek, Mandel and Brezina 1996).
 
     Parameters
@@ -119,7 +140,8 @@ def build_levels(matrix, slowest, least, enough, pool, report):
     matrix, mass : csr_array
         The last version, which needs no approximate inverse.
     """
-    levels, mass = [], None
+    levels: list[Level] = []
+    mass = None
     while matrix.shape[0] > least:
         n, diagonal, rows = matrix.shape[0], matrix.diagonal(), Rows(matrix, pool, report)
         for share in STRONG:
@@ -152,13 +174,13 @@ def build_levels(matrix, slowest, least, enough, pool, report):
     return levels, matrix, mass
 
 
-def _single(matrix):
+def _single(matrix: sparse.csr_array) -> sparse.csr_array:
     """Return a matrix in single precision, with the same indices in memory: neither may be sorted then."""
     return sparse.csr_array((matrix.data.astype(np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def aggregates(matrix, diagonal, share, report):
-    """Part the unknowns of a matrix, given by `Rows`, into neighbourhoods of roots, of which no two couple strongly.
+def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> tuple[Ints, Ints]:
+    """Divide the unknowns of a matrix into neighbourhoods of roots, of which no two couple strongly.
 
     Returns
     -------
@@ -168,7 +190,7 @@ def aggregates(matrix, diagonal, share, report):
         The root of each part, which couples strongly with all of it.
     """
 
-    def strong(rows, part):
+    def strong(rows: slice, part: sparse.csr_array) -> tuple[Array, Array, Array]:
         row = np.repeat(np.arange(rows.start, rows.stop, dtype=np.int32), np.diff(part.indptr))
         itself = row == part.indices
         kept = itself | (-part.data > share * np.minimum(diagonal[row], diagonal[part.indices]))
@@ -191,47 +213,51 @@ def aggregates(matrix, diagonal, share, report):
     return (np.cumsum(root) - 1)[chosen], np.flatnonzero(root)
 
 
-def smoothing_steps(top, diagonal):
+def smoothing_steps(top: float, diagonal: Floats) -> list[Floats]:
     """Return the lengths of the steps of smoothing, two (n,), from the largest eigenvalue over the diagonal."""
     middle, half = 0.5 * top * (1.0 + _SMOOTHED), 0.5 * top * (1.0 - _SMOOTHED) * np.sqrt(0.5)
     return [1.0 / (length * diagonal) for length in (middle - half, middle + half)]
 
 
-def solve_roughly(levels, load, shifts, wanted):
+def solve_roughly(levels: list[Level], last: Known, load: Array, shifts: Array, wanted: int) -> Array:
     """Apply an approximate inverse of ``matrix - shift * mass`` by one V-cycle in single precision.
 
     Parameters
     ----------
     levels : list of Level
-        From the one that the load is on. The last has nothing but its eigenpairs.
+        From the one that the load is on; none at the last one.
+    last : Known
+        All eigenpairs of the last version.
     load : ndarray, (n, k) float32
     shifts : ndarray, (k,) float32
-        One for each column. Only the part of known eigenvectors heeds it: it is small for all others.
+        One for each column. It counts for known eigenvectors only: it is small against the eigenvalues of all others.
     wanted : int
-        The lowest so many eigenvectors are found otherwise: the shift may lie among them, and is left out there.
+        Lowest eigenvectors for which the shift, which may lie among their eigenvalues, is left out.
 
     Returns
     -------
     ndarray, (n, k) float32
     """
-    level, known = levels[0], 0.0
-    if level.values is not None:
-        values = level.values[:, None]
+    known, solved = levels[0].known if levels else last, None
+    if known is not None:
+        values = known.values[:, None]
         floor = values[min(wanted, len(values) - 1)]
         shift = shifts * values[wanted - 1]
         distance = np.where(np.arange(len(values))[:, None] < wanted, np.maximum(values, floor), values - shift)
-        share = product(level.vectors.T, load)
-        known = product(level.vectors, (share / np.maximum(distance, 0.1 * floor)).astype(np.float32))
-        if len(levels) == 1:
-            return known
-        load = load - product(level.duals, share)
-    result = level.extension @ solve_roughly(levels[1:], level.restriction @ load, shifts, wanted)
+        share = product(known.vectors.T, load)
+        solved = product(known.vectors, (share / np.maximum(distance, 0.1 * floor)).astype(np.float32))
+        if not levels:
+            return solved
+        load = load - product(known.duals, share)
+    level = levels[0]
+    result: Array = level.extension @ solve_roughly(levels[1:], last, level.restriction @ load, shifts, wanted)
     _smooth(level, load, result, level.steps)
-    result += known
+    if solved is not None:
+        result += solved
     return result
 
 
-def approximate_inverse(matrix, pool, report):
+def approximate_inverse(matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> LinearOperator | None:
     """Return an approximate inverse that is symmetric, for conjugate gradients.
 
     Parameters
@@ -244,38 +270,38 @@ def approximate_inverse(matrix, pool, report):
     Returns
     -------
     LinearOperator, (n, n), or None
-        A V-cycle in single precision; none where coarse versions do not help.
+        A V-cycle in single precision; None where coarse versions do not help.
     """
     levels, last, _ = build_levels(matrix, np.ones(matrix.shape[0]), SMALL, 0, pool, report)
     if not levels or last.shape[0] > SMALL:
         return None
     for level in levels:
         _shorten(level)
-    inverse = pinvh(last.toarray())  # of constants, where nothing is fixed, it makes nothing
+    inverse = pinvh(last.toarray())  # constants are its null space where nothing is fixed
 
-    def multiply(load):
+    def multiply(load: Floats) -> Floats:
         size = np.linalg.norm(load) or 1.0  # single precision has no smaller numbers than 1e-38
         return size * _cycle(levels, inverse, (load[:, None] / size).astype(np.float32))[:, 0].astype(np.float64)
 
     return LinearOperator(matrix.shape, matvec=multiply, dtype=np.float64)
 
 
-def _shorten(level):
-    """Shorten the steps of smoothing so far that they surely enlarge no error, which keeps the inverse positive.
+def _shorten(level: Level) -> None:
+    """Shorten the steps of smoothing so far that they enlarge no error, which keeps the inverse positive.
 
     Two steps do not if ``1 / first + 1 / second``, here with the diagonal, is more than any eigenvalue, and these are
     not more than the largest sum over a row of sizes (Gershgorin). The estimated largest eigenvalue may be too low.
     """
-    room = sum(1.0 / step[:, 0] for step in level.steps)
+    room = np.sum([1.0 / step[:, 0] for step in level.steps], axis=0)
 
-    def excess(rows, part):
-        return np.max(np.add.reduceat(np.abs(part.data), part.indptr[:-1]) / room[rows])
+    def excess(rows: slice, part: sparse.csr_array) -> float:
+        return float(np.max(np.add.reduceat(np.abs(part.data), part.indptr[:-1]) / room[rows]))
 
     share = np.float32(1.0 / max(1.0, *level.matrix.each(excess)))
     level.steps = [share * step for step in level.steps]
 
 
-def _cycle(levels, inverse, load):
+def _cycle(levels: list[Level], inverse: Floats, load: Array) -> Array:
     """Smooth as much before the correction by the next level as after it, which makes both together symmetric."""
     if not levels:
         return (inverse @ load).astype(np.float32)
@@ -289,7 +315,7 @@ def _cycle(levels, inverse, load):
     return result
 
 
-def _smooth(level, load, result, steps):
+def _smooth(level: Level, load: Array, result: Array, steps: list[Array]) -> None:
     """Improve a result in place by some steps over the diagonal."""
     for step in steps:
         change = level.rough @ result

@@ -1,17 +1,23 @@
 """Any number of eigenpairs, by Lanczos steps on a Chebyshev polynomial of the matrix."""
 
+from collections.abc import Callable
 from itertools import islice
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from ..types import Floats
 from .chebyshev import chebyshev_terms
 from .eigenvalue import largest_eigenvalue
 
 _DEGREE = 6  # of the polynomial that the Lanczos steps work on, at least
 
 
-def lift_lowest(matrix, count, cut, report):
+def lift_lowest(
+    matrix: sparse.csr_array, count: int, cut: float, report: Callable[[float], None]
+) -> tuple[Floats, Floats]:
     """Return the lowest eigenpairs of a matrix.
 
     The polynomial lifts the eigenvalues below a cut and keeps all others within [-1, 1]. Lanczos then needs a sixth of
@@ -41,14 +47,14 @@ def lift_lowest(matrix, count, cut, report):
     random = np.random.default_rng(0)
     products = 0
 
-    def multiply(y):
+    def multiply(y: Floats) -> Floats:
         nonlocal products
         if products % 20 == 0:
             report(products / (products + 30.0 * count))  # the number of products is not known before
         products += 1
         return matrix @ y.ravel()
 
-    def solve(function, maxiter=500, **settings):
+    def solve(function: Callable[[Floats], Floats], maxiter: int = 500, **settings: Any) -> Any:
         operator = LinearOperator((n, n), matvec=function, dtype=np.float64)
         return eigsh(operator, which="LA", v0=random.standard_normal(n), maxiter=maxiter, **settings)
 
@@ -60,7 +66,7 @@ def lift_lowest(matrix, count, cut, report):
         else:  # too few points for a polynomial: a shift to [1, 2], right wherever the cut lies
             degree, center, radius = 1, 2.0 * top, top
 
-        def polynomial(y, degree=degree, center=center, radius=radius):
+        def polynomial(y: Floats, degree: int = degree, center: float = center, radius: float = radius) -> Floats:
             terms = chebyshev_terms(lambda y: (center * y - multiply(y)) / radius, y.ravel())
             return next(islice(terms, degree, None))
 
@@ -78,7 +84,7 @@ def lift_lowest(matrix, count, cut, report):
     # any above the least one found, orthogonal to all found.
     while True:
 
-        def remainder(y, found=vectors):
+        def remainder(y: Floats, found: Floats = vectors) -> Floats:
             return project(found, polynomial(project(found, y.ravel())))
 
         if solve(remainder, k=1, tol=1e-3, return_eigenvectors=False)[0] <= lifted.min() * (1.0 + 1e-6):
@@ -91,6 +97,6 @@ def lift_lowest(matrix, count, cut, report):
     return values[ascending], vectors[:, ascending]
 
 
-def project(vectors, y):
-    """Take the orthonormal vectors out of y."""
+def project(vectors: Floats, y: Floats) -> Floats:
+    """Return the component of y orthogonal to orthonormal vectors."""
     return y - vectors @ (vectors.T @ y)

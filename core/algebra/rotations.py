@@ -3,12 +3,14 @@
 import numpy as np
 from scipy import sparse
 
+from ..types import Floats, Ints
+
 _STEPS = 12  # of Newton's method; seven reach full precision for singular values within 1 : 20
 _TOLERANCE = 1e-10
-TRACE = 1e-8  # how strongly what turns freely is held to a turn known from elsewhere, relative to what turns it
+TRACE = 1e-8  # weight of a rotation known from elsewhere, where the matrix leaves it free, relative to the matrix
 
 
-def nearest_rotations(matrices):
+def nearest_rotations(matrices: Floats) -> Floats:
     """Find the proper rotations R that maximise trace(R^T S), each of one matrix S.
 
     Parameters
@@ -58,15 +60,15 @@ def nearest_rotations(matrices):
     return result
 
 
-def rotations_in_groups(matrices, group):
-    """Find the nearest rotations where a matrix may leave a turn about an axis free: then it is the one of its group.
+def rotations_in_groups(matrices: Floats, group: Ints) -> Floats:
+    """Find the nearest rotations; where a matrix leaves the angle about an axis free, it is that of its group.
 
     Parameters
     ----------
     matrices : ndarray, (3, 3, n)
         As of `nearest_rotations`.
     group : ndarray, (n,) int
-        Numbers from 0 on; the turn of a group is that of the sum of its matrices.
+        Numbers from 0 on; the rotation of a group is that of the sum of its matrices.
 
     Returns
     -------
@@ -74,12 +76,12 @@ def rotations_in_groups(matrices, group):
     """
     count = len(group)
     members = sparse.csr_array((np.ones(count), group, np.arange(count + 1)))
-    turn = nearest_rotations((matrices.reshape(9, -1) @ members).reshape(3, 3, -1))
+    rotation = nearest_rotations((matrices.reshape(9, -1) @ members).reshape(3, 3, -1))
     size = np.sqrt(np.einsum("acn,acn->n", matrices, matrices))
-    return nearest_rotations(matrices + TRACE * np.where(size > 0.0, size, 1.0) * turn[:, :, group])
+    return nearest_rotations(matrices + TRACE * np.where(size > 0.0, size, 1.0) * rotation[:, :, group])
 
 
-def _cofactors(x):
+def _cofactors(x: Floats) -> Floats:
     """Return the matrices of cofactors, whose rows are the cross products of the others, (3, 3, n)."""
     result = np.empty_like(x)
     for a in range(3):
@@ -91,7 +93,7 @@ def _cofactors(x):
     return result
 
 
-def _decompose(matrices):
+def _decompose(matrices: Floats) -> Floats:
     """Find the same rotations by singular value decompositions; zero matrices count as the identity."""
     # A hint of the identity decides where the rotation about some axis is free.
     left, _, right = np.linalg.svd(matrices + 1e-14 * np.eye(3))

@@ -1,12 +1,16 @@
 """Conjugate gradients: for symmetric equations, and for symmetric quadratics with lower bounds."""
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from ..errors import SolverError
+from ..types import Array, Floats, Progress
 from .hierarchy import PART, approximate_inverse
 
 _STEPS = 20_000  # of `solve_symmetric`, at most
@@ -31,14 +35,22 @@ class Iterate:
         No direction was found along which the matrix is not positive; with one the values are those before it.
     """
 
-    values: np.ndarray
+    values: Array
     products: int
     converged: bool
     residual: float
     definite: bool = True
 
 
-def conjugate_gradients(matrix, load, start=None, scaling=1.0, rtol=1e-9, products=_STEPS, report=lambda step: None):
+def conjugate_gradients(
+    matrix: Any,
+    load: Array,
+    start: Array | None = None,
+    scaling: Any = 1.0,
+    rtol: float = 1e-9,
+    products: int = _STEPS,
+    report: Callable[[int], None] = lambda step: None,
+) -> Iterate:
     """Solve ``matrix @ x = load``.
 
     Parameters
@@ -66,7 +78,8 @@ def conjugate_gradients(matrix, load, start=None, scaling=1.0, rtol=1e-9, produc
     values = np.zeros_like(load) if start is None else start.copy()
     residual = load.copy() if start is None else load - matrix @ values
     unit = max(np.linalg.norm(load), np.linalg.norm(residual)) or 1.0
-    direction = moment = None
+    direction: Any = None
+    moment: Any = None
     for step in range(products):
         left = float(np.linalg.norm(residual) / unit)
         if left <= rtol:
@@ -86,7 +99,9 @@ def conjugate_gradients(matrix, load, start=None, scaling=1.0, rtol=1e-9, produc
     return Iterate(values, products, left <= rtol, left)
 
 
-def solve_symmetric(matrix, load, start=None, progress=None):
+def solve_symmetric(
+    matrix: sparse.csr_array, load: Floats, start: Floats | None = None, progress: Progress | None = None
+) -> Floats:
     """Solve positive semi-definite equations to nine digits.
 
     Conjugate gradients, preconditioned by the diagonal first, whose steps grow with the root of the number of points,
@@ -114,15 +129,15 @@ def solve_symmetric(matrix, load, start=None, progress=None):
     """
     done = 0.0
 
-    def tell(products):
+    def count(products: float) -> None:
         nonlocal done
         if progress is not None:
             progress("Solve", done / (done + 200.0))
         done += products
 
-    def report(step):
+    def report(step: int) -> None:
         if step % 20 == 0:
-            tell(20.0)
+            count(20.0)
 
     part = min(1.0, PART / max(matrix.nnz, 1))  # of a product, after which there is a report
     columns = np.atleast_2d(load.T)
@@ -130,12 +145,12 @@ def solve_symmetric(matrix, load, start=None, progress=None):
     scaling, products = 1.0 / matrix.diagonal(), _STEPS if len(load) < _FEW else _PLAIN
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for number, column in enumerate(columns):
-            # Squares of loads in tiny or huge units are no numbers; a power of two rounds nothing.
+            # Squares of loads in tiny or huge units would underflow or overflow; a power of two rounds nothing.
             unit = np.ldexp(1.0, np.frexp(np.abs(column).max(initial=0.0))[1])
             column, values[number] = column / unit, values[number] / unit
             found = conjugate_gradients(matrix, column, values[number], scaling, products=products, report=report)
             if products == _PLAIN and found.definite and not found.converged:
-                scaling = approximate_inverse(matrix, pool, lambda: tell(part)) or scaling
+                scaling = approximate_inverse(matrix, pool, lambda: count(part)) or scaling
                 products = _STEPS
                 found = conjugate_gradients(matrix, column, found.values, scaling, products=products, report=report)
             if not found.converged:
@@ -147,7 +162,15 @@ def solve_symmetric(matrix, load, start=None, progress=None):
     return values.T.reshape(load.shape)
 
 
-def bounded_quadratic(product, right, lower, start, norm, products, rtol):
+def bounded_quadratic(
+    product: Callable[[Floats], Floats],
+    right: Floats,
+    lower: Floats,
+    start: Floats,
+    norm: float,
+    products: int,
+    rtol: float,
+) -> tuple[Floats, int, float]:
     """Minimise ``x.Hx / 2 - x.right`` over x >= lower by proportioned conjugate gradients.
 
     Conjugate gradients on the free unknowns, a projected step where one meets its bound, and a release of held ones
@@ -180,7 +203,7 @@ def bounded_quadratic(product, right, lower, start, norm, products, rtol):
     used, exact = 1, True
     unit = np.linalg.norm(right)
 
-    def split(gradient, x):
+    def split(gradient: Floats, x: Floats) -> tuple[Floats, Floats]:
         held = x <= lower
         return np.where(held, 0.0, gradient), np.where(held, np.minimum(gradient, 0.0), 0.0)
 
@@ -190,7 +213,7 @@ def bounded_quadratic(product, right, lower, start, norm, products, rtol):
         if np.sqrt(free @ free + chopped @ chopped) <= rtol * unit:
             if exact:
                 break
-            gradient, exact = product(x) - right, True  # what the steps made of it has lost digits
+            gradient, exact = product(x) - right, True  # the sums from step to step have lost digits
             used += 1
             free, chopped = split(gradient, x)
             direction = free

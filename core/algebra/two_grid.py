@@ -2,11 +2,13 @@
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 from scipy import sparse
 
 from ..errors import SolverError
+from ..types import Array, Bools, Floats, Progress
 from .cholesky import factorize
 from .eigenvalue import rough_largest_eigenvalue
 from .factors import dissect
@@ -37,32 +39,34 @@ class TwoGrid:
 
     Notes
     -----
-    Heat falls off by many powers of ten, and where it is faintest its direction is wanted as well. Conjugate gradients,
-    which look at the sum of all errors, do not see it. A coarse version that is solved directly falls off nearly as
-    the fine one does, so that each step makes the error smaller relative to the value of each point.
+    Heat falls off by many powers of ten, and its direction is wanted where it is faintest, too. Conjugate gradients
+    reduce the sum of all errors, in which these do not count. A coarse version that is solved directly falls off nearly
+    as the fine one does, so that each step reduces the error relative to the value of each point.
 
-    The coarse unknowns are parts of a few tens of points, each with the direction of its root, turned as the matrix
-    turns it on the way to the others, and smoothed once (Vanek, Mandel and Brezina 1996).
+    The coarse unknowns are aggregates of a few tens of points, each with the direction of its root, rotated as the
+    matrix rotates it from there to the others, and smoothed once (Vanek, Mandel and Brezina 1996).
     """
 
-    def __init__(self, matrix, mass, points, report):
+    def __init__(self, matrix: sparse.csr_array, mass: Floats, points: Floats, report: Progress) -> None:
         self._matrix, diagonal = matrix, matrix.diagonal().real
         count = len(mass)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
 
-            def rows(values, fraction):
+            def rows(values: sparse.csr_array, fraction: float) -> Rows:
                 return Rows(values, pool, lambda: report("Equations", fraction))
 
             weights = sparse.csr_array((-np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
             part, roots = aggregates(rows(weights, 0.3), diagonal, STRONG[0], lambda: report("Equations", 0.3))
             fine = rows(matrix, 0.4)
             top = rough_largest_eigenvalue(fine, diagonal)
-            # The turn from the root is that of the entry which couples both.
+            # The rotation from the root is that of the entry which couples both.
             root = roots[part]
-            turn = -matrix.data[matrix.indices == np.repeat(root, np.diff(matrix.indptr))]
-            turn[roots] = 1.0
-            plain = sparse.csr_array((turn / np.abs(turn), part, np.arange(count + 1)), shape=(count, len(roots)))
-            # The mass does not count here: what no point is coupled with stays as it is.
+            rotation = -matrix.data[matrix.indices == np.repeat(root, np.diff(matrix.indptr))]
+            rotation[roots] = 1.0
+            plain = sparse.csr_array(
+                (rotation / np.abs(rotation), part, np.arange(count + 1)), shape=(count, len(roots))
+            )
+            # Without the mass: a point that is coupled with no other keeps its value.
             change = fine @ plain - sparse.diags_array(mass) @ plain
             self._prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ change).tocsr()
             self._restriction = self._prolongation.conj().T.tocsr()
@@ -74,7 +78,7 @@ class TwoGrid:
         real = sparse.kron(coarse.real, np.eye(2)) + sparse.kron(coarse.imag, [[0.0, -1.0], [1.0, 0.0]])
         self._factors = factorize(real.tocsr(), 2 * starts, lambda share: report("Factors", 0.8 + 0.2 * share))
 
-    def solve(self, load, joined, report):
+    def solve(self, load: Array, joined: Bools, report: Progress) -> Array:
         """Solve until no value changes by more than a thousandth of itself.
 
         Parameters
@@ -88,7 +92,7 @@ class TwoGrid:
         Returns
         -------
         ndarray, (n,) complex
-            Zero where nothing of the load comes.
+            Zero on components without load.
 
         Raises
         ------
@@ -98,7 +102,7 @@ class TwoGrid:
         result = self._coarse(load)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             for step in range(_STEPS):
-                matrix = Rows(self._matrix, pool, lambda done=step: report("Directions", done / (done + 10.0)))
+                matrix = Rows(self._matrix, pool, partial(report, "Directions", step / (step + 10.0)))
                 before = result
                 if step:
                     result = before + self._coarse(load - _product(matrix, before))
@@ -113,13 +117,13 @@ class TwoGrid:
             " of them, or clean them."
         )
 
-    def _coarse(self, load):
-        """Return what the coarse version makes of a load."""
+    def _coarse(self, load: Array) -> Array:
+        """Solve the coarse version for a load."""
         right = self._restriction @ load
         values = np.empty_like(right)
         values[self._order] = self._factors(right[self._order].view(float)).view(complex)
         return self._prolongation @ values
 
 
-def _product(matrix, values):
+def _product(matrix: Rows, values: Array) -> Array:
     return (matrix @ values[:, None])[:, 0]

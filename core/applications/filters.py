@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -292,7 +292,7 @@ def chebyshev_filter(
 
 
 def corrected_operator(
-    laplacian: LaplaceBeltrami, dirichlet: bool, raw: bool, pool: Executor, report: Callable[[], None]
+    laplacian: LaplaceBeltrami, dirichlet: bool, raw: bool, pool: ThreadPoolExecutor, report: Callable[[], None]
 ) -> tuple[Ints, Floats, Callable[[Floats], Floats]]:
     """Return the negated operator with the symbol correction as a product with a symmetric matrix, on all cores.
 

@@ -287,7 +287,7 @@ class _Film:
         free = self.free[stiffness.diagonal()[self.free] > 0.0]  # in noise a point may lie on a sheet of its own
         pulled = (pull @ foot - stiffness @ points)[free]
         normals, areas = laplacian.normals[free], laplacian.areas[free]
-        squared = 4.0 * laplacian.mean_curvature[free] ** 2 - 2.0 * laplacian.gaussian_curvature[free]
+        squared = 4.0 * laplacian.quadric_mean_curvature[free] ** 2 - 2.0 * laplacian.gaussian_curvature[free]
         curvature = np.sqrt(np.maximum(squared, 0.0))  # |A|
         stiffness = stiffness[free][:, free]
         force = np.einsum("ic,ic->i", normals, pulled)

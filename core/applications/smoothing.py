@@ -112,13 +112,14 @@ def smooth_points(
     blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
     base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
     rest = laplacian.points - base
-    if callable(response) and spectrum is None:
-        filtered = chebyshev_filter(
-            laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
-        )
-    elif callable(response) and spectrum is not None:
-        end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
-        filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
+    if callable(response):
+        if spectrum is None:
+            filtered = chebyshev_filter(
+                laplacian, rest, response, dirichlet=dirichlet, tolerance=_TOLERANCE, progress=progress
+            )
+        else:
+            end = float(np.ravel(response(spectrum.eigenvalues[-1:]))[0])
+            filtered = spectral_filter(rest, spectrum, laplacian.areas, response, rest=end)
     else:
         if spectrum is None:
             spectrum = laplacian.eigenpairs(response, raw=True, dirichlet=dirichlet, progress=progress)
@@ -201,7 +202,7 @@ def fair_points(
     """
     if time is None:
         known = laplacian.component >= 0
-        time = 0.5 * np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known])
+        time = 0.5 * float(np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known]))
     return smooth_points(
         laplacian,
         fairing(time, order),
@@ -258,7 +259,7 @@ def roughness(
     400 0.02
     """
     if wavelength is None:
-        wavelength = _DETAIL * np.median(laplacian.smoothing_lengths)
+        wavelength = _DETAIL * float(np.median(laplacian.smoothing_lengths))
     length = real(wavelength)
     if not 0.0 < length < np.inf:
         raise PointCloudError(f"The wavelength of the roughness is {wavelength!r}. Use a number above zero.")

@@ -1,7 +1,7 @@
 """Boundaries of open surfaces: which points lie at one, and how far every point is from it."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -99,7 +99,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     points = nearest.points
     result = np.zeros(len(points), dtype=bool)
 
-    def facing_a_gap(part: Any) -> Ints:
+    def facing_a_gap(part: slice) -> Ints:
         block = np.arange(part.start, part.stop)
         offset = points[nearest.index[block]] - points[block, None]
         flat = offset @ frames(oriented[block])[:, :, 1:]
@@ -180,7 +180,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
     span, view = tree.query(nearest.points, k=min(_VIEWS, len(rows)), workers=-1)
     close = np.flatnonzero(span[:, 0] < reach)
 
-    def measure(part: Any) -> None:
+    def measure(part: slice) -> None:
         block = close[part]
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
@@ -339,7 +339,7 @@ def given_boundary(nearest: Nearest, normals: Floats, distance: Floats) -> Bound
     known = np.isfinite(distance)
     rows = np.flatnonzero(known & known[nearest.index].all(axis=1))
 
-    def measure(part: Any) -> None:
+    def measure(part: slice) -> None:
         block = rows[part]
         index = nearest.index[block]
         unit = nearest.distance[block, -1]

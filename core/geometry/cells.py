@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
-from ..types import Bools, Floats, Ints
+from ..types import Bools, Floats, Ints, Report
 from .distances import arc_squared
 from .nearest import Nearest
 from .quadrics import frames
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 _BLOCK = 1 << 12
 _WIDER = 1, 4, 16  # times the 40 neighbours are looked at where a cell is open: a jump of density has them on one side
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
-_BENT = -0.5  # least Gaussian curvature times the squared reach, where the fit is poor
+_BENT = -0.5  # least Gaussian curvature times the squared radius, where the fit is poor
 _OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
 _CLOSEST = 1e-6  # spacings that a cut lies off its point, at least: by `_SAME`, a longer one hides the others
@@ -35,13 +34,13 @@ class Cells:
     ----------
     areas : ndarray, (m,)
         Their areas, all positive.
-    reach : ndarray, (m,)
+    radius : ndarray, (m,)
         Distance of the furthest corner: the radius of the largest empty disc that touches the point. Half an even
         spacing or a little more; larger where points are irregular, or sparser in one direction than in the other.
     """
 
     areas: Floats
-    reach: Floats
+    radius: Floats
 
 
 def measure_cells(
@@ -50,7 +49,7 @@ def measure_cells(
     gaussian_curvature: Floats,
     boundary: Boundary,
     component: Ints | None = None,
-    report: Callable[..., Any] = lambda: None,
+    report: Report = lambda: None,
 ) -> Cells:
     """Measure the cell of every point in geodesic polar coordinates around it.
 
@@ -87,14 +86,14 @@ def measure_cells(
         def measure(part: slice, rows: Ints = rows, wider: int = wider, still_open: Bools = still_open) -> None:
             block = rows[part]
             cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, wider)
-            areas, reach, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
+            areas, radius, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
             known = np.flatnonzero(closed)
             if wider == 1 and not closed.all():
                 gaps = np.flatnonzero(~closed)
                 capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / (_OPEN * spacing[block[gaps]]))], axis=1)
-                areas[gaps], reach[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
+                areas[gaps], radius[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
                 known = np.arange(len(block))
-            cells.areas[block[known]], cells.reach[block[known]] = areas[known], reach[known]
+            cells.areas[block[known]], cells.radius[block[known]] = areas[known], radius[known]
             still_open[block] = ~closed & whole[block]
 
         on_all_cores(measure, blocks(len(rows), _BLOCK // wider), report)
@@ -160,7 +159,7 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
     here = cuts[np.arange(count), np.linalg.norm(cuts, axis=2).argmax(axis=1)]
     first, same = here, _SAME * np.linalg.norm(here, axis=1)
     ahead = np.stack([-here[:, 1], here[:, 0]], axis=1)
-    areas, reach = np.zeros(count), np.zeros(count)
+    areas, radius = np.zeros(count), np.zeros(count)
     closed = np.zeros(count, dtype=bool)
     start = corner = np.zeros((0, 2))
     rows = np.arange(count)
@@ -177,7 +176,7 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
         before = corner
         corner = np.stack([there[:, 1] - here[:, 1], here[:, 0] - there[:, 0]], axis=1)
         corner /= np.where(out, 1.0, across)[:, None]
-        reach[rows] = np.maximum(reach[rows], np.where(out, 0.0, np.linalg.norm(corner, axis=1)))
+        radius[rows] = np.maximum(radius[rows], np.where(out, 0.0, np.linalg.norm(corner, axis=1)))
         if not len(before):
             start = corner
         else:
@@ -190,7 +189,7 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
         start, first, same = start[left], first[left], same[left]
         if not len(rows):
             break
-    return areas, reach, closed & (reach < furthest)
+    return areas, radius, closed & (radius < furthest)
 
 
 def _triangles(corner: Floats, other: Floats, gaussian_curvature: Floats) -> Floats:

@@ -1,16 +1,20 @@
-"""From coordinates to pairs: the stages of the walk, each a function from one typed value to the next."""
+"""From coordinates to pairs, in stages, each a function from one typed value to the next."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import ComponentError, TooFewPointsError
 from ..options import LaplacianOptions, check_options
+from ..types import Bools, Floats, Ints, Progress, Report
 from .bandwidth import depth, mean_gaps, smoothing_lengths
 from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
-from .cells import measure_cells
+from .cells import Cells, measure_cells
 from .components import label_components, move_apart
-from .distances import measure_roughness
+from .distances import measure_squared_slope
 from .nearest import Nearest, changed_rows, find_nearest
 from .noise import FILLING, LEFT, MOST, near_misfit, noise_level, project_points
 from .normals import orient_outwards, unit_normals
@@ -22,7 +26,7 @@ from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 
 _DRAWN = 20  # points that a surface needs at least, to be drawn
 _NARROW = 0.6  # h over the depth of the surface that is too wide
-_MANY = 0.1  # share of the points that tells of depth, or of noise: that is the scanner's, not of a few places
+_MANY = 0.1  # share of narrow, or of noisy points: fewer are a few places, and not the whole scan
 
 
 @dataclass(frozen=True)
@@ -32,23 +36,23 @@ class Sample:
     Attributes
     ----------
     scaled : ScaledPoints
-        The m distinct points, and the way back to the caller's.
+        The m distinct points, and how they map to the caller's.
     component : ndarray, (m,) int
         Of each point, the largest 0.
     nearest : Nearest
         Neighbours of each point; components stand far apart there, and noisy points are where they were moved to.
     noise : ndarray, (m,)
-        What was smoothed at each point, as a share of the spacing; zero where nothing was.
+        Noise that was smoothed at each point, as a share of the spacing; zero where none was.
     """
 
     scaled: ScaledPoints
-    component: np.ndarray
+    component: Ints
     nearest: Nearest
-    noise: np.ndarray
+    noise: Floats
 
     @property
-    def moved(self):
-        """How far the points were moved to smooth noise, (m, 3)."""
+    def moved(self) -> Floats:
+        """Offsets by which the points were moved to smooth noise, (m, 3)."""
         return self.nearest.points - move_apart(self.scaled.points, self.component)
 
 
@@ -56,7 +60,7 @@ class Sample:
 class Surface:
     """A sample, and a quadric through the neighbours of each point on its own sheet; others weigh nothing there.
 
-    `sheets` is how these were told; None where close sheets are not kept apart.
+    `sheets` is how these were separated; None where close sheets are not kept apart.
     """
 
     sample: Sample
@@ -64,63 +68,71 @@ class Surface:
     sheets: Sheets | None = None
 
     @property
-    def mixed(self):
+    def mixed(self) -> Quadrics:
         """The quadrics through all neighbours, whatever their sheet."""
         return self.quadrics if self.sheets is None else self.sheets.mixed
 
 
 @dataclass(frozen=True)
 class Cloud:
-    """What is known of a cloud, in scaled coordinates.
+    """The quantities measured on a cloud, in scaled coordinates.
 
     Attributes
     ----------
     scaled : ScaledPoints
-        The m distinct points that take part, and the way back to the caller's.
+        The m distinct points that take part, and how they map to the caller's.
     component : ndarray, (m,) int
         Component of each point.
     normals : ndarray, (m, 3)
         Unit normals.
     moved : ndarray, (m, 3)
-        How far the points were moved to smooth noise.
+        Offsets by which the points were moved to smooth noise.
     shape_operator : ndarray, (m, 3, 3)
-        Second fundamental form of local quadrics, positive where the surface bends away from the normal.
+        Second fundamental form of local quadrics, positive where the surface curves away from the normal.
     gaussian_curvature : ndarray, (m,)
         Of local quadrics.
     cell_areas : ndarray, (m,)
         Areas of the points' Voronoi cells.
-    reach : ndarray, (m,)
-        Distance of the furthest corner of each cell.
+    cell_radius : ndarray, (m,)
+        Distance of the furthest corner of each cell from its point.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
     misfit : ndarray, (m,)
         Root mean square distance of the neighbours from the quadric.
-    roughness : ndarray, (m,)
-        Mean squared slope of what is finer than the normals; zero where it is noise.
+    squared_slope : ndarray, (m,)
+        Mean squared slope of the roughness that is finer than the normals resolve; zero where it is noise.
     boundary : Boundary
     pairs : Pairs
-        Where the operator takes the points to be, smoothing lengths and pairs.
+        Points as moved, smoothing lengths and pairs.
     notices : list of str
-        What a user should know.
+        Texts for the user.
     """
 
     scaled: ScaledPoints
-    component: np.ndarray
-    normals: np.ndarray
-    moved: np.ndarray
-    shape_operator: np.ndarray
-    gaussian_curvature: np.ndarray
-    cell_areas: np.ndarray
-    reach: np.ndarray
-    spacing: np.ndarray
-    misfit: np.ndarray
-    roughness: np.ndarray
+    component: Ints
+    normals: Floats
+    moved: Floats
+    shape_operator: Floats
+    gaussian_curvature: Floats
+    cell_areas: Floats
+    cell_radius: Floats
+    spacing: Floats
+    misfit: Floats
+    squared_slope: Floats
     boundary: Boundary
     pairs: Pairs
-    notices: list
+    notices: list[str]
 
 
-def read_cloud(points, options, normals=None, boundary=None, boundary_distance=None, progress=None, left_out=()):
+def read_cloud(
+    points: ArrayLike,
+    options: LaplacianOptions,
+    normals: ArrayLike | None = None,
+    boundary: ArrayLike | None = None,
+    boundary_distance: ArrayLike | None = None,
+    progress: Progress | None = None,
+    left_out: ArrayLike = (),
+) -> Cloud:
     """Go from coordinates to pairs.
 
     Parameters
@@ -157,19 +169,19 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
 
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature
-    gaps = None
+    gaps, edge = None, no_boundary(len(oriented))
 
-    def looked():
-        report("Neighbors", 0.2)
+    def cells_within(boundary: Boundary) -> Cells:
+        return measure_cells(nearest, oriented, gaussian, boundary, sample.component, lambda: report("Neighbors", 0.2))
 
     if options.boundary == "auto" and boundary is None and boundary_distance is None:
-        cells = measure_cells(nearest, oriented, gaussian, no_boundary(len(oriented)), sample.component, looked)
-        gaps = mean_gaps(nearest, cells.reach, 1)
-    boundary = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
-    if gaps is None or np.isfinite(boundary.distance).any():
-        cells = measure_cells(nearest, oriented, gaussian, boundary, sample.component, looked)
+        cells = cells_within(edge)
+        gaps = mean_gaps(nearest, cells.radius, 1)
+    edge = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
+    if gaps is None or np.isfinite(edge.distance).any():
+        cells = cells_within(edge)
     report("Neighbors", 0.25)
-    lengths = smoothing_lengths(nearest, options, sample.component, cells.reach)
+    lengths = smoothing_lengths(nearest, cells.radius, options, sample.component)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
     own = oriented if given is None else given
 
@@ -184,24 +196,26 @@ def read_cloud(points, options, normals=None, boundary=None, boundary_distance=N
         shape_operator=side[:, None, None] * quadrics.shape_operator,
         gaussian_curvature=gaussian,
         cell_areas=cells.areas,
-        reach=cells.reach,
+        cell_radius=cells.radius,
         spacing=nearest.spacing,
         misfit=quadrics.misfit,
-        # What sticks out is noise where there is any, and shape where not.
-        roughness=np.where(sample.noise > 0.0, 0.0, measure_roughness(nearest, quadrics.normals)),
-        boundary=boundary,
+        # Where noise was smoothed, slopes are noise.
+        squared_slope=np.where(sample.noise > 0.0, 0.0, measure_squared_slope(nearest, quadrics.normals)),
+        boundary=edge,
         pairs=pairs,
         notices=_notices(
             duplicates=len(kept) - len(scaled.points),
             left_out=len(scaled.points) - len(own),
             share=1.0 - len(own) / len(scaled.points),
             noise=sample.noise,
-            narrow=np.mean(lengths > _NARROW * depth(nearest, boundary.distance)) > _MANY,
+            narrow=bool(np.mean(lengths > _NARROW * depth(nearest, edge.distance)) > _MANY),
         ),
     )
 
 
-def read_surface(points, options, report, kept=None):
+def read_surface(
+    points: Floats, options: LaplacianOptions, report: Progress, kept: Ints | None = None
+) -> tuple[ScaledPoints, Surface]:
     """Go from coordinates, checked, to quadrics; of some rows of them alone, if these are named.
 
     Returns
@@ -227,7 +241,7 @@ def read_surface(points, options, report, kept=None):
     return scaled, divide_sheets(surface, needed) if options.sheets else surface
 
 
-def leave_outliers(scaled, needed, report=lambda: None):
+def leave_outliers(scaled: ScaledPoints, needed: int, report: Report = lambda: None) -> Sample:
     """Leave out distinct points that do not lie on the surface of their neighbours.
 
     Parameters
@@ -254,7 +268,7 @@ def leave_outliers(scaled, needed, report=lambda: None):
     return _regroup(sample, np.where(find_outliers(sample.nearest), -1, 0), needed)
 
 
-def divide_components(sample, needed):
+def divide_components(sample: Sample, needed: int) -> Sample:
     """Divide points into components that gaps separate, and leave out those of too few points.
 
     Parameters
@@ -276,7 +290,7 @@ def divide_components(sample, needed):
     return _regroup(sample, label_components(sample.nearest), needed)
 
 
-def fit_surface(sample, sheets, before=None):
+def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None) -> Surface:
     """Fit a quadric around every point, to the neighbours of its own sheet if close sheets are to be kept apart.
 
     `before` is the surface of the same points before some of them moved.
@@ -289,14 +303,14 @@ def fit_surface(sample, sheets, before=None):
     if not sheets:
         check_surface(nearest.quadrics)
         return Surface(sample, nearest.quadrics)
-    fitted = fit_sheets(nearest, before and before.sheets)
+    fitted = fit_sheets(nearest, before.sheets if before else None)
     return Surface(replace(sample, nearest=fitted.nearest), fitted.quadrics, fitted)
 
 
-def remove_noise(surface, options):
+def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
     """Move points onto the surface that their neighbours describe, where the options or the noise ask for it.
 
-    Each round looks again only at points that the last one moved, and at their neighbours.
+    Each round measures again only points that the last one moved, and their neighbours.
 
     Returns
     -------
@@ -326,19 +340,19 @@ def remove_noise(surface, options):
     return replace(surface, sample=replace(surface.sample, noise=first))
 
 
-def _noise(surface, near):
+def _noise(surface: Surface, near: Floats) -> Floats:
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 
-def _project(surface, noise, moving):
+def _project(surface: Surface, noise: Floats, moving: Bools) -> Surface:
     sample, tree = surface.sample, surface.sample.nearest.tree
     points, rows = tree.data.copy(), np.flatnonzero(moving)
     points[rows] = project_points(tree, rows, noise, sample.component)
     return fit_surface(replace(sample, nearest=find_nearest(points)), surface.sheets is not None, surface)
 
 
-def divide_sheets(surface, needed):
-    """Divide components into sheets that nowhere meet, and leave out points that lie off all of them.
+def divide_sheets(surface: Surface, needed: int) -> Surface:
+    """Divide components into disjoint sheets, and leave out points that lie off all of them.
 
     Returns
     -------
@@ -356,23 +370,29 @@ def divide_sheets(surface, needed):
     return surface if divided is sample else fit_surface(divided, True)
 
 
-def _regroup(sample, component, needed):
-    """Give points to other components, and leave out those of component -1; the same sample if nothing changes."""
+def _regroup(sample: Sample, component: Ints, needed: int) -> Sample:
+    """Assign points to other components, and leave out those of component -1; the same sample if nothing changes."""
     out = component < 0
     if not out.any() and component.max() == sample.component.max():
         return sample
-    count, left = np.count_nonzero(out), np.count_nonzero(~out)
+    count, left = int(np.count_nonzero(out)), int(np.count_nonzero(~out))
     if left < max(needed, count):
         raise ComponentError(
-            f"{count} of {len(out)} points lie apart from each other, in components of too few points. Use points of a"
-            " surface, or delete the lone ones."
+            f"{count} of {len(out)} points are in components of too few points. Use points of a surface, or delete the"
+            " lone ones."
         )
     scaled, component, moved = sample.scaled.leave_out(out), component[~out], sample.moved[~out]
     return Sample(scaled, component, find_nearest(move_apart(scaled.points, component) + moved), sample.noise[~out])
 
 
-def locate_boundary(sample, oriented, gaps=None, boundary=None, boundary_distance=None):
-    """Find where the surface ends, or take what the caller knows of it.
+def locate_boundary(
+    sample: Sample,
+    oriented: Floats,
+    gaps: Floats | None = None,
+    boundary: ArrayLike | None = None,
+    boundary_distance: ArrayLike | None = None,
+) -> Boundary:
+    """Detect the boundary of the surface, or take the caller's.
 
     Parameters
     ----------
@@ -392,7 +412,7 @@ def locate_boundary(sample, oriented, gaps=None, boundary=None, boundary_distanc
     Raises
     ------
     InvalidPointsError
-        What is given does not fit the points, or names too few of them.
+        A boundary that does not fit the points, or names too few of them.
     """
     scaled, nearest = sample.scaled, sample.nearest
     distance = None
@@ -410,25 +430,24 @@ def locate_boundary(sample, oriented, gaps=None, boundary=None, boundary_distanc
     return measured if distance is None else measured.with_nearest(distance, nearest.spacing)
 
 
-def _notices(duplicates, left_out, share, noise, narrow):
-    """Say what a user should know of the walk, where there is something to say."""
+def _notices(duplicates: int, left_out: int, share: float, noise: Floats, narrow: bool) -> list[str]:
+    """Return texts on what was merged, smoothed and left out."""
     noisy, filling = np.mean(noise > 0.0), np.mean(noise > FILLING)
     level = noise.mean() / max(noisy, 1e-300)
     texts = {
         f"Points that lie on another one: {duplicates}. They share one area.": duplicates,
         f"Noise of {level:.2f} of the spacing was smoothed within the operator, at {noisy:.0%} of the points.": noisy
         > filling,
-        "Noise of more than half the spacing was smoothed within the operator, and details with it: areas may be off by"
-        f" 10 % and more. So it is at {filling:.0%} of the points: use more exact ones.": filling > _MANY,
-        f"Points that lie apart from the rest or off the surface, left out of the operator: {left_out}"
-        f" ({100.0 * share:.2g} %).": left_out,
-        "Part of the surface is so narrow that the kernel reaches several of its sides, so its areas may be off by"
-        " 10 % and more. Add points.": narrow,
+        f"Noise of more than half the spacing, at {filling:.0%} of the points, was smoothed within the operator, and"
+        " details with it: areas may be off by 10 % and more. Use more exact points.": filling > _MANY,
+        f"Outliers and small components left out of the operator: {left_out} ({100.0 * share:.2g} %).": left_out,
+        "Part of the surface is so narrow that the kernel covers several of its sides: areas there may be off by 10 %"
+        " and more. Add points.": narrow,
     }
     return [text for text, holds in texts.items() if holds]
 
 
-def estimate_normals(points, options=LaplacianOptions()):
+def estimate_normals(points: ArrayLike, options: LaplacianOptions = LaplacianOptions()) -> Floats:
     """Estimate unit normals from points alone.
 
     Parameters
@@ -452,7 +471,7 @@ def estimate_normals(points, options=LaplacianOptions()):
     See Also
     --------
     build_laplacian : The operator, whose ``normals`` these are.
-    mean_curvature : How the surface bends.
+    mean_curvature : Half their divergence.
 
     Examples
     --------
@@ -478,24 +497,24 @@ class Discs:
         Unit normals, outwards on closed surfaces, up on sheets such as terrain; the z axis at points that lie off the
         surface.
     radii : ndarray, (n,)
-        As far as the part of the surface reaches that is nearest to the point [L], so that all together leave no hole.
+        Of the points' Voronoi cells [L], so that all together leave no hole.
     """
 
-    normals: np.ndarray
-    radii: np.ndarray
+    normals: Floats
+    radii: Floats
 
-    def deformed(self, gradients):
-        """Return these discs carried along by a deformation, as large as it stretches the surface at most.
+    def deformed(self, gradients: Floats) -> Discs:
+        """Return these discs after a deformation, scaled by its largest stretch of the surface.
 
         Parameters
         ----------
         gradients : ndarray, (n, 3, 3)
-            How it maps small steps around each point, of `deformation_gradients` or any other.
+            Its linear map around each point, of `deformation_gradients` or any other.
 
         Returns
         -------
         Discs
-            With the normals of the mapped tangent planes; where such a plane is lost, the normal stays as it is.
+            With the normals of the mapped tangent planes; where these are degenerate, the normal stays as it is.
         """
         along = gradients @ frames(self.normals)[:, :, 1:]
         across = np.cross(along[:, :, 1], along[:, :, 0])  # as `frames` orders them
@@ -507,8 +526,8 @@ class Discs:
         return Discs(normals, self.radii * np.sqrt(longest))
 
 
-def surface_discs(points, *, progress=None):
-    """Find discs that cover the surface as far as the points tell it, to be drawn: much faster than the operator.
+def surface_discs(points: ArrayLike, *, progress: Progress | None = None) -> Discs:
+    """Find discs that cover the surface, to be drawn: much faster than the operator.
 
     Parameters
     ----------
@@ -520,7 +539,7 @@ def surface_discs(points, *, progress=None):
     Returns
     -------
     Discs
-        Where there are no neighbors, at open boundaries and in holes, they reach a spacing far.
+        Where there are no neighbors, at open boundaries and in holes, their radius is up to a spacing.
 
     Raises
     ------
@@ -552,6 +571,6 @@ def surface_discs(points, *, progress=None):
     cells = measure_cells(
         sample.nearest, oriented, curvature, everywhere, sample.component, lambda: report("Discs", 0.6)
     )
-    radii = cells.reach * scaled.scale
+    radii = cells.radius * scaled.scale
     kept = sample.scaled
-    return Discs(kept.scatter(oriented, (0.0, 0.0, 1.0)), kept.scatter(radii, np.median(radii)))
+    return Discs(kept.scatter(oriented, (0.0, 0.0, 1.0)), kept.scatter(radii, float(np.median(radii))))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,16 +15,16 @@ from .patches import Patch
 if TYPE_CHECKING:
     from .cloud import Cloud
 
-_STEPS = 8  # nearest neighbours whose chords tell of roughness
-_ACROSS = 3  # of these chords lead across a sharp edge: it is no roughness there
+_STEPS = 8  # nearest neighbours whose chords give the squared slope
+_ACROSS = 3  # of these chords lead across a sharp edge: the slope there does not count
 
 
 def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | float = 1.0) -> Floats:
     """Return the squared length of arcs over chords, from the normals at both ends.
 
     ``s^2 = r^2 + (e - d)^2 (1 / 12 + c / 45) + (e + d)^2 / 20``, of the cubic that has these normals: the first term
-    for the bend that both ends share, exact on spheres and cylinders to sixth order of the arc's angle; the second for
-    what one end bends more than the other.
+    for the curvature that both ends share, exact on spheres and cylinders to sixth order of the arc's angle; the second
+    for the difference of their curvatures.
 
     Parameters
     ----------
@@ -38,17 +38,17 @@ def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | f
     return squared + (right - left) ** 2 * (1.0 / 12.0 + (1.0 - cosine) / 45.0) + (left + right) ** 2 / 20.0
 
 
-def circle_arc(chord: Floats, bend: Floats) -> Floats:
+def circle_arc(chord: Floats, sine: Floats) -> Floats:
     """Return the length of circular arcs over chords, to all orders, by the sine of half their angle, |t| / (2 r)."""
-    return chord * np.where(bend > 1e-4, np.arcsin(bend) / np.maximum(bend, 1e-4), 1.0)
+    return chord * np.where(sine > 1e-4, np.arcsin(sine) / np.maximum(sine, 1e-4), 1.0)
 
 
 def arc_length(cloud: Cloud) -> Floats:
     """Return the length of the arc that joins each pair within the surface.
 
-    That of `arc_squared`, and ``g max(r^2 - a^2, 0)`` more: the way up and down over roughness of mean squared slope g,
-    the mean of both ends' roughness, finer than the normals tell, but shape. Between points one spacing a apart the
-    chord is that way.
+    That of `arc_squared`, and ``g max(r^2 - a^2, 0)`` more: the path up and down over a roughness finer than the
+    normals resolve, of mean squared slope g, the mean of both ends. Between points one spacing a apart the chord is
+    that path.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def arc_length(cloud: Cloud) -> Floats:
     -------
     ndarray, (p,)
     """
-    pairs, rough = cloud.pairs, cloud.roughness.any()
+    pairs, steep = cloud.pairs, cloud.squared_slope.any()
     result = np.empty(len(pairs.first))
     points, normals = pairs.points.T.copy(), cloud.normals.T.copy()
 
@@ -69,16 +69,16 @@ def arc_length(cloud: Cloud) -> Floats:
         right = np.where(cosine < 0.0, -right, right)
         squared = pairs.distance[patch.pairs] ** 2
         arc = arc_squared(squared, left, right, np.abs(cosine))
-        if rough:
-            arc += patch.mean(cloud.roughness) * np.maximum(squared - patch.mean(cloud.spacing) ** 2, 0.0)
+        if steep:
+            arc += patch.mean(cloud.squared_slope) * np.maximum(squared - patch.mean(cloud.spacing) ** 2, 0.0)
         result[patch.pairs] = np.sqrt(arc)
 
     on_all_cores(measure, pairs.patches)
     return result
 
 
-def measure_roughness(nearest: Nearest, normals: Floats) -> Floats:
-    """Measure what rises and falls between neighbouring points faster than the normals, fitted to many, can tell.
+def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
+    """Measure the slopes between neighbouring points that are too fine for the normals, which are fitted to many.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def measure_roughness(nearest: Nearest, normals: Floats) -> Floats:
     ndarray, (m,)
         Mean square of the slope of the chords to the eight nearest neighbours against the mean normal of their ends,
         averaged over the neighbourhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
-        turn too fast between neighbours to be right, are no roughness: arcs make up for them already.
+        change too fast between neighbours to be right, do not count: arcs make up for them already.
     """
     near = slice(1, _STEPS + 1)
     index, counted = nearest.index[:, near], nearest.weight[:, near] > 0.0
@@ -107,7 +107,7 @@ def measure_roughness(nearest: Nearest, normals: Floats) -> Floats:
 
 
 def pair_heights(
-    first: Callable[..., Any], second: Callable[..., Any], points: Floats, normals: Floats
+    first: Callable[[Floats], Floats], second: Callable[[Floats], Floats], points: Floats, normals: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return the chords of pairs, their heights along the first normal and along the second, and the normals' cosine.
 

@@ -2,7 +2,7 @@
 
 import functools
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from scipy import sparse
@@ -105,7 +105,7 @@ def fading_weights(distance: Floats) -> Floats:
     return weights
 
 
-def typical_distance(positions: Any) -> Any:
+def typical_distance(positions: Floats) -> float:
     """Return the typical distance between neighbouring points of a surface, (n, 3); 0 if unknown.
 
     The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8. Of very many
@@ -122,6 +122,7 @@ def typical_distance(positions: Any) -> Any:
     return float(distance * np.sqrt(np.pi / 8.0 * len(few) / len(positions)))
 
 
-def nearest_rows(points: Any, places: Any) -> Any:
+def nearest_rows(points: Floats, places: Floats) -> Ints:
     """Return which of the points, (n, 3), is nearest to each of some places, (k, 3)."""
-    return cKDTree(points).query(places)[1]
+    rows: Ints = cKDTree(points).query(places)[1]
+    return rows

@@ -1,7 +1,5 @@
 """Noise: its measure around every point, and points moved onto the surface that their neighbours describe."""
 
-from typing import Any
-
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -82,7 +80,7 @@ def project_points(tree: cKDTree, rows: Ints, noise: Floats, component: Ints | N
     order = np.argsort(many, kind="stable")  # those who ask for few neighbours do not wait for others' many
     result = np.empty((len(rows), 3))
 
-    def project(part: Any) -> None:
+    def project(part: slice) -> None:
         block = order[part]
         result[block] = _projected(tree, rows[block], many[block])
 

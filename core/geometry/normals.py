@@ -1,20 +1,21 @@
 """Normals: given ones checked, and a consistent orientation."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
+from ..types import Array, Floats, Ints
+from .nearest import Nearest
 
 NEIGHBORS = 12
-_BULGING = (
-    0.4  # mean height over the middle, along the normals, against the mean distance from it: 0.87 of half a sphere
-)
-_UPRIGHT = 0.5  # of a sheet's area as seen from above, what is left after what faces the other way is taken off
+_BULGING = 0.4  # mean height over the center, along the normals, over the mean distance from it: 0.87 of half a sphere
+_UPRIGHT = 0.5  # difference of a sheet's areas that face up and down, as a share of both, as seen from above
 
 
-def unit_normals(normals, count):
+def unit_normals(normals: ArrayLike, count: int) -> Floats:
     """Check given normals and scale them to unit length.
 
     Raises
@@ -33,11 +34,11 @@ def unit_normals(normals, count):
     bad = int(np.count_nonzero(~(np.isfinite(largest) & (largest > 0.0))))
     if bad:
         raise InvalidPointsError(f"{bad} of {count} normals are zero or not finite. Leave the normals to be estimated.")
-    normals = normals / largest  # squares of what is tiny or huge are no numbers
+    normals = normals / largest  # squares of tiny or huge ones would underflow or overflow
     return normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
-def orient_outwards(nearest, normals):
+def orient_outwards(nearest: Nearest, normals: Floats) -> Floats:
     """Flip normals so that neighbours agree, outwards where the cloud encloses a volume.
 
     Parameters
@@ -57,8 +58,8 @@ def orient_outwards(nearest, normals):
     return normals * outer_signs(nearest.points, normals, component)[component, None]
 
 
-def outer_signs(points, normals, part, weight=None):
-    """Choose a sign for each part of a surface: away from its middle, or up where it is a sheet that hardly bulges.
+def outer_signs(points: Floats, normals: Floats, part: Ints, weight: Floats | None = None) -> Floats:
+    """Choose a sign for each part of a surface: away from its center, or up where it is a sheet that hardly bulges.
 
     A body, a bowl, or what a scanner sees of a body bulges to its outer side. Terrain does not: its hills and pits are
     low against its width. It hardly overhangs, though, so that nearly all of it faces up or down, and up is outside.
@@ -79,12 +80,12 @@ def outer_signs(points, normals, part, weight=None):
     """
     weight = np.ones(len(points)) if weight is None else weight
 
-    def total(values):
+    def total(values: Floats | float) -> Array:
         return np.bincount(part, weight * values)
 
     size = total(1.0) + np.finfo(float).tiny
-    middle = np.column_stack([total(points[:, axis]) for axis in range(3)]) / size[:, None]
-    offset = points - middle[part]
+    center = np.column_stack([total(points[:, axis]) for axis in range(3)]) / size[:, None]
+    offset = points - center[part]
     outward = total(np.einsum("ij,ij->i", offset, normals))
     upward = total(normals[:, 2])
     distance = np.sqrt(size * total(np.einsum("ij,ij->i", offset, offset)))
@@ -92,7 +93,7 @@ def outer_signs(points, normals, part, weight=None):
     return np.where(np.where(sheet, upward, outward) < 0.0, -1.0, 1.0)
 
 
-def propagate_signs(nearest, normals):
+def propagate_signs(nearest: Nearest, normals: Floats) -> tuple[Floats, sparse.csr_array]:
     """Flip normals so that neighbours agree.
 
     The sign travels along a minimum spanning tree of the neighbour graph, whose edges cost least where a circular arc
@@ -116,9 +117,8 @@ def propagate_signs(nearest, normals):
     points = nearest.points
     n = len(points)
     first, second = near_edges(nearest)
-    cost = (
-        1.0 + 1e-9 - np.minimum(np.abs(mirrored_cosine(points, normals, first, second)), 1.0)
-    )  # zero would be no edge
+    cosine = np.abs(mirrored_cosine(points, normals, first, second))
+    cost = 1.0 + 1e-9 - np.minimum(cosine, 1.0)  # zero would be no edge
     tree = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
     graph = tree + tree.T
     component = connected_components(graph, directed=False)[1]
@@ -136,7 +136,7 @@ def propagate_signs(nearest, normals):
     return normals * sign[:, None], tree
 
 
-def near_edges(nearest):
+def near_edges(nearest: Nearest) -> tuple[Ints, Ints]:
     """Return the edges from every point to its nearest neighbours on its own sheet, by both ends."""
     near = slice(1, NEIGHBORS + 1)
     same = nearest.weight[:, near] > 0.0
@@ -144,7 +144,7 @@ def near_edges(nearest):
     return first, nearest.index[:, near][same]
 
 
-def mirrored_cosine(points, normals, first, second):
+def mirrored_cosine(points: Floats, normals: Floats, first: Ints, second: Ints) -> Floats:
     """Cosine between the second normal and the mirror image of the first in the plane halfway between the points."""
     chord = points[second] - points[first]
     chord /= np.linalg.norm(chord, axis=1)[:, None]

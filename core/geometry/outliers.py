@@ -1,7 +1,5 @@
 """Outliers: points that do not lie on the surface of their neighbours."""
 
-from typing import Any
-
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
@@ -101,7 +99,7 @@ def _heights(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:
     """Return how far some points are off the quadrics of their witnesses, (k, 12)."""
     result = np.empty((len(rows), len(_WITNESSES)))
 
-    def measure(part: Any) -> None:
+    def measure(part: slice) -> None:
         block = rows[part]
         witnesses = _witnesses(nearest, block)
         result[part] = np.abs(heights_over(surface, nearest.points, witnesses, block[:, None]))
@@ -123,7 +121,7 @@ def _let_go(nearest: Nearest, surface: Quadrics, rows: Ints) -> tuple[Quadrics, 
     points, spacing = nearest.points, nearest.spacing
     weight = np.empty((len(rows), nearest.index.shape[1]))
 
-    def weigh(part: Any) -> None:
+    def weigh(part: slice) -> None:
         block = rows[part]
         height, scatter = _scatter(surface, points, block, nearest.index[block])
         far = height / np.maximum(_SCATTERS * scatter, ON * spacing[block])[:, None]
@@ -135,7 +133,7 @@ def _let_go(nearest: Nearest, surface: Quadrics, rows: Ints) -> tuple[Quadrics, 
     fitted = fit_quadrics(points, index, weight, rows)
     surface = surface.put(rows, fitted)
 
-    def measure(part: Any) -> None:
+    def measure(part: slice) -> None:
         result[part] = _scatter(surface, points, rows[part], index[part])[1]
 
     on_all_cores(measure, parts)

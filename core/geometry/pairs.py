@@ -1,9 +1,9 @@
 """The neighbour pairs inside the kernel's support."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self, TypeAlias
 
 import numpy as np
 from scipy import sparse
@@ -11,8 +11,10 @@ from scipy.spatial import cKDTree
 
 from ..algebra import on_all_cores
 from ..kernel import SUPPORT
-from ..types import Array, Bools, Floats, Ints
+from ..types import Array, Bools, Floats, Ints, Report
 from .patches import Patch, divide_pairs
+
+Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at their first and second points
 
 _BLOCK = 1 << 22  # neighbour candidates held at one time while the pairs are collected
 
@@ -51,7 +53,7 @@ class Pairs:
         """Return a pair quantity as the (m, m) CSR matrix U that holds each pair once; the whole is U + U.T."""
         return sparse.csr_array((values, self.second, self.start), shape=(len(self.points),) * 2)
 
-    def over_ends(self, values: Callable[..., Any], count: int, report: Callable[..., Any] = lambda: None) -> Floats:
+    def over_ends(self, values: Callable[[Patch], Ends], count: int, report: Report = lambda: None) -> Floats:
         """Return the sums over the pairs of each point of what they have at that end, (count, m).
 
         Parameters
@@ -88,7 +90,7 @@ class Pairs:
         return start
 
 
-def find_pairs(tree: cKDTree, lengths: Floats, report: Callable[..., Any] = lambda: None) -> list[Array]:
+def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) -> list[Array]:
     """Find all pairs nearer than 3 h_ij, with h_ij = (h_i + h_j) / 2.
 
     Parameters

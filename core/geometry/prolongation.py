@@ -1,8 +1,5 @@
 """From some points to all: what was computed on a subset is carried to the points between."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
@@ -11,7 +8,7 @@ from scipy.spatial import cKDTree
 from ..algebra import blocks, eliminate, on_all_cores
 from ..arguments import as_array
 from ..errors import InvalidPointsError
-from ..types import Array, Floats, Ints
+from ..types import Array, Floats, Ints, Report
 from .nearest import SMOOTH
 from .points import as_mask, check_points, check_values
 from .quadrics import frames
@@ -81,7 +78,7 @@ class Prolongation:
         subset: ArrayLike,
         normals: ArrayLike,
         component: ArrayLike | None = None,
-        progress: Callable[[], Any] | None = None,
+        progress: Report | None = None,
     ) -> None:
         points = check_points(points)
         count = len(points)

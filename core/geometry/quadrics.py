@@ -1,7 +1,6 @@
 """What the cloud tells about the surface around each point: normal and curvature, from local quadrics."""
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 
@@ -89,7 +88,7 @@ def fit_quadrics(
         curved=np.zeros(count, dtype=bool),
     )
 
-    def fit_block(block: Any) -> None:
+    def fit_block(block: slice) -> None:
         places, here = points[index[block]], points[rows[block]]
         offset = [places[:, :, axis] - here[:, axis, None] for axis in range(3)]
         share = weight[block] / weight[block].sum(axis=1, keepdims=True)

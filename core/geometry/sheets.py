@@ -1,7 +1,7 @@
 """Keep close sheets of a surface apart: which points lie on the same sheet, told by normals and by ways along it."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -130,7 +130,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
         planes[missed] = before.planes[missed]
     looked = rows[missed[rows]]
 
-    def find(part: Any) -> None:
+    def find(part: slice) -> None:
         block = looked[part]
         offset = points[index[block]] - points[block, None]
         planes[block] = _own_plane(offset, whole[block], spacing[block])
@@ -213,7 +213,7 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
     """
     result = np.zeros(nearest.index.shape, dtype=bool)
 
-    def find(part: Any) -> None:
+    def find(part: slice) -> None:
         block = np.arange(part.start, part.stop)
         index = nearest.index[block]
         flat = (nearest.points[index] - nearest.points[block, None]) @ frames(normals[block])[:, :, 1:]

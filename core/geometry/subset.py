@@ -1,7 +1,6 @@
 """Fewer points that stand for many: a blue-noise subset, evenly spread over the surface whatever the density was."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from ..arguments import whole
 from ..errors import InvalidPointsError
-from ..types import Array, Bools, Floats, Ints
+from ..types import Array, Bools, Floats, Ints, Report
 from .points import check_points
 
 _CANDIDATES = 3.0  # voxels for each point wanted: enough to choose from, few enough for their pairs
@@ -21,7 +20,7 @@ _SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that tell
 _TRIALS = 8  # of voxels, or of radii
 
 
-def blue_noise_subset(points: ArrayLike, count: int, *, progress: Callable[[], Any] | None = None) -> Ints:
+def blue_noise_subset(points: ArrayLike, count: int, *, progress: Report | None = None) -> Ints:
     """Choose points that are evenly spread over the surface, none close to another: a Poisson-disc subset.
 
     Of each voxel of a fine grid the point next to its centre is a candidate. Of candidates closer than a radius one
@@ -75,9 +74,7 @@ def blue_noise_subset(points: ArrayLike, count: int, *, progress: Callable[[], A
     return np.sort(chosen)
 
 
-def _candidates(
-    points: Floats, low: Floats, extent: float, count: int, report: Callable[..., Any]
-) -> tuple[Ints, Ints]:
+def _candidates(points: Floats, low: Floats, extent: float, count: int, report: Report) -> tuple[Ints, Ints]:
     """Return a point of each voxel, and the numbers of these voxels, few more than are needed."""
     finest = extent / _FINEST
     wanted = _CANDIDATES * count
@@ -118,7 +115,7 @@ def _central(points: Floats, order: Ints, first: Ints, low: Floats, edge: float)
     return order[nearest[np.diff(voxel[nearest], prepend=-1) > 0]]
 
 
-def _thin(points: Floats, keys: Ints, count: int, report: Callable[..., Any]) -> Bools:
+def _thin(points: Floats, keys: Ints, count: int, report: Report) -> Bools:
     """Return which of the candidates stay when discs of one radius must not hold another, at most a count of them."""
     rank = _shuffled(keys)
     tree = cKDTree(points)

@@ -1,13 +1,12 @@
 """Fewer points for the same surface, spread as evenly as the given ones let them."""
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks
-from ..types import Bools, Floats, Ints
+from ..types import Bools, Floats, Ints, Report
 from .subset import independent
 
 _STEP = 2.0  # each pass leaves a quarter of the points
@@ -23,7 +22,7 @@ def thin(
     spacing: Floats,
     count: int,
     rank: Ints | None = None,
-    report: Callable[..., Any] = lambda: None,
+    report: Report = lambda: None,
 ) -> Ints:
     """Choose some of the points so that no two are close to each other, and none of the others is far from all.
 
@@ -69,7 +68,7 @@ def thin(
     return chosen
 
 
-def _independent(points: Floats, reach: Floats, priority: Ints, rank: Ints, report: Callable[..., Any]) -> Bools:
+def _independent(points: Floats, reach: Floats, priority: Ints, rank: Ints, report: Report) -> Bools:
     """Return which points have none of a higher priority within reach that stays, (m,) bool."""
     pairs = [_close_pairs(*found, reach, rank) for found in nearest_in_blocks(points, points, _NEIGHBORS, report)]
     first, second = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
@@ -86,7 +85,7 @@ def _close_pairs(start: int, distance: Floats, index: Ints, reach: Floats, rank:
 
 
 def nearest_in_blocks(
-    sources: Floats, points: Floats, count: int, report: Callable[..., Any] = lambda: None
+    sources: Floats, points: Floats, count: int, report: Report = lambda: None
 ) -> Iterator[tuple[int, Floats, Ints]]:
     """Find the nearest sources of points; yield the first row of each block, distances and indices, (b, count)."""
     tree = cKDTree(sources)

@@ -1,27 +1,42 @@
 """Area elements from the unit-integral condition of the kernel, eq. (6) of the paper."""
 
+from __future__ import annotations
+
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from ..algebra import chebyshev_terms, on_all_cores
 from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
+from ..types import Bools, Floats, Report
 from .curvature import kernel_integral, uneven
 from .images import mirror, own_images
 
+if TYPE_CHECKING:
+    from ..geometry import Boundary, Cloud, Pairs, Patch
+
 _FLOOR = 0.5  # least area in units of that of the Voronoi cell: all stay positive
 _DEGREES = 100, 50  # of the polynomials of two rounds: the second makes up for what the floor changed in the first
-_WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] can tell from zero
-_EVEN = 1e-9  # changes of h, as a share, that are none
-_MANY = 1 << 20  # pairs from which a product takes longer than to begin threads
-NO_AREA = 1e-300  # of points left out: positive, and nothing to any sum
+_WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] separates from zero
+_EVEN = 1e-9  # changes of h, as a share, that are rounding
+_MANY = 1 << 20  # pairs from which a product takes longer than to start threads
+NO_AREA = 1e-300  # of points left out: positive, and negligible in any sum
 
 
-def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary=None, boundary_distance=None):
+def estimate_areas(
+    points: ArrayLike,
+    normals: ArrayLike | None = None,
+    options: LaplacianOptions = LaplacianOptions(),
+    *,
+    boundary: ArrayLike | None = None,
+    boundary_distance: ArrayLike | None = None,
+) -> Floats:
     """Estimate the area element of every point, the operator's own, without the operator.
 
     Parameters
@@ -62,7 +77,7 @@ def estimate_areas(points, normals=None, options=LaplacianOptions(), *, boundary
     return scaled.scatter(areas * scaled.scale**2 / scaled.copies, NO_AREA)
 
 
-def solve_areas(cloud, distance, report=lambda: None):
+def solve_areas(cloud: Cloud, distance: Floats, report: Report = lambda: None) -> Floats:
     """Solve for the areas of the distinct points, in scaled coordinates.
 
     Parameters
@@ -85,12 +100,12 @@ def solve_areas(cloud, distance, report=lambda: None):
     return _like_cells(matrix, fast_areas(matrix, target, cloud.cell_areas), cloud)
 
 
-def _like_cells(matrix, areas, cloud):
-    """Scale areas, part by part, to those of the Voronoi cells, (m,).
+def _like_cells(matrix: KernelMatrix, areas: Floats, cloud: Cloud) -> Floats:
+    """Scale areas to those of the Voronoi cells, first locally, then by component, (m,).
 
-    Around sharp bends, where distances along the surface are not known well enough for the kernel's integral, it asks
-    for too little area. The cells, which are as wide as a spacing and not as a kernel, tell how much there is at large;
-    which of the points has it, the kernel.
+    Where the surface is sharply curved, distances along it are too inexact for the kernel's integral, which gives too
+    little area. The cells, as wide as a spacing and not as a kernel, decide the area at large; the kernel decides its
+    distribution among the points.
     """
     mean = 1.0 / (matrix @ areas)
     ratio = cloud.cell_areas / areas
@@ -101,8 +116,8 @@ def _like_cells(matrix, areas, cloud):
     return areas * (total / found)[cloud.component]
 
 
-def _gain(matrix, lengths):
-    """Return what h that varies along the surface adds to the integral of the kernel, (m,).
+def _gain(matrix: KernelMatrix, lengths: Floats) -> Floats:
+    """Return the increase of the integral of the kernel by variations of h along the surface, (m,).
 
     ``mu2 (h Laplacian(h) / 4 + |grad h|^2 / 8)``, from means over the kernel: that of f is ``f + mu2 h^2 / 4
     Laplacian(f)``.
@@ -121,12 +136,12 @@ class KernelMatrix:
     Near a boundary the image of a point in it counts as a neighbour too.
     """
 
-    def __init__(self, pairs, distance, boundary, report=lambda: None):
+    def __init__(self, pairs: Pairs, distance: Floats, boundary: Boundary, report: Report = lambda: None) -> None:
         self._report = report
         own = pairs.lengths
         values = np.empty(len(distance))
 
-        def evaluate(patch):
+        def evaluate(patch: Patch) -> None:
             lengths = patch.mean(own)
             values[patch.pairs] = kernel(distance[patch.pairs] / lengths) / lengths**2
 
@@ -140,7 +155,7 @@ class KernelMatrix:
         for rows, image, factor in own_images(pairs, boundary):
             self._diagonal[rows] += factor * kernel(image / own[rows]) / own[rows] ** 2
 
-    def __matmul__(self, values):
+    def __matmul__(self, values: Floats) -> Floats:
         self._report()
         if self._halves[0].nnz < _MANY:
             first, second = (half @ values for half in self._halves)
@@ -149,16 +164,16 @@ class KernelMatrix:
         return self._diagonal * values + first + second
 
 
-def fast_areas(matrix, target, cells):
+def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
     """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells.
 
     M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [-1, 1]; but for pairs left out between close
     sheets, images in boundaries and noise they would be positive. Each round adds p(M) times the residual to y in
-    M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue, and next to nothing below
-    it: the smooth part is solved for, and what the kernel cannot see stays near the cells. In between, areas below the
-    floor of c / 2 are put on it, held there, and released when the gradient turns inward. A fixed number of linear
-    steps, unlike conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order of the
-    points.
+    M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue, and about zero below it:
+    the smooth part is solved for, and details that the kernel does not resolve stay near the cells. In between, areas
+    below the floor of c / 2 are set to it, held there, and released when the gradient points inward. A fixed number of
+    linear steps, unlike conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order
+    of the points.
 
     Parameters
     ----------
@@ -187,20 +202,23 @@ def fast_areas(matrix, target, cells):
     return root * y
 
 
-def _polynomial(matrix, root, residual, held, coefficients):
+def _polynomial(matrix: KernelMatrix, root: Floats, residual: Floats, held: Bools, coefficients: Floats) -> Floats:
     """Evaluate a Chebyshev series in M on the free part of a residual."""
 
-    def product(values):
+    def product(values: Floats) -> Floats:
         image = root * (matrix @ (root * values))
         image[held] = 0.0
         return image
 
-    terms = chebyshev_terms(product, residual)
-    return sum(coefficient * term for coefficient, term in zip(coefficients, terms, strict=False))
+    terms, result = chebyshev_terms(product, residual), np.zeros_like(residual)
+    for coefficient, term in zip(coefficients, terms, strict=False):
+        result += coefficient * term
+    return result
 
 
 @functools.cache
-def _inverse(degree):
-    """Return the Chebyshev series over [-1, 1] of 1 / x for x well above the width; near zero and below, of nothing."""
+def _inverse(degree: int) -> Floats:
+    """Return a Chebyshev series over [-1, 1]: 1 / x for x well above the width, about zero from there down."""
     width = _WIDTH / degree
-    return chebyshev.chebinterpolate(lambda x: expit(2.0 * x / width) * x / (x * x + width * width), degree)
+    series: Floats = chebyshev.chebinterpolate(lambda x: expit(2.0 * x / width) * x / (x * x + width * width), degree)
+    return series

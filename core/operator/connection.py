@@ -1,13 +1,10 @@
 """The connection Laplacian: the operator on tangent vectors, each a complex number in the frame of its point."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from scipy import sparse
 
 from ..algebra import blocks, on_all_cores
-from ..types import Array, Floats
+from ..types import Array, Floats, Report
 
 _BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
 
@@ -38,7 +35,7 @@ def connection_laplacian(
     normals: Floats,
     frames: Array,
     mass: Floats | float = 0.0,
-    report: Callable[..., Any] = lambda: None,
+    report: Report = lambda: None,
 ) -> sparse.csr_array:
     """Build the operator on tangent vectors from the one on functions.
 
@@ -74,7 +71,7 @@ def connection_laplacian(
     entries = np.empty(len(first), dtype=complex)
     normal, real, imaginary = (np.ascontiguousarray(values.T) for values in (normals, frames.real, frames.imag))
 
-    def measure(block: Any) -> None:
+    def measure(block: slice) -> None:
         i, j = first[block], second[block]
         left, right, axis = normal.take(i, axis=1), normal.take(j, axis=1), real.take(j, axis=1)
         cosine = _dot(left, right)

@@ -62,10 +62,13 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     Returns
     -------
     ndarray, (n,)
-        Mean of the two principal curvatures [1 / L]; where the kernel reaches beyond a boundary, from local quadrics.
+        Mean of the two principal curvatures [1 / L], averaged over the kernel; where that extends beyond a boundary,
+        `LaplaceBeltrami.quadric_mean_curvature`.
 
     See Also
     --------
+    LaplaceBeltrami.quadric_mean_curvature : The same by local quadrics through the nearest points; see there how far
+        they differ.
     LaplaceBeltrami.apply : What it is computed by.
     principal_curvatures : Both curvatures that it is the mean of.
     estimate_normals : The normals alone.
@@ -86,7 +89,7 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     centered = points - points.mean(axis=0)
     curvature = -0.5 * np.einsum("ij,ij->i", laplacian.apply(centered), laplacian.normals)
     # At a boundary the natural operator takes the surface as level across it.
-    return np.where(laplacian.near_boundary, laplacian.mean_curvature, curvature)
+    return np.where(laplacian.near_boundary, laplacian.quadric_mean_curvature, curvature)
 
 
 @dataclass(frozen=True, eq=False)

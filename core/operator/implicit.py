@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
 from ..geometry import SMOOTH, find_nearest
-from ..types import Array, Bools, Floats, Ints
+from ..types import Array, Bools, Floats, Ints, Report
 
 if TYPE_CHECKING:
     from .laplacian import LaplaceBeltrami
@@ -124,7 +123,7 @@ class ImplicitSurface:
         self.normals[rows] *= -1.0
         self._shape_operator[rows] *= -1.0
 
-    def heights(self, places: Floats, report: Callable[..., Any] = lambda: None) -> Heights:
+    def heights(self, places: Floats, report: Report = lambda: None) -> Heights:
         """Measure places near the surface.
 
         Parameters
@@ -142,7 +141,7 @@ class ImplicitSurface:
         normal, outward = np.empty((2, count, 3))
         result = Heights(height, normal, np.empty(count, dtype=np.int64), spacing, distance, beyond, outward)
 
-        def measure(block: Any) -> None:
+        def measure(block: slice) -> None:
             for known, found in zip(result, self._measure(places[block]), strict=True):
                 known[block] = found
 

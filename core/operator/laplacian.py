@@ -1,8 +1,12 @@
 """The symmetrised mesh-free Laplace-Beltrami operator."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..arguments import check_switches
@@ -11,13 +15,17 @@ from ..geometry import arc_length, check_points, check_values, move_apart, read_
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
+from ..types import Bools, Floats, Ints, Progress
 from .areas import NO_AREA, solve_areas
 from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
-from .stiffness import assemble_stiffness
+from .stiffness import Stiffness, assemble_stiffness
+
+if TYPE_CHECKING:
+    from ..geometry import Cloud
 
 _FAR, _MISSED = 0.1, 1.0  # residual of the moments, and misfit of quadrics in spacings, at which trust is a half
-_DOUBTFUL = 0.02  # share of the area at which a notice tells
-NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that random points bear
+_DOUBTFUL = 0.02  # share of the area without trust from which there is a notice
+NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that suffice for random points
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -32,37 +40,36 @@ class LaplaceBeltrami:
     points : ndarray, (n, 3)
         The caller's points [L], unchanged and in order.
     surface_points : ndarray, (n, 3)
-        Where the operator takes them to be [L]: other places than `points` only where noise was smoothed.
+        The same as the operator uses them [L]: at other positions only where noise was smoothed.
     normals : ndarray, (n, 3)
         Unit normals, as given or estimated.
     areas : ndarray, (n,)
         Area elements [L^2], all positive: the lumped mass. Those of points left out are too small to count.
     shape_operator : ndarray, (n, 3, 3)
         Second fundamental form of local quadrics [1 / L]: ``t . shape_operator t`` is the curvature along the unit
-        tangent t, positive where the surface bends away from the normal.
+        tangent t, positive where the surface curves away from the normal.
     gaussian_curvature : ndarray, (n,)
         Product of the two principal curvatures [1 / L^2], from local quadrics.
-    reach : ndarray, (n,)
-        Distance of the furthest corner of the Voronoi cell [L]: discs of this radius leave no hole.
+    cell_radius : ndarray, (n,)
+        Radius of the Voronoi cell [L], up to its furthest corner: discs of this radius leave no hole.
     boundary : ndarray, (n,) bool
         Points at a boundary of the surface.
     near_boundary : ndarray, (n,) bool
-        Points whose kernel reaches beyond a boundary.
+        Points whose kernel extends beyond a boundary.
     boundary_distance : ndarray, (n,)
-        Distance to the nearest boundary along the surface [L]; infinite where there is none near.
+        Distance to the nearest boundary along the surface [L]; infinite far from any.
     boundary_direction : ndarray, (n, 3)
         Unit vector across that boundary, out of the surface; zero where it is not known.
     component : ndarray, (n,) int
         Component of each point, the largest first; -1 for points that were left out.
     trust : ndarray, (n,)
-        How far the points around carry the answer, from 0 to 1: less than a half where no positive weights have the
-        moments of the kernel within a tenth, or where the neighbours miss a quadric by their spacing. 0 for points
-        left out.
+        How reliable results are, from 0 to 1: less than a half where no positive weights have the moments of the kernel
+        within a tenth, or where the neighbours deviate from a quadric by their spacing. 0 for points left out.
     smoothing_lengths : ndarray, (n,)
-        h of each point [L]; the kernel reaches 3 h.
+        h of each point [L]; the radius of the kernel is 3 h.
     kernel_widths : ndarray, (n,)
-        Smoothing length of the kernel that the balanced weights are like [L], by their fourth moment: what the symbol
-        correction goes by. Zero in the paper's operator, which has none.
+        Smoothing length of a kernel with the fourth moment of the balanced weights [L], for the symbol correction.
+        Zero in the paper's operator, which has none.
     stiffness : csr_array, (n, n)
         Symmetric positive semi-definite, rows sum to zero, no units. At a boundary it is the Neumann one: no flow
         across.
@@ -71,36 +78,41 @@ class LaplaceBeltrami:
     options : LaplacianOptions
         The settings it was built with.
     notices : list of str
-        What a user should know: merged duplicates, points left out, noise, a solver that stopped early.
+        Texts for the user: merged duplicates, points left out, noise, a solver that stopped early.
     """
 
-    points: np.ndarray
-    surface_points: np.ndarray
-    normals: np.ndarray
-    areas: np.ndarray
-    shape_operator: np.ndarray
-    gaussian_curvature: np.ndarray
-    reach: np.ndarray
-    boundary: np.ndarray
-    near_boundary: np.ndarray
-    boundary_distance: np.ndarray
-    boundary_direction: np.ndarray
-    component: np.ndarray
-    trust: np.ndarray
-    smoothing_lengths: np.ndarray
-    kernel_widths: np.ndarray
+    points: Floats
+    surface_points: Floats
+    normals: Floats
+    areas: Floats
+    shape_operator: Floats
+    gaussian_curvature: Floats
+    cell_radius: Floats
+    boundary: Bools
+    near_boundary: Bools
+    boundary_distance: Floats
+    boundary_direction: Floats
+    component: Ints
+    trust: Floats
+    smoothing_lengths: Floats
+    kernel_widths: Floats
     stiffness: sparse.csr_array
     images: sparse.csr_array
     options: LaplacianOptions
-    notices: list
+    notices: list[str]
 
     @property
-    def mean_curvature(self):
-        """Mean of the two principal curvatures of local quadrics, (n,) [1 / L]."""
+    def quadric_mean_curvature(self) -> Floats:
+        """Mean curvature of local quadrics through the nearest points, (n,) [1 / L].
+
+        `mean_curvature`, from the operator, averages over the kernel and is smoother on noisy points. Without noise the
+        two differ by 3 % on 800 even points of a sphere and by 0.3 % on 8,000, in the root mean square; on 8,000 points
+        of an ellipsoid with the axes 1, 0.6 and 0.3 by 3 %.
+        """
         return 0.5 * np.trace(self.shape_operator, axis1=1, axis2=2)
 
     @property
-    def dirichlet(self):
+    def dirichlet(self) -> tuple[sparse.csr_array, sparse.csr_array]:
         """The operator of functions with fixed values at the boundary, such as zero.
 
         Returns
@@ -115,7 +127,7 @@ class LaplaceBeltrami:
         pull = sparse.diags_array(self.images.sum(axis=1)) + self.images
         return (self.stiffness + 2.0 * self.images).tocsr(), pull.tocsr()
 
-    def toward(self, directions):
+    def toward(self, directions: ArrayLike) -> LaplaceBeltrami:
         """Return the same operator with normals that point to the side of given directions.
 
         Parameters
@@ -127,7 +139,7 @@ class LaplaceBeltrami:
         -------
         LaplaceBeltrami
             Normals, and the curvature that takes its sign from them, are reversed where they pointed against the
-            directions. All else is the same: the Laplacian knows no sides.
+            directions. All else is the same: the Laplacian does not depend on the side.
 
         Raises
         ------
@@ -150,18 +162,18 @@ class LaplaceBeltrami:
         >>> print(core.mean_curvature(inner).mean().round(2))
         -1.0
         """
-        directions = check_values(directions, len(self.normals))
-        if directions.ndim != 2 or directions.shape[1] != 3:
+        given = check_values(directions, len(self.normals))
+        if given.ndim != 2 or given.shape[1] != 3:
             raise InvalidPointsError(
-                f"Directions of shape {directions.shape} do not fit {len(self.normals)} normals. Give three numbers"
+                f"Directions of shape {given.shape} do not fit {len(self.normals)} normals. Give three numbers"
                 " for each."
             )
-        normals = toward(self.normals, directions)
+        normals = toward(self.normals, given)
         reversed_ = np.einsum("ij,ij->i", normals, self.normals) < 0.0
         shape_operator = np.where(reversed_[:, None, None], -self.shape_operator, self.shape_operator)
         return replace(self, normals=normals, shape_operator=shape_operator)
 
-    def apply(self, values, raw=False):
+    def apply(self, values: ArrayLike, raw: bool = False) -> Floats:
         """Apply the operator in its strong form.
 
         Parameters
@@ -174,8 +186,9 @@ class LaplaceBeltrami:
         Returns
         -------
         ndarray
-            Same shape as the values, their Laplacian [unit of values / L^2]: ``L f - mu2 / 8 L(h^2 L f)``, which takes
-            the kernel's width out to second order and stays self-adjoint and negative semi-definite; with `raw`, L f.
+            Same shape as the values, their Laplacian [unit of values / L^2]: ``L f - mu2 / 8 L(h^2 L f)``, which
+            corrects for the kernel's width to second order and stays self-adjoint and negative semi-definite; with
+            `raw`, L f.
 
         Raises
         ------
@@ -184,8 +197,8 @@ class LaplaceBeltrami:
 
         See Also
         --------
-        LaplaceBeltrami.eigenpairs : Functions that it only scales.
-        mean_curvature : What it makes of the coordinates.
+        LaplaceBeltrami.eigenpairs : Its eigenfunctions.
+        mean_curvature : Applies it to the coordinates.
         solve_poisson : Its inverse.
 
         Examples
@@ -201,16 +214,24 @@ class LaplaceBeltrami:
         0.0
         """
         check_switches(raw=raw)
-        values = check_values(values, len(self.areas))
+        checked = check_values(values, len(self.areas))
         areas, widths = self.areas, self.kernel_widths
-        if values.ndim == 2:
+        if checked.ndim == 2:
             areas, widths = areas[:, None], widths[:, None]
-        result = -(self.stiffness @ values) / areas
+        result: Floats = -(self.stiffness @ checked) / areas
         if raw:
             return result
         return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (widths**2 * result)) / areas
 
-    def eigenpairs(self, count, raw=False, *, dirichlet=False, tolerance=TOLERANCE, progress=None):
+    def eigenpairs(
+        self,
+        count: int,
+        raw: bool = False,
+        *,
+        dirichlet: bool = False,
+        tolerance: float = TOLERANCE,
+        progress: Progress | None = None,
+    ) -> Spectrum:
         """Compute the lowest eigenpairs of the negated operator, eq. (12).
 
         Parameters
@@ -220,10 +241,10 @@ class LaplaceBeltrami:
         raw : bool
             Leave out the symbol correction of the eigenvalues.
         dirichlet : bool
-            Dirichlet modes, which vanish at the boundary, instead of Neumann modes, which meet it level.
+            Dirichlet modes, which vanish at the boundary, instead of Neumann modes, whose derivative across it does.
         tolerance : float
-            Largest residual, see `Spectrum`. Errors of eigenvectors go by it, over the relative gap to the next
-            eigenvalue; those of eigenvalues by its square.
+            Largest residual, see `Spectrum`. Errors of eigenvectors are proportional to it, over the relative gap to
+            the next eigenvalue; those of eigenvalues to its square.
         progress : callable, optional
             Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -246,7 +267,7 @@ class LaplaceBeltrami:
         --------
         LaplaceBeltrami.corrected : The symbol correction alone.
         spectral_filter : Filters functions by modes.
-        heat_kernel_signature : Tells points apart by modes.
+        heat_kernel_signature : Distinguishes points by modes.
         segment : Finds parts by modes.
 
         Examples
@@ -265,7 +286,7 @@ class LaplaceBeltrami:
         spectrum = solve_spectrum(self, stiffness, count, tolerance, progress)
         return spectrum if raw else self.corrected(spectrum)
 
-    def corrected(self, spectrum):
+    def corrected(self, spectrum: Spectrum) -> Spectrum:
         """Apply the symbol correction to the eigenvalues of a raw spectrum.
 
         Parameters
@@ -288,15 +309,15 @@ class LaplaceBeltrami:
 
 
 def build_laplacian(
-    points,
-    normals=None,
-    options=LaplacianOptions(),
+    points: ArrayLike,
+    normals: ArrayLike | None = None,
+    options: LaplacianOptions = LaplacianOptions(),
     *,
-    boundary=None,
-    boundary_distance=None,
-    left_out=(),
-    progress=None,
-):
+    boundary: ArrayLike | None = None,
+    boundary_distance: ArrayLike | None = None,
+    left_out: ArrayLike = (),
+    progress: Progress | None = None,
+) -> LaplaceBeltrami:
     """Build the operator from a point cloud.
 
     Parameters
@@ -308,10 +329,10 @@ def build_laplacian(
     options : LaplacianOptions
         Settings.
     boundary : array_like, (k,) int or (n,) bool, optional
-        The points at the boundary, instead of those that the options would find.
+        The points at the boundary, instead of detected ones.
     boundary_distance : array_like, (n,), optional
         Distance of every point to the boundary along the surface [L], instead of a measured one; infinity where it is
-        far. With `boundary`, measured ones stand next to corners, where there are two boundaries.
+        far. With `boundary`, distances next to corners, where there are two boundaries, are measured nevertheless.
     left_out : array_like, (k,) int or (n,) bool, optional
         Points to leave out, such as `floaters`: on the others the operator is that of them alone.
     progress : callable, optional
@@ -324,8 +345,8 @@ def build_laplacian(
     Raises
     ------
     PointCloudError
-        The input has no sound answer; the text says why and what to do. Its children tell what it is: points, normals
-        or a boundary of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighbourhoods need
+        The input has no sound answer; the text says why and what to do. Its subclasses: points, normals or a boundary
+        of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighbourhoods need
         (`TooFewPointsError`), points along a curve (`NotASurfaceError`), components of too few points alone
         (`ComponentError`), more points than the free memory is enough for, before the start (`NotEnoughMemoryError`).
 
@@ -356,22 +377,24 @@ def build_laplacian(
     """
     report = progress or (lambda stage, fraction: None)
     check_options(options)
-    points = check_points(points)
-    check_memory(len(points), options)
+    checked = check_points(points)
+    check_memory(len(checked), options)
 
-    cloud = read_cloud(points, options, normals, boundary, boundary_distance, report, left_out)
+    cloud = read_cloud(checked, options, normals, boundary, boundary_distance, report, left_out)
     report("Areas", 0.5)
     distance = arc_length(cloud)
     areas = solve_areas(cloud, distance, lambda: report("Areas", 0.6))
 
     report("Operator", 0.8)
-    cloud = replace(cloud, pairs=replace(cloud.pairs, distance=distance))  # gives back that of the ways through space
+    cloud = replace(cloud, pairs=replace(cloud.pairs, distance=distance))  # frees the memory of distances in space
     stiffness = assemble_stiffness(cloud, distance, areas, lambda: report("Operator", 0.8))
-    return laplacian_of(points, cloud, areas, stiffness, options)
+    return laplacian_of(checked, cloud, areas, stiffness, options)
 
 
-def laplacian_of(points, cloud, areas, assembled, options):
-    """Give the caller what was computed for the distinct points in scaled coordinates.
+def laplacian_of(
+    points: Floats, cloud: Cloud, areas: Floats, assembled: Stiffness, options: LaplacianOptions
+) -> LaplaceBeltrami:
+    """Transfer the results for the distinct points in scaled coordinates to the caller's points and units.
 
     Parameters
     ----------
@@ -383,7 +406,7 @@ def laplacian_of(points, cloud, areas, assembled, options):
         Area elements in scaled coordinates.
     assembled : Stiffness
     options : LaplacianOptions
-        How the points were taken.
+        The settings they were built with.
 
     Returns
     -------
@@ -392,15 +415,15 @@ def laplacian_of(points, cloud, areas, assembled, options):
     scaled, pairs, notices = cloud.scaled, cloud.pairs, cloud.notices
     if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
         notices.append(
-            "The kernel of most points reaches over a third of the object, which is too wide for good results."
+            "The kernel of most points covers more than a third of the object, which is too wide for good results."
             " Add points, or lower the number of neighbors."
         )
     trust = _trust(cloud, assembled.residual)
     doubtful = np.sum(areas[trust < 0.5]) / np.sum(areas)
     if doubtful > _DOUBTFUL and options.bandwidth == "adaptive":  # the width of others is the caller's choice
         notices.append(
-            f"On {doubtful:.0%} of the surface the points tell too little of it: they are too few for its bends, lie in"
-            " rows, or between close sheets. The attribute lb_trust shows where. Add points there."
+            f"On {doubtful:.0%} of the surface the results are unreliable: the points are too few for its curvature,"
+            " lie in rows, or lie between close sheets. The attribute lb_trust shows where. Add points there."
         )
     return LaplaceBeltrami(
         points=points,
@@ -409,7 +432,9 @@ def laplacian_of(points, cloud, areas, assembled, options):
         areas=scaled.scatter(areas * scaled.scale**2 / scaled.copies, NO_AREA),
         shape_operator=scaled.scatter(cloud.shape_operator / scaled.scale, 0.0),
         gaussian_curvature=scaled.scatter(cloud.gaussian_curvature / scaled.scale**2, 0.0),
-        reach=scaled.scatter(cloud.reach * scaled.scale, np.median(cloud.reach) * scaled.scale),
+        cell_radius=scaled.scatter(
+            cloud.cell_radius * scaled.scale, float(np.median(cloud.cell_radius)) * scaled.scale
+        ),
         boundary=scaled.scatter(cloud.boundary.at_boundary, False),
         near_boundary=scaled.scatter(cloud.boundary.reached(pairs.lengths), False),
         boundary_distance=scaled.scatter(cloud.boundary.distance[:, 0] * scaled.scale, np.inf),
@@ -425,18 +450,20 @@ def laplacian_of(points, cloud, areas, assembled, options):
     )
 
 
-def _trust(cloud, residual):
-    """Return how far the points around carry the answer, (m,), from 0 to 1."""
+def _trust(cloud: Cloud, residual: Floats) -> Floats:
+    """Return how reliable results are, (m,), from 0 to 1."""
     return 1.0 / (1.0 + (residual / _FAR) ** 2 + (cloud.misfit / (_MISSED * cloud.spacing)) ** 2)
 
 
-def narrow_laplacian(laplacian, neighbors=NARROW, *, rows=None, progress=None):
+def narrow_laplacian(
+    laplacian: LaplaceBeltrami, neighbors: int = NARROW, *, rows: Ints | None = None, progress: Progress | None = None
+) -> LaplaceBeltrami:
     """Build an operator with few neighbours on the same points, to be factorised, or on some of them.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        Its normals, boundary, and the points that it takes the surface to be at are used.
+        Its normals, boundary and `surface_points` are used.
     neighbors : int
         Neighbours inside the kernel's support.
     rows : ndarray, (k,) int, optional
@@ -447,8 +474,8 @@ def narrow_laplacian(laplacian, neighbors=NARROW, *, rows=None, progress=None):
     Returns
     -------
     LaplaceBeltrami
-        Less accurate for functions, but it ends sharply at fixed points, and its factors are small. The given one if it
-        is as narrow already, and no rows are named.
+        Less accurate for functions, but sharp at fixed points, and with small factors. The given one if it is as narrow
+        already, and no rows are given.
     """
     options = replace(
         laplacian.options,

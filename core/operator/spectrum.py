@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -16,7 +15,7 @@ from ..arguments import real, whole
 from ..errors import PointCloudError, SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
-from ..types import Floats, Ints, Progress
+from ..types import Floats, Ints, Progress, Report
 
 if TYPE_CHECKING:
     from .laplacian import LaplaceBeltrami
@@ -104,14 +103,14 @@ def solve_spectrum(
 
 
 def _cut(laplacian: LaplaceBeltrami, count: int) -> float:
-    """Return what the wide kernel makes of twice Weyl's estimate 4 pi count / area of the highest eigenvalue wanted."""
+    """Return the raw eigenvalue for twice Weyl's estimate 4 pi count / area of the highest one wanted."""
     squared = np.mean(laplacian.smoothing_lengths**2)
     frequency = 8.0 * np.pi * count / laplacian.areas.sum() * squared
-    return symbol(np.sqrt(min(frequency, _FLAT**2))) / squared
+    return float(symbol(np.sqrt(min(frequency, _FLAT**2))) / squared)
 
 
 def symmetric_form(
-    laplacian: LaplaceBeltrami, stiffness: sparse.csr_array, report: Callable[..., Any] = lambda: None
+    laplacian: LaplaceBeltrami, stiffness: sparse.csr_array, report: Report = lambda: None
 ) -> tuple[Ints, Floats, sparse.csr_array]:
     """Return a matrix with the eigenvalues of the negated operator whose eigenvectors are orthonormal.
 

@@ -1,19 +1,27 @@
 """Pair weights of maximum entropy: as close to the kernel's as its own moments around every point allow."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..algebra import Anderson, inverses, on_all_cores
 from ..geometry import dots, frames
 from ..kernel import SECOND_MOMENT, SUPPORT
+from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
+
+if TYPE_CHECKING:
+    from ..geometry import Cloud, Patch
 
 _ROUNDS = 12  # of the solver, at most
 _ENOUGH = 1e-3  # root mean square of that over h, which a first moment makes of a slope, at which it stops
-_RIDGE = 1e-3  # of the entropy's curvature, where the points cannot tell the terms apart
-_LARGEST = 1.0  # most that the logarithm of a weight may change: where more is asked for the moments cannot be met
-_SMALLEST = 1e-8  # share of what rounds change that an extrapolation goes by: less would be rounding
+_RIDGE = 1e-3  # added to the entropy's Hessian, where the points do not determine the terms
+_LARGEST = 1.0  # largest change of the logarithm of a weight: where more is needed the moments cannot be met
+_SMALLEST = 1e-8  # regularization of the extrapolation, see `Anderson`
 _TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 
 
@@ -26,30 +34,32 @@ class Balance:
     factor : ndarray, (p,)
         By which each pair's weight is multiplied, positive.
     residual : ndarray, (m,)
-        What the moments of each point are off by, relatively.
+        Relative error of the moments of each point.
     """
 
-    factor: np.ndarray
-    residual: np.ndarray
+    factor: Floats
+    residual: Floats
 
 
-def balance_weights(cloud, distance, weights, areas, report=lambda: None):
+def balance_weights(
+    cloud: Cloud, distance: Floats, weights: Floats, areas: Floats, report: Report = lambda: None
+) -> Balance:
     """Find factors of the pair weights that give them the moments of the kernel.
 
     For the operator to be right on every function that is quadratic along the surface, the weights of a point i must
     have no first moment, ``sum_j w_ij u_ij = 0``, and the second moment ``sum_j w_ij u_ij u_ij^T = 2 v_i m_i I``, where
-    u_ij is the way to j along the surface as i sees it and m_i = 1 up to curvature. Of all symmetric positive weights
-    with these moments those are taken that are closest to the kernel's own in relative entropy (as in local
-    maximum-entropy approximation; Arroyo and Ortiz 2006): ``w_ij exp((p_i(u_ij) + p_j(u_ji)) / 2)`` with a quadratic
-    polynomial p_i without a constant for each point. Its coefficients solve a convex problem, whose gradient is what
-    the moments are off by.
+    u_ij is the offset of j in the tangent plane of i, as long as their distance along the surface, and m_i = 1 up to
+    curvature. Of all symmetric positive weights with these moments those are taken that are closest to the kernel's own
+    in relative entropy (as in local maximum-entropy approximation; Arroyo and Ortiz 2006):
+    ``w_ij exp((p_i(u_ij) + p_j(u_ji)) / 2)`` with a quadratic polynomial p_i without a constant for each point. Its
+    coefficients solve a convex problem, whose gradient is the error of the moments.
 
-    Next to a boundary images complete the sums, and functions do not change across it: quadratic are the square of the
-    distance to it, and what they are along it. A pair and its image take one factor.
+    Next to a boundary images complete the sums, and functions do not change across it: the quadratic ones are the
+    square of the distance to it, and those along it. A pair and its image take one factor.
 
-    It is solved by Newton's method point by point, the other ends of the pairs held, and Anderson's extrapolation from
-    the last rounds. Where a few points lie in a row, or on one side, no weights have these moments: the residual says
-    so.
+    It is solved by Newton's method point by point, the other ends of the pairs fixed, and Anderson's extrapolation from
+    the last rounds. Where a few points lie in a row, or on one side, no weights have these moments, and the residual
+    is large.
 
     Parameters
     ----------
@@ -84,15 +94,15 @@ def balance_weights(cloud, distance, weights, areas, report=lambda: None):
     return Balance(moments.factor(terms), residual)
 
 
-def _trace(cloud, weights, areas):
+def _trace(cloud: Cloud, weights: Floats, areas: Floats) -> Floats:
     """Return the trace of the weights' second moments over 4 areas, as the integral gives it, (m,).
 
-    That of the curved surface, times ``1 + mu2 Laplacian(h^2) / 8`` where h varies: pairs are as wide as h is in their
-    middle, which is on the side of the wider kernel more often.
+    That of the curved surface, times ``1 + mu2 Laplacian(h^2) / 8`` where h varies: h_ij of a pair is h at its middle,
+    which is on the side of the wider kernel more often.
     """
     pairs, squared = cloud.pairs, cloud.pairs.lengths**2
 
-    def changes(patch):
+    def changes(patch: Patch) -> tuple[list[Floats], list[Floats]]:
         change = weights[patch.pairs] * (patch.second(squared) - patch.first(squared))
         return [change], [-change]
 
@@ -101,20 +111,20 @@ def _trace(cloud, weights, areas):
 
 
 class _Edges:
-    """The terms of points next to boundaries, where the images make even what is odd across them."""
+    """The terms of points next to boundaries, where the images make all functions even across them."""
 
-    def __init__(self, cloud, tangents):
+    def __init__(self, cloud: Cloud, tangents: Floats) -> None:
         boundary, lengths = cloud.boundary, cloud.pairs.lengths[:, None]
         across = np.einsum("tci,isc->sti", tangents, boundary.outward)
         self._across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
         self._inside = np.minimum(boundary.distance / lengths, SUPPORT).T
         self._corner = self._inside[1] < SUPPORT
 
-    def terms(self, rows, x, y):
-        """Return the terms of the ways (x, y) from some points, (5, k).
+    def terms(self, rows: Ints, x: Floats, y: Floats) -> tuple[Floats, ...]:
+        """Return the terms of the offsets (x, y) from some points, (5, k).
 
-        What counts is the square of the distance n to the boundary: it grows by ``s^2 - 2 n s`` on a way that leads by
-        s towards it. Next to a corner, where there are two of them, that is all.
+        The first is the change of the squared distance n to the boundary, ``s^2 - 2 n s`` for an offset by s towards
+        it. Next to a corner, where there are two boundaries, there are no others.
         """
         (to_x, to_y), (other_x, other_y) = self._across[:, :, rows]
         along = to_x * y - to_y * x
@@ -126,28 +136,29 @@ class _Edges:
 
 
 class _Moments:
-    """The moments of weights around every point, in units of those that the kernel has."""
+    """The moments of weights around every point, in units of those of the kernel."""
 
-    def __init__(self, cloud, distance, weights, unit, report):
+    def __init__(self, cloud: Cloud, distance: Floats, weights: Floats, unit: Floats, report: Report) -> None:
         pairs, lengths = cloud.pairs, cloud.pairs.lengths
         self._pairs, self._weights, self._unit, self._report = pairs, weights, unit, report
-        # The ways from both ends, in the tangent planes there over h; next to boundaries, the terms of some pairs.
-        self._ways = np.empty((2, 2, len(weights)), dtype=np.float32)  # seven digits, of numbers about one
+        # The offsets from both ends, in the tangent planes there over h; next to boundaries, the terms of some pairs.
+        self._offsets = np.empty((2, 2, len(weights)), dtype=np.float32)  # seven digits, of numbers about one
         places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
         tangents = frames(cloud.normals)[:, :, 1:].transpose(2, 1, 0).copy()
         near, edges = cloud.boundary.reached(lengths), _Edges(cloud, tangents)
         edge = np.where(near, np.arange(len(near)), -1)
 
-        def describe(patch):
-            ends, reach = (patch.first, patch.second), distance[patch.pairs]
+        def describe(patch: Patch) -> list[tuple[Ints, Any]]:
+            ends, length = (patch.first, patch.second), distance[patch.pairs]
             chord, left, right = patch.second(places) - patch.first(places), patch.first(normals), patch.second(normals)
             right *= np.where(dots(left, right) < 0.0, -1.0, 1.0)
-            # How far the geodesic bends away from the chord, to third order, within the tangent plane.
-            turn = (dots(chord, right) - dots(chord, left)) / 6.0
-            at_edges = []
-            for stored, end, way in zip(self._ways, ends, (chord + turn * right, turn * left - chord), strict=True):
-                x, y = (dots(way, end(axis)) for axis in tangents)
-                size = reach / (np.maximum(np.hypot(x, y), 1e-300) * end(lengths))
+            # The initial direction of the geodesic differs from the chord by its curvature, to third order.
+            change = (dots(chord, right) - dots(chord, left)) / 6.0
+            at_edges: list[tuple[Ints, Any]] = []
+            offsets = chord + change * right, change * left - chord
+            for stored, end, offset in zip(self._offsets, ends, offsets, strict=True):
+                x, y = (dots(offset, end(axis)) for axis in tangents)
+                size = length / (np.maximum(np.hypot(x, y), 1e-300) * end(lengths))
                 stored[:, patch.pairs] = x, y = x * size, y * size
                 point = end(edge)
                 rows = np.flatnonzero(point >= 0)
@@ -157,32 +168,32 @@ class _Moments:
         at_edges = on_all_cores(describe, pairs.patches, report)
         self._at_edges = {patch.pairs.start: found for patch, found in zip(pairs.patches, at_edges, strict=True)}
 
-    def factor(self, terms):
+    def factor(self, terms: Floats) -> Floats:
         """Return the factor of each pair's weight, (p,)."""
         terms, result = terms.T.copy(), np.empty(len(self._weights))
 
-        def evaluate(patch):
+        def evaluate(patch: Patch) -> None:
             result[patch.pairs] = _factor(patch, self._basis(patch), terms)
 
         on_all_cores(evaluate, self._pairs.patches, self._report)
         return result
 
-    def of(self, terms):
+    def of(self, terms: Floats) -> Floats:
         """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
         terms = terms.T.copy()
 
-        def weighted(patch):
+        def weighted(patch: Patch) -> Floats:
             basis = self._basis(patch)
             basis *= self._weights[patch.pairs] * _factor(patch, basis, terms)
             return basis
 
         return self._sums(weighted, _TERMS)
 
-    def curvature(self):
+    def curvature(self) -> Floats:
         """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
         places = [(i, j) for i in range(_TERMS) for j in range(i + 1)]
 
-        def products(patch):
+        def products(patch: Patch) -> list[list[Floats]]:
             basis = self._basis(patch)
             weighted = self._weights[patch.pairs] * basis
             return [[own[i] * other[j] for i, j in places] for own, other in zip(weighted, basis, strict=True)]
@@ -192,17 +203,17 @@ class _Moments:
         result[:, left, right] = result[:, right, left] = self._sums(products, len(places))
         return result
 
-    def _sums(self, values, count):
-        """Return the sums of what pairs have at both ends, in the unit, (m, count)."""
+    def _sums(self, values: Callable[[Patch], Any], count: int) -> Floats:
+        """Return the sums of quantities of pairs at both ends, in the unit, (m, count)."""
         return (self._pairs.over_ends(values, count, self._report) / self._unit).T
 
-    def _basis(self, patch):
+    def _basis(self, patch: Patch) -> Floats:
         """Return the terms of the pairs of a patch, (2, 5, pairs), as each end sees them."""
         result = np.empty((2, _TERMS, patch.pairs.stop - patch.pairs.start))
         at_edges = self._at_edges[patch.pairs.start]
-        for basis, way, (rows, terms) in zip(result, self._ways[:, :, patch.pairs], at_edges, strict=True):
+        for basis, offset, (rows, terms) in zip(result, self._offsets[:, :, patch.pairs], at_edges, strict=True):
             square, x, y, difference, product = basis
-            x[:], y[:] = way
+            x[:], y[:] = offset
             np.multiply(x, x, out=square)
             np.multiply(y, y, out=product)
             np.subtract(square, product, out=difference)
@@ -212,7 +223,7 @@ class _Moments:
         return result
 
 
-def _factor(patch, basis, terms):
+def _factor(patch: Patch, basis: Floats, terms: Floats) -> Floats:
     """Return the factor of the weights of a patch, from the terms of its pairs and their coefficients, (5, m)."""
     power = np.einsum("tp,tp->p", basis[0], patch.first(terms))
     power += np.einsum("tp,tp->p", basis[1], patch.second(terms))

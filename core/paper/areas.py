@@ -1,12 +1,18 @@
 """Area elements by the paper's least squares, eqs. (6) to (8), and its Algorithm 1."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
 from ..algebra import bounded_quadratic, conjugate_gradients
 from ..errors import AreaError
+from ..operator import KernelMatrix
+from ..types import Array, Floats
+
+Matrix: TypeAlias = KernelMatrix | Floats
 
 _RTOL = 1e-12  # a looser one leaves areas open by as much as themselves: small eigenvalues weigh as little as rho
 _START = 1000  # products for a start that need not be exact
@@ -24,15 +30,17 @@ class AreaSolution:
     products : int
         Products with the kernel matrix.
     residual : float
-        What is left of the equations, as a share, where the solver did not reach its tolerance, and zero where it did.
+        Relative residual of the equations where the solver did not reach its tolerance, and zero where it did.
     """
 
-    areas: np.ndarray
+    areas: Floats
     products: int
     residual: float = 0.0
 
 
-def regularized_areas(matrix, target, rho, products=8000, rtol=_RTOL):
+def regularized_areas(
+    matrix: Matrix, target: Floats, rho: float, products: int = 8000, rtol: float = _RTOL
+) -> AreaSolution:
     """Minimise |A v - b|^2 + rho |v|^2, eq. (7), without a bound.
 
     A is symmetric, so the solution (A^2 + rho)^(-1) A b is the real part of (A + i sqrt(rho))^(-1) b. That system has
@@ -47,12 +55,13 @@ def regularized_areas(matrix, target, rho, products=8000, rtol=_RTOL):
     count = len(target)
     density = 1.0 / (matrix @ np.ones(count))
 
-    def multiply(v):
+    def multiply(v: Array) -> Array:
         return (matrix @ v.real) + 1j * (matrix @ v.imag) + 1j * np.sqrt(rho) * v
 
     shifted = LinearOperator((count, count), matvec=multiply, dtype=complex)
-    values, used, left = None, 1, np.inf
-    # Sums from step to step lose digits: again from where they led, until what is left is known to be so little.
+    values: Array = np.zeros(count, dtype=complex)
+    used, left = 1, np.inf
+    # The updated residual loses digits: solve again from the last solution, until the true residual is so small.
     while left > rtol and used + 2 < products:
         found = conjugate_gradients(
             shifted, target.astype(complex), values, density, rtol=rtol, products=(products - used) // 2
@@ -62,7 +71,9 @@ def regularized_areas(matrix, target, rho, products=8000, rtol=_RTOL):
     return AreaSolution(values.real, used, left if left > rtol else 0.0)
 
 
-def constrained_areas(matrix, target, rho, products=8000, rtol=_RTOL):
+def constrained_areas(
+    matrix: Matrix, target: Floats, rho: float, products: int = 8000, rtol: float = _RTOL
+) -> AreaSolution:
     """Minimise |A v - b|^2 + rho |v|^2 with v >= tau, eq. (8), starting from the solution of eq. (7).
 
     Returns
@@ -108,15 +119,25 @@ class DescentResult:
         The guard ended the Armijo search: no step changed F by more than its rounding.
     """
 
-    areas: np.ndarray
-    objective: np.ndarray
+    areas: Floats
+    objective: Floats
     steps: int
     residual: float
     converged: bool
     stalled: bool
 
 
-def algorithm_1(matrix, target, start, rho=1e-3, epsilon=1e-3, nu=1e-4, beta=0.1, omega=1e-10, steps=100_000):
+def algorithm_1(
+    matrix: Matrix,
+    target: Floats,
+    start: Floats,
+    rho: float = 1e-3,
+    epsilon: float = 1e-3,
+    nu: float = 1e-4,
+    beta: float = 0.1,
+    omega: float = 1e-10,
+    steps: int = 100_000,
+) -> DescentResult:
     """Minimise eq. (8) by the paper's Algorithm 1: projected gradient steps with an Armijo-like search.
 
     Parameters
@@ -126,7 +147,7 @@ def algorithm_1(matrix, target, start, rho=1e-3, epsilon=1e-3, nu=1e-4, beta=0.1
     target : ndarray, (n,)
         b.
     start : ndarray, (n,)
-        The solution of eq. (7); entries below tau are put on it.
+        The solution of eq. (7); entries below tau are set to it.
     rho, epsilon, nu, beta, omega : float
         As in the paper.
     steps : int
@@ -143,9 +164,9 @@ def algorithm_1(matrix, target, start, rho=1e-3, epsilon=1e-3, nu=1e-4, beta=0.1
     than a few units in its last place, and the result says that it stalled.
     """
 
-    def evaluate(v):
+    def evaluate(v: Floats) -> tuple[Floats, float]:
         misfit = matrix @ v - target
-        return misfit, misfit @ misfit + rho * (v @ v)
+        return misfit, float(misfit @ misfit + rho * (v @ v))
 
     v = np.maximum(start, TAU)
     misfit, value = evaluate(v)
@@ -171,7 +192,7 @@ def algorithm_1(matrix, target, start, rho=1e-3, epsilon=1e-3, nu=1e-4, beta=0.1
     return DescentResult(v, np.array(objective), len(objective) - 1, residual, residual <= epsilon, stalled)
 
 
-def _positive_areas(matrix, target, rho):
+def _positive_areas(matrix: Matrix, target: Floats, rho: float) -> AreaSolution:
     solution = regularized_areas(matrix, target, rho)
     bad = int(np.count_nonzero(solution.areas <= 0.0))
     if bad:
@@ -182,10 +203,14 @@ def _positive_areas(matrix, target, rho):
     return solution
 
 
-def _uniform_areas(matrix, target, rho):
+def _uniform_areas(matrix: Matrix, target: Floats, rho: float) -> AreaSolution:
     solution = regularized_areas(matrix, target, rho)
     return replace(solution, areas=np.full(len(target), solution.areas.mean()))
 
 
-AREAS = {"constrained": constrained_areas, "regularized": _positive_areas, "uniform": _uniform_areas}
+AREAS: dict[str, Callable[[Matrix, Floats, float], AreaSolution]] = {
+    "constrained": constrained_areas,
+    "regularized": _positive_areas,
+    "uniform": _uniform_areas,
+}
 """Function of each choice of `PaperOptions.areas`."""

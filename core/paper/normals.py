@@ -1,18 +1,19 @@
-"""Normals by principal component analysis, eq. (9), and what the paper does against noise by such planes."""
+"""Normals by principal component analysis, eq. (9), and denoising by such planes."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..errors import NotASurfaceError
-from ..geometry import fading_weights
+from ..geometry import Pairs, fading_weights
 from ..kernel import kernel
+from ..types import Floats
 
-_AROUND = 90  # neighbours of a plane that a point is taken onto
-_BLOCK = 1 << 12  # points taken at one time
+_AROUND = 90  # neighbours of a plane that a point is projected onto
+_BLOCK = 1 << 12  # points
 
 
-def covariance_normals(pairs, weighted=True):
+def covariance_normals(pairs: Pairs, weighted: bool = True) -> Floats:
     """Estimate unit normals by (weighted) principal component analysis, eq. (9).
 
     Parameters
@@ -35,10 +36,9 @@ def covariance_normals(pairs, weighted=True):
     points = pairs.points
     if weighted:
         weights = pairs.half(kernel(pairs.distance / pairs.mean(pairs.lengths)))
-        own = kernel(0.0)
     else:
         weights = pairs.half(np.ones(len(pairs.first)))
-        own = 1.0
+    own = kernel(0.0) if weighted else 1.0
     axes = np.triu_indices(3)
     moments = np.column_stack([np.ones(len(points)), points, points[:, axes[0]] * points[:, axes[1]]])
     moments = own * moments + weights @ moments + weights.T @ moments
@@ -58,8 +58,8 @@ def covariance_normals(pairs, weighted=True):
     return np.ascontiguousarray(directions[:, :, 0])
 
 
-def tangent_planes(points):
-    """Take every point onto the plane through its neighbours, as section 6 does for noisy points.
+def tangent_planes(points: Floats) -> Floats:
+    """Project every point onto the plane through its neighbours, as section 6 does for noisy points.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def tangent_planes(points):
     """
     tree, result = cKDTree(points), np.empty_like(points)
 
-    def project(part):
+    def project(part: slice) -> None:
         distance, index = tree.query(points[part], k=min(_AROUND + 1, len(points)))
         weight = fading_weights(distance)
         weight /= weight.sum(axis=1, keepdims=True)

@@ -3,29 +3,31 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..algebra import on_all_cores
-from ..geometry import check_points, pair_heights, read_cloud, toward
+from ..geometry import Cloud, Pairs, Patch, check_points, pair_heights, read_cloud, toward
 from ..kernel import pair_kernel
 from ..memory import check_memory
-from ..operator import KernelMatrix, Stiffness, laplacian_of, stiffness_matrix
+from ..operator import KernelMatrix, LaplaceBeltrami, Stiffness, laplacian_of, stiffness_matrix
 from ..options import PaperOptions
+from ..types import Floats, Progress
 from .areas import AREAS
 from .normals import covariance_normals, tangent_planes
 
 
 def build_laplacian(
-    points,
+    points: ArrayLike,
     *,
-    areas="constrained",
-    normals="wpca",
-    regularization=1e-3,
-    neighbors=100,
-    denoise=False,
-    left_out=(),
-    progress=None,
-):
+    areas: str = "constrained",
+    normals: str | ArrayLike = "wpca",
+    regularization: float = 1e-3,
+    neighbors: int = 100,
+    denoise: bool = False,
+    left_out: ArrayLike = (),
+    progress: Progress | None = None,
+) -> LaplaceBeltrami:
     """Build the paper's operator: one smoothing length, no boundary, none of the corrections of the default.
 
     Parameters
@@ -40,9 +42,9 @@ def build_laplacian(
     regularization : float
         rho of eqs. (7) and (8), in coordinates scaled to a root mean square radius of one.
     neighbors : int
-        h is the mean distance to this neighbour; the kernel reaches 3 h, to some nine times as many.
+        h is the mean distance to this neighbour; the radius of the kernel is 3 h, for some nine times as many.
     denoise : bool
-        Take every point onto the plane through its neighbours first, as section 6 does for noisy points.
+        Project every point onto the plane through its neighbours first, as section 6 does for noisy points.
     left_out : array_like, (k,) int or (n,) bool, optional
         Points to leave out.
     progress : callable, optional
@@ -76,9 +78,7 @@ def build_laplacian(
 
     >>> import numpy as np
     >>> import core
-    >>> z = 1 - (np.arange(800) + 0.5) / 400  # 800 points, evenly on the unit sphere
-    >>> ring = np.sqrt(1 - z**2) * np.exp(2.39996j * np.arange(800))
-    >>> points = np.column_stack([ring.real, ring.imag, z])
+    >>> points = core.example_sphere()
     >>> print(core.paper.build_laplacian(points).areas.sum().round(2))
     12.57
     """
@@ -86,14 +86,14 @@ def build_laplacian(
     given = None if isinstance(normals, str) else normals
     options = PaperOptions(
         areas=areas,
-        normals=normals if given is None else "wpca",
+        normals=normals if isinstance(normals, str) else "wpca",
         regularization=regularization,
         neighbors=neighbors,
         denoise=denoise,
     )
-    points = check_points(points)
-    check_memory(len(points), options.cloud)
-    places = tangent_planes(points) if denoise else points
+    checked = check_points(points)
+    check_memory(len(checked), options.cloud)
+    places = tangent_planes(checked) if denoise else checked
     cloud = read_cloud(places, options.cloud, given, progress=report, left_out=left_out)
     pairs, scaled = cloud.pairs, cloud.scaled
     if given is None:
@@ -110,11 +110,11 @@ def build_laplacian(
         )
 
     report("Operator", 0.8)
-    cloud = replace(cloud, moved=(places - points)[scaled.first] / scaled.scale)
-    return laplacian_of(points, cloud, solution.areas, symmetrized_operator(cloud, solution.areas), options.cloud)
+    cloud = replace(cloud, moved=(places - checked)[scaled.first] / scaled.scale)
+    return laplacian_of(checked, cloud, solution.areas, symmetrized_operator(cloud, solution.areas), options.cloud)
 
 
-def symmetrized_operator(cloud, areas):
+def symmetrized_operator(cloud: Cloud, areas: Floats) -> Stiffness:
     """Assemble ``-D G D`` of eq. (10): a pair is projected on one plane, that of its mean normal.
 
     Parameters
@@ -127,7 +127,7 @@ def symmetrized_operator(cloud, areas):
     Returns
     -------
     Stiffness
-        Without images in boundaries, and without a width for the symbol correction to go by.
+        Without images in boundaries and widths for the symbol correction.
     """
     pairs, count = cloud.pairs, len(cloud.scaled.inverse)
     h = pairs.mean(pairs.lengths)
@@ -139,7 +139,7 @@ def symmetrized_operator(cloud, areas):
     return Stiffness(matrix, sparse.csr_array((count, count)), none, none)
 
 
-def projected_distance(pairs, normals):
+def projected_distance(pairs: Pairs, normals: Floats) -> Floats:
     """Return the length of each pair's difference in the plane orthogonal to its mean normal, eq. (10).
 
     Parameters
@@ -156,7 +156,7 @@ def projected_distance(pairs, normals):
     result = np.empty(len(pairs.first))
     points, normals = pairs.points.T.copy(), normals.T.copy()
 
-    def measure(patch):
+    def measure(patch: Patch) -> None:
         _, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
         side = np.where(cosine < 0.0, -1.0, 1.0)
         # The mean of two unit normals has the squared length (1 + cos) / 2.
@@ -167,7 +167,7 @@ def projected_distance(pairs, normals):
     return result
 
 
-def unsymmetrized_operator(pairs, normals, areas):
+def unsymmetrized_operator(pairs: Pairs, normals: Floats, areas: Floats) -> sparse.csr_array:
     """Assemble the operator of eq. (5): each row projects its neighbours on its own tangent plane.
 
     Parameters

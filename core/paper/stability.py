@@ -6,10 +6,12 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..operator import LaplaceBeltrami
+
 
 @dataclass(frozen=True, kw_only=True)
 class Stability:
-    """What Theorem 1 asks of a cloud, and what it promises of the operator.
+    """The assumptions of Theorem 1 on a cloud, and its conclusions on the operator.
 
     Attributes
     ----------
@@ -36,7 +38,7 @@ class Stability:
     column_sum: float
     components: int
 
-    def concerns(self):
+    def concerns(self) -> list[str]:
         """Return a sentence for each assumption that does not hold comfortably; none for a sound operator."""
         found = []
         if self.area_ratio > 1e4:
@@ -53,7 +55,7 @@ class Stability:
         return found
 
 
-def check_stability(laplacian):
+def check_stability(laplacian: LaplaceBeltrami) -> Stability:
     """Measure the assumptions (A1) to (A4) of Theorem 1 and the two kernels it names.
 
     Parameters
@@ -73,7 +75,7 @@ def check_stability(laplacian):
 
     Examples
     --------
-    A closed surface in one piece, where only constants have no Laplacian:
+    A closed surface of one component, where only constants have no Laplacian:
 
     >>> import numpy as np
     >>> import core
@@ -85,14 +87,14 @@ def check_stability(laplacian):
     """
     known = np.flatnonzero(laplacian.component >= 0)
     distinct, first = np.unique(laplacian.points[known], axis=0, return_index=True)
-    reach = cKDTree(distinct).query(distinct, k=[min(7, len(distinct))], workers=-1)[0][:, 0]
+    spacing = cKDTree(distinct).query(distinct, k=[min(7, len(distinct))], workers=-1)[0][:, 0]
     stiffness, areas = laplacian.stiffness[known][:, known], laplacian.areas[known]
     largest = stiffness.diagonal().max()
     return Stability(
         area_ratio=float(areas.max() / areas.min()),
-        fill_distance=float(reach.max()),
+        fill_distance=float(spacing.max()),
         most_neighbors=int(np.diff(stiffness.indptr).max()),
-        least_bandwidth=float((laplacian.smoothing_lengths[known[first]] / reach).min()),
+        least_bandwidth=float((laplacian.smoothing_lengths[known[first]] / spacing).min()),
         row_sum=float(np.abs(stiffness.sum(axis=1)).max() / largest),
         column_sum=float(np.abs(stiffness.sum(axis=0)).max() / largest),
         components=int(connected_components(stiffness, directed=False, return_labels=False)),

@@ -27,7 +27,7 @@ _PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_an
 
 
 class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
-    """Keep the deformation of each frame in the file, for machines without the extension"""
+    """Store the deformation of each frame in the file, for machines without the extension"""
 
     bl_idname = "meshfree.deform_bake"
     bl_label = "Bake"
@@ -42,7 +42,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
     last: IntProperty(name="Last Frame", description="Last frame to bake", default=0, min=0, max=_LAST)
     harmonics: BoolProperty(
         name="View-Dependent Colors",
-        description="Of Gaussian splats, let the harmonics turn in each frame, which takes 12 bytes for each of them",
+        description="Rotate the harmonics of Gaussian splats in each frame, which takes 12 bytes for each of them",
         default=True,
     )
     asks = ("first", "last")
@@ -219,7 +219,7 @@ class _Kept:
 
 
 class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
-    """Remove what was baked, and let the points follow the handles again"""
+    """Remove the baked animation, and let the points follow the handles again"""
 
     bl_idname = "meshfree.deform_free"
     bl_label = "Delete Bake"

@@ -19,12 +19,13 @@ from ..objects.attributes import (
     in_edit_mesh,
     point_count,
     read_attribute,
+    remove_attributes,
     write_attribute,
 )
 from ..objects.carried import moved_names
 from ..objects.counting import members, weighted_checksum
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.options import laplacian_options, settings_values
 from ..objects.quantities import DISPLACEMENT
 from ..objects.reading import TYPES, boundary_points, fingerprint, sharing_objects
@@ -349,11 +350,9 @@ def forget(obj):
     settings = obj.meshfree.deform
     settings.is_bound = False
     settings.handle_items.clear()
-    for name in (*WRITES, *moved_names(obj.data)):
-        if obj.data.attributes.get(name) is not None:
-            obj.data.attributes.remove(obj.data.attributes[name])
+    remove_attributes(obj.data, *WRITES, *moved_names(obj.data))
     obj.data.pop(POSE, None)
     modifier = find_deform(obj)
     if modifier is not None:
         obj.modifiers.remove(modifier)
-        tell("shape_changed", obj)
+        notify("shape_changed", obj)

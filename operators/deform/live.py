@@ -19,9 +19,9 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core import Cancelled
-from ..objects.handlers import add_handlers, remove_handlers, tell
+from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..running.job import STOPPED, Job, running
-from ..running.ready import TROUBLES, told
+from ..running.ready import TROUBLES, error_text
 from .binding import bound_objects, forget_bound, is_bound, read_binding, stale_reason
 from .follower import Follower
 from .nodes import is_baked
@@ -70,15 +70,15 @@ class _Followed:
     troubled: np.ndarray | None = None
 
 
-class _Turn:
-    """Lets one thread at a time update: a render has one of its own."""
+class _UpdateLock:
+    """A lock that lets one thread at a time update, since renders have a thread of their own."""
 
     def __init__(self):
         self._lock, self._owner = threading.Lock(), None
 
     @contextmanager
-    def taken(self):
-        """Wait for the turn, and say whether this thread was not updating already, which updates call up."""
+    def held(self):
+        """Hold the lock; yield False if this thread holds it already, since updates trigger handlers."""
         if self._owner == threading.get_ident():
             yield False
             return
@@ -92,11 +92,11 @@ class _Turn:
 
 _followers = {}  # by `binding_key`
 _followed = defaultdict(_Followed)  # by the object's session_uid, which undo does not change
-_turn = _Turn()
+_lock = _UpdateLock()
 
 
 def state(obj) -> tuple:
-    """Return how a bound object follows its handles, as far as a glance tells, and what to say of that, a text."""
+    """Return the state of a bound object, by a glance, and a text about it."""
     reason = stale_reason(obj, glance=True)
     if reason:
         return State.BAKED if is_baked(obj) else State.STALE, reason
@@ -185,12 +185,12 @@ def update(obj, depsgraph=None, wanted=State.SETTLED):
 
 def update_all(scene, depsgraph, wanted):
     """Let all bound objects of a scene follow; what goes wrong is for the panel, since nobody called this."""
-    with _turn.taken() as free:
+    with _lock.held() as free:
         for obj in _editable(scene) if free else ():
             try:
                 update(obj, depsgraph, wanted)
             except TROUBLES as error:
-                _note(obj, told(error))
+                _note(obj, error_text(error))
 
 
 def _note(obj, trouble, pose=None):
@@ -230,10 +230,10 @@ def _tick():
         shown.update((obj.session_uid, (obj, depsgraph)) for obj in _editable(window.scene))
     for uid in _followed.keys() - shown.keys():
         _drop(_followed[uid])
-    with _turn.taken():
+    with _lock.held():
         waiting = [_attend(obj, depsgraph) for obj, depsgraph in shown.values()]
     if any(waiting):
-        tell("panels_changed")
+        notify("panels_changed")
     return _TICK if any(waiting) else None
 
 
@@ -257,7 +257,7 @@ def _attend(obj, depsgraph) -> bool:
         elif thread.prepares:
             thread.work.show(bpy.context)
     except TROUBLES as error:
-        _note(obj, told(error), thread and thread.pose)
+        _note(obj, error_text(error), thread and thread.pose)
         return thread is not None  # else wait for another pose, not to go wrong again at once
     return True
 
@@ -340,7 +340,7 @@ def _on_undo(scene, *_):
 
 @persistent
 def _on_render(scene, *_):
-    """Settle what a still picture would show on its way; frames of an animation come with a change of the frame."""
+    """Settle the frame of a still; frames of an animation come with a frame change."""
     update_all(scene, None, State.SETTLED)
 
 

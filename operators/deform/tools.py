@@ -1,4 +1,4 @@
-"""Deform objects by handles: bind once, then move the handles; take the result over, or take it back."""
+"""Deform objects by handles: bind once, then move the handles; apply the result, or reset it."""
 
 from dataclasses import replace
 
@@ -22,8 +22,9 @@ from ..objects.attributes import (
 )
 from ..objects.carried import carried, shown_moved
 from ..objects.groups import ANCHOR, HANDLE, assign, check_assignable, group_weights, handle_names, has_group
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.modifiers import get_input
+from ..objects.place import activate
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
 from ..objects.result import length_text
@@ -55,7 +56,7 @@ from .pose import POSE, State, is_there, read_pose, relative_matrix, write_displ
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
-    """Make the selected points one more handle: a group of its own, which Bind gives an empty"""
+    """Make the selected points another handle: a group of its own, for which Bind adds an empty"""
 
     bl_idname = "meshfree.handle_add"
     bl_label = "Add Handle"
@@ -91,7 +92,7 @@ class HandledOperator(ReadyOperator):
 
 
 class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Operator):
-    """Prepare the deformation: the points of some groups are moved, those of another stay, and all others follow"""
+    """Prepare the deformation: points of some groups are moved, those of another stay, and all others follow"""
 
     bl_idname = "meshfree.deform_bind"
     bl_label = "Bind"
@@ -120,8 +121,8 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         edited = constraints.moved[~np.array(by_empty)[constraints.owner]]
         if len(edited) and (shape_keys(obj) is not None or obj.meshfree.use_modifiers):
             raise PointCloudError(
-                f'The {len(edited)} handles of "{obj.name}" have no empty, and to move them in Edit Mode takes'
-                " a mesh without shape keys whose modifiers are not used. Turn on Add Empties."
+                f'Moving the {len(edited)} handles of "{obj.name}" in Edit Mode requires a mesh without shape keys and'
+                " used modifiers. Turn on Add Empties."
             )
         if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
             rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
@@ -148,7 +149,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
             empties.append(moved_by)
         record(obj, rest, binding.matrix, constraints, empties)
         add_deform(obj)
-        tell("shape_changed", obj)
+        notify("shape_changed", obj)
         # Blender crashes when it draws what a render's handlers change, and handles are there to be animated.
         context.scene.render.use_lock_interface = True
         live.keep(obj, follower)
@@ -157,16 +158,13 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         live.update(obj, wanted=State.SETTLED if bpy.app.background else State.PREPARING)
         moved, stay = len(constraints.moved), len(constraints.kept)
         press = "Press G or R to move" if self.at_once else "Move"
-        way = f'{press} "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
-        return [*follower.quick.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {way}"]
+        advice = f'{press} "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
+        return [*follower.quick.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {advice}"]
 
     def conclude(self, context, objects):
         item = objects[0].meshfree.deform.handle_items[0]
         if self.at_once and item.has_empty and item.empty.name in context.view_layer.objects:
-            for other in context.selected_objects:
-                other.select_set(False)
-            item.empty.select_set(True)
-            context.view_layer.objects.active = item.empty
+            activate(context, item.empty)
 
 
 def _plan_ends(context, obj):
@@ -278,7 +276,7 @@ def check_fresh(obj):
 
 
 class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.Operator):
-    """Let all points follow the handles to where they are now, which happens by itself when they are moved"""
+    """Compute the full deformation for the present handles, as happens automatically when they are moved"""
 
     bl_idname = "meshfree.deform_update"
     bl_label = "Update"
@@ -300,20 +298,19 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
         live.keep(obj, follower)
         live.write(obj, follower, moved, pose)
         distance = np.linalg.norm(moved.points - follower.quick.points, axis=1)
-        notices = [] if moved.converged else ["The turns of details were still changing. Raise Steps."]
+        notices = [] if moved.converged else ["The rotations had not converged. Raise Steps."]
         return [*notices, f"{obj.name}: moved at most by {length_text(distance.max())}"]
 
 
 class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
-    """Move the points themselves to where the deformation shows them, and go on from there"""
+    """Apply the deformation to the points, as the new rest shape"""
 
     bl_idname = "meshfree.deform_apply"
     bl_label = "Apply"
 
     keep_keyframes: BoolProperty(
         name="Keep Keyframes",
-        description="Let the handles keep the keyframes that move them, which bend the applied shape from the next"
-        " frame on",
+        description="Keep the keyframes of the handles, which deform the applied shape again from the next frame on",
         default=False,
     )
 
@@ -358,12 +355,12 @@ def _lost_keyframes(scene, empties):
     names = ", ".join(f'"{empty.name}"' for empty in empties)
     return (
         f"The keyframes that moved {names} were removed: the shape of frame {scene.frame_current} is at rest now, and"
-        " they would bend it once more. Undo, and turn on Keep Keyframes, to keep them."
+        " they would deform it again. Undo, and turn on Keep Keyframes, to keep them."
     )
 
 
 class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
-    """Keep the deformation as a shape key of value zero, or as a modifier like one, and put the handles back"""
+    """Store the deformation as a shape key of value zero, or as a modifier like one, and reset the handles"""
 
     bl_idname = "meshfree.deform_to_shape_key"
     bl_label = "To Shape Key"
@@ -407,7 +404,7 @@ def _free_name(obj, name):
 
 
 class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
-    """Put the handles back to where they were bound, and all points to rest"""
+    """Reset the handles to where they were bound, and all points to rest"""
 
     bl_idname = "meshfree.deform_reset"
     bl_label = "Reset"
@@ -419,7 +416,7 @@ class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
 
 
 class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
-    """Let go of the handles: points go back to rest, and the modifier and its attributes are removed"""
+    """Remove the binding: points return to rest, and the modifier and its attributes are removed"""
 
     bl_idname = "meshfree.deform_unbind"
     bl_label = "Unbind"

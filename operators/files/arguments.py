@@ -25,7 +25,7 @@ def add_setting(parser, setting):
 
 
 def _number(setting, convert):
-    """Return what turns a text into a number for a setting, and refuses those that Blender would silently replace."""
+    """Return a function that parses a number for a setting, and refuses those that Blender would silently clamp."""
 
     def number(text):
         value = convert(text)
@@ -37,7 +37,7 @@ def _number(setting, convert):
 
 
 def place(text):
-    """Turn X,Y,Z into a place or a direction, (3,) float64."""
+    """Parse X,Y,Z as a position or a direction, (3,) float64."""
     found = as_place(text)
     if found is None:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z")
@@ -45,7 +45,7 @@ def place(text):
 
 
 def as_place(text):
-    """Turn X,Y,Z into a place, (3,) float64; None if the text is something else."""
+    """Parse X,Y,Z as a position, (3,) float64; None if the text is something else."""
     try:
         found = np.array([float(word) for word in text.split(",")])
     except ValueError:

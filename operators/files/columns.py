@@ -62,11 +62,11 @@ def read_columns(obj, names) -> dict:
     return columns
 
 
-def tell_columns(obj, attributes) -> list:
+def column_notices(obj, attributes) -> list:
     """Return notices of the columns of a file, by name, whose names or numbers an object keeps otherwise."""
     there = obj.data.attributes
     kept = kept_columns(obj).items()
-    notices = [f"{obj.name}: {_told(name, *column)}; exports write it as it was" for name, column in kept]
+    notices = [f"{obj.name}: {_description(name, *column)}; exports write it as it was" for name, column in kept]
     names = [name for name in attributes if RENAMED + name in there and RENAMED + name not in attributes]
     renamed = [f"{name} as {RENAMED}{name}" for name in names]
     if renamed:
@@ -85,7 +85,7 @@ def _too_large(values):
     return np.count_nonzero(np.isfinite(values) & (np.abs(values) > _LARGEST))
 
 
-def _told(name, digits, second):
+def _description(name, digits, second):
     """Say how a column is kept."""
     offset = digits.offset if isinstance(digits.offset, list) else [digits.offset]
     parts = f" in two parts, {name} and {second}" if second else ""

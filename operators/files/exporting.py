@@ -120,7 +120,7 @@ class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
     filter_glob: file_filter(".ply")
     all_selected: BoolProperty(
         name="All Selected",
-        description="Where several objects of splats are selected, write all to one file, as they stand in the world",
+        description="Write all selected objects of splats to one file, in world space",
         default=True,
     )
 

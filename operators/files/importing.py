@@ -25,7 +25,7 @@ from ...core.files import (
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
 from ..objects.colors import own_colors
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.notices import keep
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
@@ -33,7 +33,7 @@ from ..registration import Registration
 from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
-from .columns import tell_columns
+from .columns import column_notices
 from .objects import add_object, file_filter, read_file
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
@@ -85,8 +85,8 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         description="Axis of the file that points upwards",
         items=[
             ("Z", "Z", "Coordinates as they are in the file, as in Blender and in surveys"),
-            ("Y", "Y", "Turn the points upright that other programs store with Y upwards, as in .spz"),
-            ("-Y", "-Y", "Turn the points upright that are stored with Y downwards, as many Gaussian splats are"),
+            ("Y", "Y", "Rotate points stored with Y upwards, as in other programs and .spz"),
+            ("-Y", "-Y", "Rotate points stored with Y downwards, as many Gaussian splats are"),
         ],
         default="Z",
     )
@@ -104,7 +104,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     )
     surface: BoolProperty(
         name="Show as Surface",
-        description=f"Draw points as discs in the surface that they lie on, up to {_QUICK:,} of them; not a sequence",
+        description=f"Draw points as discs tangent to the surface, up to {_QUICK:,} of them; not a sequence",
         default=True,
     )
     sequence: BoolProperty(
@@ -127,7 +127,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
     )
     withheld: BoolProperty(
         name="Withheld Points",
-        description="Import points of LAS files, too, that are flagged as withheld, which stands for deleted",
+        description="Import points of LAS files, too, that are flagged as withheld, which means deleted",
         default=False,
     )
     frame: BoolProperty(
@@ -200,17 +200,17 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
                 clouds.append(obj)
                 shared = shared if shared is not None or OFFSET not in obj else offset_of(obj)
                 continue
-            turned = _turned_up(table, self.up) if self.up != "Z" else table
-            obj = add_object(path.stem, turned, context.collection, shared, self.attributes)
+            upright = _rotate_up(table, self.up) if self.up != "Z" else table
+            obj = add_object(path.stem, upright, context.collection, shared, self.attributes)
             obj.select_set(True)
             context.view_layer.objects.active = obj
-            self._tell(obj, table, shared, f"{len(table.points):,} points")
+            self._report(obj, table, shared, f"{len(table.points):,} points")
             if isinstance(found, str):
                 self.note(f"{obj.name} is shown as dots. {found}", obj)
             elif found is not None:
                 surfaces.append(obj)
-                if DISC not in obj.data.attributes:  # those of the file, if there are any, may have been turned
-                    write_attribute(obj.data, DISC, _turned(found, self.up) if self.up != "Z" else found)
+                if DISC not in obj.data.attributes:  # else the file has them
+                    write_attribute(obj.data, DISC, _rotate(found, self.up) if self.up != "Z" else found)
                     tag_changed(obj.data)
             if shared is None and OFFSET in obj:
                 shared = offset_of(obj)
@@ -222,22 +222,22 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         for obj in clouds:
             mark(obj.data)
             if self.surface and not self.sequence and point_count(obj.data) <= _DRAWN and not is_drawn(obj.data):
-                tell("splats_found", obj)
+                notify("splats_found", obj)
         for obj in surfaces:  # Convert would have taken discs for points
-            tell("surface_found", obj)
+            notify("surface_found", obj)
         colored = [obj for obj in every if obj not in surfaces and own_colors(obj.data)]
         for objects in [colored] if self.sequence and colored else [[obj] for obj in colored]:
-            tell("colors_found", objects)
+            notify("colors_found", objects)
         if self.sequence:
             self._join(context)
 
     def _add_splats(self, context, name, splats, shared):
-        """Add an object of splats, which keep the numbers of their file: it is the object that is turned upright."""
+        """Add an object of splats, which keep the numbers of their file: the object is rotated instead."""
         obj = add_splats(name, splats, context.collection, shared, self.up)
         obj.select_set(True)
         context.view_layer.objects.active = obj
         degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
-        self._tell(obj, splats, shared, f"{len(splats):,} Gaussian splats with harmonics of degree {degree}")
+        self._report(obj, splats, shared, f"{len(splats):,} Gaussian splats with harmonics of degree {degree}")
         return obj
 
     def _join(self, context):
@@ -249,16 +249,16 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         sequence.select_set(True)
         context.view_layer.objects.active = sequence
         for frame in frames:  # which nobody selects
-            for told in frame.meshfree.notices:
-                text = told.text if frame.name in told.text else f"{frame.name}: {told.text}"
-                keep(sequence, told.tool, text, told.level)
+            for notice in frame.meshfree.notices:
+                text = notice.text if frame.name in notice.text else f"{frame.name}: {notice.text}"
+                keep(sequence, notice.tool, text, notice.level)
         missing = numbers[-1] - numbers[0] + 1 - len(numbers)
         rest = f"; {missing} of them have no file and show the one before" if missing else ""
         self.report({"INFO"}, f"{sequence.name}: frames {numbers[0]} to {numbers[-1]}{rest}")
 
-    def _tell(self, obj, table, shared, what):
-        """Report what was imported, and what became of its coordinates."""
-        for notice in (*table.notices, *tell_columns(obj, getattr(table, "attributes", {}))):
+    def _report(self, obj, table, shared, what):
+        """Report what was imported, and how its coordinates were shifted."""
+        for notice in (*table.notices, *column_notices(obj, getattr(table, "attributes", {}))):
             self.warn(notice, obj)
         offset = offset_of(obj)
         self.report({"INFO"}, f"{obj.name}: {what}")
@@ -269,7 +269,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
 
 
 def _convert(context, objects):
-    """Turn new meshes into point clouds, where Blender can."""
+    """Convert new meshes to point clouds, where Blender can."""
     if bpy.app.version < (4, 5) or not objects:
         return
     context.view_layer.update()
@@ -330,13 +330,13 @@ def _find_discs(points, progress):
     return shown
 
 
-def _turned_up(table, up):
-    """Return a table with what points along Y, or against it, turned towards Z."""
-    vectors = {name: _turned(values, up) for name, values in table.attributes.items() if values.ndim == 2}
-    return replace(table, points=_turned(table.points, up), attributes={**table.attributes, **vectors})
+def _rotate_up(table, up):
+    """Return a table rotated so that its Y axis, or -Y, points upwards."""
+    vectors = {name: _rotate(values, up) for name, values in table.attributes.items() if values.ndim == 2}
+    return replace(table, points=_rotate(table.points, up), attributes={**table.attributes, **vectors})
 
 
-def _turned(vectors, up):
+def _rotate(vectors, up):
     side = 1.0 if up == "Y" else -1.0
     return vectors[:, [0, 2, 1]] * np.array([1.0, -side, side], vectors.dtype)
 

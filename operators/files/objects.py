@@ -32,7 +32,7 @@ INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
 _ALL = LasChoices()
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
-_PART = 5  # of them that tell the second part of a column
+_PART = 5  # of them for the suffix of the second part of a column
 
 
 def file_filter(*suffixes):
@@ -161,11 +161,11 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     Returns
     -------
     PointTable
-        With normals and places of scanners of the world. `single` tells that single precision does for the coordinates,
-        and notices tell which columns are in doubt.
+        With normals and scanner positions in world space. `single` says whether single precision resolves the
+        coordinates; notices name the columns in doubt.
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
-    with np.errstate(invalid="ignore"):  # infinite points have no place when they are turned
+    with np.errstate(invalid="ignore"):  # infinite points become NaN when transformed
         table = PointTable(seen_positions(context, obj).astype(np.float64) @ matrix.T + place_of(obj))
     table.single = not (OFFSET in obj or is_coarse(table.points))
     data = obj.data
@@ -190,7 +190,7 @@ def _is_column(layer):
 
 
 def _world_normals(normals, matrix):
-    """Turn local normals into unit normals of the world, by cofactors, which objects scaled to nothing have too."""
+    """Transform local normals to unit normals of the world, by cofactors, which singular matrices have too."""
     cofactors = np.stack([np.cross(matrix[i - 2], matrix[i - 1]) for i in range(3)])
     world = normals.astype(np.float64) @ cofactors.T * (-1.0 if np.linalg.det(matrix) < 0.0 else 1.0)
     length = np.linalg.norm(world, axis=1, keepdims=True)
@@ -230,7 +230,7 @@ def group_of(obj, name):
 
 
 def faces_of(obj):
-    """Return the faces of an object, turned as they are seen in the world.
+    """Return the faces of an object, with the orientation that they have in the world.
 
     Returns
     -------
@@ -243,9 +243,9 @@ def faces_of(obj):
     mesh.loops.foreach_get("vertex_index", corners)
     mesh.polygons.foreach_get("loop_start", starts)
     mesh.polygons.foreach_get("loop_total", counts)
-    turn = -1 if obj.matrix_world.determinant() < 0.0 else 1
+    order = -1 if obj.matrix_world.determinant() < 0.0 else 1
     return [
-        corners[starts[counts == count, None] + np.arange(count)][:, ::turn] for count in np.unique(counts).tolist()
+        corners[starts[counts == count, None] + np.arange(count)][:, ::order] for count in np.unique(counts).tolist()
     ]
 
 

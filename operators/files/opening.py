@@ -6,11 +6,11 @@ from ... import core
 from ...core import PointCloudError
 from ...core.files import WRITABLE, PointTable, write_points
 from ..objects.colors import own_colors
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.quantities import APPLICATIONS, MEAN_CURVATURE
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
-from .columns import tell_columns
+from .columns import column_notices
 from .objects import add_object, point_table, read_file, save_arrays
 from .splats import add_splats, splats_to_write, with_results
 
@@ -47,7 +47,7 @@ def load(path, name: str = "", option: str = "--object", read=read_file):
         bpy.ops.wm.read_homefile(use_empty=True)
         add = add_object if isinstance(given, PointTable) else add_splats
         obj = add(path.stem, given, bpy.context.scene.collection)
-        notices = [*given.notices, *tell_columns(obj, getattr(given, "attributes", {}))]
+        notices = [*given.notices, *column_notices(obj, getattr(given, "attributes", {}))]
     elif path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
     else:
@@ -94,9 +94,9 @@ def save(path, obj, arrays, shown="") -> list:
             other.select_set(other == obj)
         names = [name for name in (shown, *APPLICATIONS, MEAN_CURVATURE) if name in obj.data.attributes]
         if names:
-            tell("result_written", obj, names[0])
+            notify("result_written", obj, names[0])
         elif own_colors(obj.data):
-            tell("colors_found", [obj])
+            notify("colors_found", [obj])
         save_scene(path)
     return []
 

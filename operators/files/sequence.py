@@ -4,13 +4,24 @@ import bpy
 
 from ...core import PointCloudError
 from ..objects.attributes import write_attribute
-from ..objects.modifiers import COLLECTION, SEQUENCE_TAG, add_input, add_node, is_intact, new_group, set_input
+from ..objects.modifiers import COLLECTION, SEQUENCE_TAG, is_intact, new_group, set_input
+from ..objects.node_trees import TreeBuilder
 
 NAME = "Mesh-Free Sequence"
 FIRST, STEP = "First Frame", "Frame Step"  # inputs of the nodes, beside the collection
 FRAME = "frame"  # attribute of its points, one for each object: from which frame on that is shown, less the first
 _NUMBERS = "Frame Numbers"  # name of the node that reads them; nodes of earlier versions have none
 _LAST = 1_048_574  # frame of Blender
+_INPUTS = (  # of the nodes
+    (COLLECTION, "Collection", "Collection whose objects are shown one after the other, by name"),
+    (FIRST, "Int", "Frame of the scene at which the first object is shown, and before", {"default_value": 1}),
+    (
+        STEP,
+        "Int",
+        "How many frames of the scene each object is shown; the last one stays",
+        {"default_value": 1, "min_value": 1},
+    ),
+)
 
 
 def add_sequence(context, name: str, frames, numbers):
@@ -78,50 +89,19 @@ def _known_group():
 
 def _new_group():
     """Make the nodes: the last object, by its place among the others, whose number of steps since the first is over."""
-    group = new_group(NAME, SEQUENCE_TAG)
-    add_input(group, COLLECTION, "Collection", "Collection whose objects are shown one after the other, by name")
-    add_input(
-        group, FIRST, "Int", "Frame of the scene at which the first object is shown, and before"
-    ).default_value = 1
-    step = add_input(group, STEP, "Int", "How many frames of the scene each object is shown; the last one stays")
-    step.default_value = step.min_value = 1
-    given = add_node(group, "NodeGroupInput", 0, 0)
-    frames = add_node(group, "GeometryNodeCollectionInfo", 1, 0)
-    frames.inputs["Separate Children"].default_value = True
-    time = add_node(group, "GeometryNodeInputSceneTime", 0, -300)
-    numbers = add_node(group, "GeometryNodeInputNamedAttribute", 3, -700, name=_NUMBERS, data_type="INT")
-    numbers.inputs["Name"].default_value = FRAME
-    begun = add_node(group, "GeometryNodeAttributeStatistic", 4, -300)
-    place = add_node(group, "GeometryNodeInputIndex", 5, -500)
-    size = add_node(group, "GeometryNodeAttributeDomainSize", 2, -500, component="INSTANCES")
-    chosen = add_node(group, "GeometryNodeSeparateGeometry", 7, 0, domain="INSTANCE")
-    realized = add_node(group, "GeometryNodeRealizeInstances", 8, 0)
-    result = add_node(group, "NodeGroupOutput", 9, 0)
-
-    def math(column, y, operation, *values):
-        node = add_node(group, "ShaderNodeMath", column, y, operation=operation)
-        for socket, value in zip(node.inputs, values, strict=False):
-            if isinstance(value, bpy.types.NodeSocket):
-                group.links.new(value, socket)
-            else:
-                socket.default_value = value
-        return node.outputs[0]
-
-    for source, target in (
-        (given.outputs[COLLECTION], frames.inputs["Collection"]),
-        (frames.outputs[0], size.inputs[0]),
-        (frames.outputs[0], chosen.inputs["Geometry"]),
-        (chosen.outputs["Selection"], realized.inputs[0]),
-        (realized.outputs[0], result.inputs[0]),
-        (given.outputs["Geometry"], begun.inputs["Geometry"]),
-    ):
-        group.links.new(source, target)
-    since = math(1, -300, "SUBTRACT", time.outputs["Frame"], given.outputs[FIRST])
-    steps = math(2, -300, "DIVIDE", since, math(1, -500, "MAXIMUM", given.outputs[STEP], 1.0))
-    over = math(3, -300, "ADD", math(3, -300, "FLOOR", steps), 0.5)
-    group.links.new(math(4, -700, "LESS_THAN", numbers.outputs[0], over), begun.inputs["Attribute"])
-    number = math(5, -300, "MAXIMUM", math(5, -300, "SUBTRACT", begun.outputs["Sum"], 1.0), 0.0)
-    last = math(3, -500, "SUBTRACT", size.outputs["Instance Count"], 1.0)
-    number = math(6, -300, "MINIMUM", number, last)
-    group.links.new(math(6, -300, "COMPARE", number, place.outputs[0], 0.5), chosen.inputs["Selection"])
+    group = new_group(NAME, SEQUENCE_TAG, _INPUTS)
+    tree = TreeBuilder(group)
+    given = tree.node("NodeGroupInput").outputs
+    frames = tree.node("GeometryNodeCollectionInfo", given[COLLECTION], True)
+    size = tree.node("GeometryNodeAttributeDomainSize", frames, component="INSTANCES")
+    since = tree.math("SUBTRACT", tree.node("GeometryNodeInputSceneTime").outputs["Frame"], given[FIRST])
+    steps = tree.math("FLOOR", tree.math("DIVIDE", since, tree.math("MAXIMUM", given[STEP], 1.0)))
+    numbers = tree.node("GeometryNodeInputNamedAttribute", FRAME, name=_NUMBERS, data_type="INT")
+    over = tree.math("LESS_THAN", numbers, tree.math("ADD", steps, 0.5))
+    begun = tree.node("GeometryNodeAttributeStatistic", given["Geometry"], Attribute=over).outputs["Sum"]
+    number = tree.math("MAXIMUM", tree.math("SUBTRACT", begun, 1.0), 0.0)
+    number = tree.math("MINIMUM", number, tree.math("SUBTRACT", size, 1.0))
+    now = tree.math("COMPARE", number, tree.node("GeometryNodeInputIndex"), 0.5)
+    chosen = tree.node("GeometryNodeSeparateGeometry", frames, now, domain="INSTANCE")
+    tree.output("NodeGroupOutput", tree.node("GeometryNodeRealizeInstances", chosen))
     return group

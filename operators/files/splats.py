@@ -24,13 +24,17 @@ from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, growth, remember_p
 from .objects import add_column
 
 _TYPE = "GAUSSIAN_SPLAT"  # of point clouds, from Blender 5.3 on
-_UPRIGHT = {"Z": 0, "Y": 1, "-Y": -1}  # quarters of a turn about x, by the axis of the file that points upwards
+_UPRIGHT = {
+    "Z": 0,
+    "Y": 1,
+    "-Y": -1,
+}  # rotation about x in units of 90 degrees, by the axis of the file that points upwards
 
 
 def add_splats(name, splats, collection, known=None, up="Z"):
     """Add an object of splats as loose vertices, which become a point cloud by `mark` and Object > Convert.
 
-    Coordinates are those of the file, less an offset if they are far from the origin; it is the object that is turned.
+    Coordinates are those of the file, less an offset if they are far from the origin; the object is rotated instead.
 
     Parameters
     ----------
@@ -50,7 +54,7 @@ def add_splats(name, splats, collection, known=None, up="Z"):
     mesh.vertices.add(len(splats))
     obj = bpy.data.objects.new(name, mesh)
     obj.rotation_euler.x = _UPRIGHT[up] * 0.5 * np.pi
-    _write_shifted(obj, splats.positions.astype(np.float64), _turn(_UPRIGHT[up]), known)
+    _write_shifted(obj, splats.positions.astype(np.float64), _rotation(_UPRIGHT[up]), known)
     remember_places(mesh)
     write_attribute(mesh, SCALE, splats.scales, "FLOAT_VECTOR")
     write_attribute(mesh, ROTATION, splats.rotations, "QUATERNION")
@@ -66,27 +70,27 @@ def add_splats(name, splats, collection, known=None, up="Z"):
     return obj
 
 
-def _turn(quarters):
-    """Return the rotation by quarters of a turn about x, (3, 3), without an error of rounding."""
+def _rotation(quarters):
+    """Return the rotation by multiples of 90 degrees about x, (3, 3), without rounding."""
     return np.linalg.matrix_power(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), quarters)
 
 
-def _write_shifted(obj, places, turn, known):
-    """Write places of a file, those far away less an offset, which the object keeps as it is in the world."""
-    turned = places @ turn.T
-    origin = choose_origin(turned, known)
+def _write_shifted(obj, places, rotation, known):
+    """Write positions of a file, less an offset if they are far away, which the object keeps in world axes."""
+    rotated = places @ rotation.T
+    origin = choose_origin(rotated, known)
     if known is None or (origin != known).any():
-        # Where a few floaters lie far away, the others would lose digits by a shift to the middle of all.
-        nearer = np.median(np.abs(turned - origin), axis=0) < np.median(np.abs(turned), axis=0)
+        # With a few floaters far away, a shift to the center of all would cost the others digits.
+        nearer = np.median(np.abs(rotated - origin), axis=0) < np.median(np.abs(rotated), axis=0)
         origin = np.where(nearer, origin, 0.0)
-    own = origin @ turn
+    own = origin @ rotation
     if origin.any():
         obj[OFFSET], obj[OWN_OFFSET] = origin.tolist(), own.tolist()
     write_places(obj.data, places - own)
 
 
 def _keep_file(obj, splats):
-    """Keep on an object what its splats do not tell of their file."""
+    """Keep on an object what its file holds beside the splats."""
     columns = splats.file.columns
     keep_raw(obj.data, columns)
     for name in columns.keys() - _known_columns(splats):
@@ -103,7 +107,7 @@ def _known_columns(splats):
 
 
 def mark(data):
-    """Tell Blender that a point cloud is one of splats, where it knows such."""
+    """Set the type of a point cloud to splats, where Blender has it."""
     kind = data.bl_rna.properties.get("type")
     if kind is not None and _TYPE in kind.enum_items:
         data.type = _TYPE

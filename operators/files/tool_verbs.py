@@ -84,8 +84,10 @@ class _SignedDistanceInFile(SignedDistance):
     places = None  # (k, 3), if it is no object
     closed = False
 
-    def way(self, context, obj):
-        return super().way(context, obj) if self.places is None else (self.places - place_of(obj), self.closed)
+    def read_curve(self, context, obj):
+        if self.places is None:
+            return super().read_curve(context, obj)
+        return self.places - place_of(obj), self.closed
 
 
 class Mesh(Apply):
@@ -225,8 +227,8 @@ class _OrientInFile(OrientNormals):
     place = None  # that the points were seen from, (3,), if it is no object
     shift = 0.0  # of places that are columns of the file
 
-    def seen_from(self, context, obj, reading):
+    def viewpoints(self, context, obj, reading):
         if self.method == "VIEWPOINT" and self.place is not None:
             return self.place - place_of(obj)
-        found = super().seen_from(context, obj, reading)
+        found = super().viewpoints(context, obj, reading)
         return found - self.shift if self.method == "ATTRIBUTE" and self.holds == "POSITIONS" else found

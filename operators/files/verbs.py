@@ -66,7 +66,7 @@ class ObjectVerb(Verb):
         self.operator = getattr(bpy.ops.meshfree, operator).get_rna_type()
         self.help = self.operator.description[0].lower() + self.operator.description[1:]
         self.description = (
-            f"{self.operator.description}. Writes one JSON line per input: points, what was done, seconds per stage,"
+            f"{self.operator.description}. Writes one JSON line per input: points, summary, seconds per stage,"
             " notices; or the error. The exit code is 1 if any input failed."
         )
 

@@ -1,4 +1,4 @@
-"""Objects as they were, should anything fail while they are written: all or nothing."""
+"""Restore objects if anything fails while they are written."""
 
 from contextlib import contextmanager
 
@@ -9,16 +9,16 @@ from .modifiers import inputs_of, is_own, put_inputs
 
 @contextmanager
 def all_or_nothing(objects):
-    """Put objects, with their data, back to how they were if what is done with them fails, whatever it fails with.
+    """Restore objects, with their data, if the body of the with statement raises anything.
 
-    Their data are copied before: cheap, for Blender copies the values of points only when one of both is written. So
-    are the actions of shape keys, and the materials that our own modifiers show. After a failure the copies take their
-    places. What was added since, such as objects, materials and modifiers, is removed, and the active object stays so;
-    modifiers that were removed stay so.
+    Their data are copied before, which is cheap: Blender copies the values of points only on write. So are the actions
+    of shape keys, and the materials of our own modifiers. After a failure the copies replace them. Objects, materials,
+    modifiers and so on that were added since are removed, and the active object is kept; removed modifiers are not
+    restored.
     """
     render, layer = bpy.context.scene.render, bpy.context.view_layer
     locked, active = render.use_lock_interface, getattr(layer.objects.active, "name", "")
-    kept = {}  # of objects that share their data one copy
+    kept = {}  # one copy for objects that share their data
     try:
         for block in dict.fromkeys(block for obj in objects for block in _written(obj)):
             kept[block] = _copy(block)
@@ -32,7 +32,7 @@ def all_or_nothing(objects):
             for block in list(kept):
                 _replace(block, kept.pop(block))
             _remove(set(bpy.data.user_map()) - there)
-            if layer.objects.active is None:  # for what was added had been it
+            if layer.objects.active is None:  # it was among what was added
                 layer.objects.active = layer.objects.get(active)
             raise
     finally:
@@ -40,7 +40,7 @@ def all_or_nothing(objects):
 
 
 def _written(obj):
-    """Data-blocks that are changed when results are written to an object, the object itself apart."""
+    """Return the data-blocks that writing results to an object changes, without the object itself."""
     blocks = [obj.data]
     keys = getattr(obj.data, "shape_keys", None)
     if keys is not None and keys.animation_data is not None:
@@ -51,7 +51,7 @@ def _written(obj):
 
 
 class _State:
-    """What an object holds beside its data: where it is, which data and modifiers, custom properties, settings."""
+    """The state of an object beside its data: transform, data-block, modifiers, custom properties, settings."""
 
     def __init__(self, obj):
         self._obj, self._data = obj, obj.data
@@ -84,15 +84,15 @@ class _State:
 
 
 def _own_names(obj):
-    """Names of the custom properties of an object, without what extensions define, which old files keep there too."""
+    """Names of the custom properties of an object, without properties of extensions, which old files keep there too."""
     return [name for name in obj.keys() if name not in obj.bl_rna.properties]
 
 
 def _plain(value):
     """Return the value of a custom property as one that outlives it and can be compared."""
-    for way in ("to_list", "to_dict"):
-        if hasattr(value, way):
-            return getattr(value, way)()
+    for method in ("to_list", "to_dict"):
+        if hasattr(value, method):
+            return getattr(value, method)()
     return value
 
 
@@ -100,7 +100,7 @@ def _values(group):
     """Read all values of a property group, of the groups in it, and of those in collections."""
     values = {}
     for item in group.bl_rna.properties:
-        if item.identifier == "rna_type":  # which tells of the group itself
+        if item.identifier == "rna_type":  # the type of the group
             continue
         value = getattr(group, item.identifier)
         if item.type == "COLLECTION":
@@ -116,7 +116,7 @@ def _values(group):
 
 
 def _put_values(group, values):
-    """Set what differs: every setting may have somebody who follows it."""
+    """Set only what differs, since settings have update functions."""
     now = _values(group)
     for name, value in values.items():
         if now[name] == value:
@@ -139,9 +139,9 @@ def _copy(data):
 
 
 def _replace(data, copy):
-    """Let a copy of data take their place and their names."""
+    """Replace data by a copy, under the same names."""
     pairs = [(copy, data.name)]
-    if getattr(copy, "shape_keys", None) is not None:  # data may have got their first ones since
+    if getattr(copy, "shape_keys", None) is not None:  # data may have gained their first ones since
         pairs.append((copy.shape_keys, data.shape_keys.name))
     data.user_remap(copy)
     bpy.data.batch_remove([data])

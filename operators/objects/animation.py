@@ -8,7 +8,7 @@ PLACE = (*_PLACE, *(f"delta_{name}" for name in _PLACE if name != "rotation_axis
 
 
 def curves(block):
-    """Return the F-curves that animate a data-block: a collection of Blender's, or nothing."""
+    """Return the F-curves of a data-block: Blender's collection, or an empty tuple."""
     animation = block.animation_data
     if animation is None or animation.action is None:
         return ()
@@ -24,9 +24,9 @@ def moves_by_keys(obj) -> bool:
 
 
 def stop_moving(obj):
-    """Remove the keyframes that move an object, from it alone; it stays where it is, and keeps all others."""
+    """Remove the keyframes that move an object, not those of other users of its action; it keeps its transform."""
     animation = obj.animation_data
-    if animation.action.users > 1:  # others have the same, or somebody wants it kept
+    if animation.action.users > 1:  # other users, or a fake one
         animation.action = animation.action.copy()
     found = curves(obj)
     for curve in [curve for curve in found if curve.data_path in PLACE]:

@@ -1,4 +1,4 @@
-"""The attributes of this extension, beside results by name and type, and how values get in and out of a mesh."""
+"""Attributes of this extension other than results, by name and type; reading and writing attributes."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from .quantities import AREA, EIGENVECTOR, quantity
 class _Storage(NamedTuple):
     dtype: type
     components: int
-    key: str  # what foreach_get and foreach_set call the values
+    key: str  # name of the values in foreach_get and foreach_set
 
 
 _STORAGE = {
@@ -23,7 +23,7 @@ _STORAGE = {
     "INT": _Storage(np.int32, 1, "value"),
     "BOOLEAN": _Storage(np.bool_, 1, "value"),
 }
-_FOUR = {  # numbers that are kept, but are no results that one could choose
+_FOUR = {  # types that are stored, but cannot be shown as results
     "QUATERNION": _Storage(np.float32, 4, "value"),
     "FLOAT_COLOR": _Storage(np.float32, 4, "color"),
     "FLOAT4": _Storage(np.float32, 4, "vector"),  # Blender 5.3 on
@@ -32,21 +32,21 @@ _LAYERS = {"FLOAT": "float", "FLOAT_VECTOR": "float_vector", "INT": "int", "BOOL
 
 SELECTION = ".selection"  # of point clouds, as Blender names it
 PREFIX = "lb_"
-ORIENTATION = "lb_orientation"  # vectors whose side the normals take, where a user chose it
-DISC = "lb_disc"  # unit normal times the radius of a disc that leaves no hole, in spacings
-# Slopes of what is shown, or of both texture coordinates, and the values, by their means. Blender hides such names.
+ORIENTATION = "lb_orientation"  # vectors that orient the normals, where a user chose a side
+DISC = "lb_disc"  # unit normal times the radius of the disc of the point, in units of the spacing
+# Gradients of the displayed values, or of both texture coordinates, and these values. Blender hides such names.
 SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
-# What viewports in Solid show instead: colors, linear, and how these change with what is shown.
+# For viewports in Solid: linear colors, and their derivative by the displayed value.
 SOLID, TILT = ".lb_color", ".lb_tilt"
-RISE = "lb_rise"  # by how much what is shown rises in discs that the display draws
-CORNER = "lb_corner"  # marks corners of the discs that the display draws, which are no points
+RISE = "lb_rise"  # difference of the displayed value to that at the center of a disc
+CORNER = "lb_corner"  # marks corners of the discs of the display, which are not points
 COMPARED = "lb_compared"  # where there is a deviation from another cloud
 REST = "lb_rest"  # positions before the displacement
-SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of splats that are carried along
-MOVED_DISC = "lb_moved_disc"  # what a deformation makes of the disc
-ONLY_DRAWN = DISC, MOVED_DISC, CORNER  # which say nothing about the points, only how they are drawn
+SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of deformed splats
+MOVED_DISC = "lb_moved_disc"  # the disc after a deformation
+ONLY_DRAWN = DISC, MOVED_DISC, CORNER  # attributes of the display alone
 SPLAT_HARMONIC = "lb_splat_sh_"  # followed by the number of the harmonic, from 0
-_TYPES = {  # of what is no result; all others are FLOAT
+_TYPES = {  # of attributes that are not results; all others are FLOAT
     **dict.fromkeys((ORIENTATION, DISC, MOVED_DISC, REST, SLOPE, SLOPE_2, TILT, SPLAT_SCALE), "FLOAT_VECTOR"),
     COMPARED: "BOOLEAN",
     SPLAT_ROTATION: "QUATERNION",
@@ -78,7 +78,7 @@ def _number(name, prefix):
 
 
 def check_names(obj, names):
-    """Refuse names that a vertex group holds, since attributes and vertex groups share one namespace."""
+    """Refuse names of vertex groups, since attributes and vertex groups share one namespace."""
     taken = sorted(set(names) & {group.name for group in obj.vertex_groups})
     if taken:
         raise PointCloudError(
@@ -95,19 +95,19 @@ def point_count(data) -> int:
 def own_positions(data):
     """Read the positions of the points of a mesh or a point cloud, (n, 3) float32."""
     positions = np.empty((point_count(data), 3), np.float32)
-    if not len(positions):  # new data have no attribute for them
+    if not len(positions):  # new data have no such attribute
         return positions
     data.attributes["position"].data.foreach_get("vector", positions.reshape(-1))
     return positions
 
 
 def in_edit_mesh(obj) -> bool:
-    """Whether a mesh is in Edit Mode, by this object or another one, so that its data are out of reach as arrays."""
+    """Whether a mesh is in Edit Mode, by this object or another one, so that its data cannot be read as arrays."""
     return obj.type == "MESH" and obj.data.is_editmode
 
 
 def positions_now(obj):
-    """Read the positions of the points in local space, with changes of Edit Mode that are not yet in the mesh."""
+    """Read the positions of the points in local space, with unsaved changes of Edit Mode."""
     if not in_edit_mesh(obj):
         return own_positions(obj.data)
     obj.update_from_editmode()
@@ -123,7 +123,7 @@ def write_own_positions(data, positions):
 
 
 def deselect(data):
-    """Let no point of a mesh or a point cloud be selected; new ones are, or count as such."""
+    """Deselect all points of a mesh or a point cloud; new ones are selected, or count as such."""
     nothing = np.zeros(point_count(data), dtype=bool)
     if isinstance(data, bpy.types.Mesh):
         data.vertices.foreach_set("select", nothing)
@@ -132,7 +132,7 @@ def deselect(data):
 
 
 def tag_changed(data):
-    """Tell Blender that the data of a mesh or a point cloud changed."""
+    """Notify Blender that the data of a mesh or a point cloud changed."""
     if isinstance(data, bpy.types.Mesh):
         data.update()
     else:
@@ -172,7 +172,7 @@ def write_attribute(data, name: str, values, data_type: str = ""):
 
 
 def check_size(name: str, values):
-    """Refuse numbers for an attribute that the single precision in which Blender keeps them cannot hold."""
+    """Refuse numbers for an attribute that single precision, in which Blender stores them, cannot represent."""
     sizes, kept = np.abs(values), np.finfo(np.float32)
     lost = np.count_nonzero(~np.isfinite(sizes))
     if lost:
@@ -183,11 +183,11 @@ def check_size(name: str, values):
     largest = np.max(sizes, initial=0.0)
     if largest > kept.max:
         row = quantity(name)
-        way = f"Scale the object {'up' if row.power < 0 else 'down'}"
+        advice = f"Scale the object {'up' if row.power < 0 else 'down'}"
         if row.attribute and row.power == 0:
-            way = "Use smaller values"
+            advice = "Use smaller values"
         raise PointCloudError(
-            f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. {way}."
+            f"Attribute {name} has numbers up to {largest:.1e}, beyond the 3e38 that Blender keeps. {advice}."
         )
     if name == AREA and 0.0 < largest < kept.tiny:
         raise PointCloudError(
@@ -216,7 +216,7 @@ def read_attribute(data, name: str):
 
 
 def _edited_values(mesh, name, data_type):
-    """Read an attribute of a mesh in Edit Mode, where only its vertices know it, one by one."""
+    """Read an attribute of a mesh in Edit Mode, vertex by vertex."""
     edited, storage = bmesh.from_edit_mesh(mesh), _STORAGE[data_type]
     layers = getattr(edited.verts.layers, _LAYERS.get(data_type, ""), None)
     if layers is None:  # pairs of numbers, and truth values in Blender 4.2
@@ -237,7 +237,19 @@ def _copied_values(edited, name, storage):
     return values
 
 
+def has_vectors(data, name: str) -> bool:
+    """Whether an attribute exists and holds a vector for each point."""
+    attribute = data.attributes.get(name)
+    return attribute is not None and (attribute.data_type, attribute.domain) == ("FLOAT_VECTOR", "POINT")
+
+
+def remove_attributes(data, *names: str):
+    """Remove attributes, as far as they exist."""
+    for name in names:
+        if name in data.attributes:
+            data.attributes.remove(data.attributes[name])
+
+
 def remove_numbered(data, prefix: str, beyond: int):
     """Remove the attributes of a kind that are numbered above `beyond`."""
-    for name in [attribute.name for attribute in data.attributes if _number(attribute.name, prefix) > beyond]:
-        data.attributes.remove(data.attributes[name])
+    remove_attributes(data, *(name for name in data.attributes.keys() if _number(name, prefix) > beyond))

@@ -1,4 +1,4 @@
-"""What goes along with points that a deformation moves: the discs that the display draws, or splats."""
+"""What deforms with the points: the discs of the display, or splats."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,9 @@ from .attributes import (
     SPLAT_HARMONIC,
     SPLAT_ROTATION,
     SPLAT_SCALE,
+    has_vectors,
     read_attribute,
+    remove_attributes,
     write_attribute,
 )
 from .splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats, shown_splats
@@ -24,9 +26,9 @@ class Carried(NamedTuple):
     Attributes
     ----------
     name : str
-        Of the attribute at rest, whose place is taken where the deformation is shown.
+        Of the attribute at rest, which the modifier replaces where the deformation is shown.
     moved : str
-        Of the attribute that holds it after the deformation; there is none where that changes nothing.
+        Of the attribute that holds it after the deformation; missing at rest.
     data_type : str
     """
 
@@ -36,7 +38,7 @@ class Carried(NamedTuple):
 
 
 def carried(data) -> tuple:
-    """Return what goes along with the points of a mesh or a point cloud, as `Carried`."""
+    """Return what deforms with the points of a mesh or a point cloud, as `Carried`."""
     if has_splats(data):
         harmonics = range(len(harmonic_names(data)))
         numbered = (Carried(f"{HARMONIC}{number}", _harmonic(number), "FLOAT_VECTOR") for number in harmonics)
@@ -45,29 +47,24 @@ def carried(data) -> tuple:
             Carried(ROTATION, SPLAT_ROTATION, "QUATERNION"),
             *numbered,
         )
-    return (Carried(DISC, MOVED_DISC, "FLOAT_VECTOR"),) if _has_discs(data) else ()
+    return (Carried(DISC, MOVED_DISC, "FLOAT_VECTOR"),) if has_vectors(data, DISC) else ()
 
 
 def carries(obj) -> bool:
-    """Whether more than places has to follow a deformation; in Edit Mode that is out of reach."""
+    """Whether more than positions has to be deformed; in Edit Mode attributes cannot be written."""
     data = obj.data
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         return False
-    return has_splats(data) or (_has_discs(data) and obj.meshfree.point_shape == "DISCS")
-
-
-def _has_discs(data):
-    layer = data.attributes.get(DISC)
-    return layer is not None and (layer.data_type, layer.domain) == ("FLOAT_VECTOR", "POINT")
+    return has_splats(data) or (has_vectors(data, DISC) and obj.meshfree.point_shape == "DISCS")
 
 
 def discs_at_rest(obj):
-    """Read the discs that the display of an object draws at rest, normals times radii, (n, 3); None for none."""
+    """Read the discs of an object's display at rest, normals times radii, (n, 3); None without discs."""
     return read_attribute(obj.data, DISC) if carries(obj) and not has_splats(obj.data) else None
 
 
 def local_gradients(gradients, matrix):
-    """Return deformation gradients, (n, 3, 3), of points that a matrix, (3, 3), takes from local space, as there."""
+    """Transform deformation gradients, (n, 3, 3), to local space, from which a matrix, (3, 3), leads."""
     # Two large products: n small ones take five times as long.
     right = (gradients.reshape(-1, 3) @ matrix).reshape(-1, 3, 3)
     return np.moveaxis(np.tensordot(np.linalg.inv(matrix), right, (1, 1)), 1, 0)
@@ -76,7 +73,7 @@ def local_gradients(gradients, matrix):
 def moved_discs(vectors, gradients):
     """Return discs, normals times radii, (n, 3), after a deformation with these gradients, (n, 3, 3)."""
     radii = np.linalg.norm(vectors, axis=1)
-    known = radii > 0.0  # of points that were added since, nothing is known
+    known = radii > 0.0  # added points have zeros
     moved = core.Discs(vectors[known] / radii[known, None], radii[known]).deformed(gradients[known])
     result = np.zeros(vectors.shape)
     result[known] = moved.normals * moved.radii[:, None]
@@ -84,13 +81,13 @@ def moved_discs(vectors, gradients):
 
 
 def moved_splats(splats) -> dict:
-    """Return splats after a deformation, those harmonics that they have, by the names of their attributes."""
+    """Return deformed splats, with the harmonics that they have, by the names of attributes."""
     harmonics = {_harmonic(number): splats.harmonics[:, number] for number in range(splats.harmonics.shape[1])}
     return {SPLAT_SCALE: splats.scales, SPLAT_ROTATION: splats.rotations, **harmonics}
 
 
 def shown_moved(obj, strength) -> dict:
-    """Return what goes along as a deformation shows it, by a share of it, by the names of its attributes."""
+    """Return what deforms with the points, interpolated by the strength of the deformation, by attribute."""
     data = obj.data
     if not moved_names(data):
         return {}
@@ -101,16 +98,15 @@ def shown_moved(obj, strength) -> dict:
 
 
 def write_moved(data, moved):
-    """Keep what was carried, by the names of the attributes; nothing for as it is at rest."""
+    """Write what was deformed, by the names of attributes; remove them if there is nothing, as at rest."""
     if not moved:
-        for name in moved_names(data):
-            data.attributes.remove(data.attributes[name])
+        remove_attributes(data, *moved_names(data))
     for name, values in moved.items():
         write_attribute(data, name, values)
 
 
 def moved_names(data) -> list:
-    """Return the names of the attributes that hold what was carried."""
+    """Return the names of the attributes that hold what was deformed."""
     return [item.moved for item in carried(data) if item.moved in data.attributes]
 
 

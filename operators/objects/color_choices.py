@@ -1,4 +1,4 @@
-"""What one can choose about colours, for the settings of objects and for the operator that shows them."""
+"""Choices of colours, for the settings of objects and for the operator that shows colors."""
 
 from functools import partial
 
@@ -8,24 +8,23 @@ _COLOR_MAPS = (
     (
         "AUTO",
         "Automatic",
-        "Cool to Warm for values on both sides of zero, a color each for few whole numbers and for true or"
-        " false, Viridis otherwise",
+        "Cool to Warm for signed values, a color each for few whole numbers and for true or false, Viridis otherwise",
     ),
     ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
     ("MAGMA", "Magma", "From black over red to light yellow, in even steps to the eye"),
     ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
-    ("CYCLIC", "Cyclic", "All around the hues back to the first one, for angles and phases"),
+    ("CYCLIC", "Cyclic", "Through all hues back to the first one, for angles and phases"),
     ("CATEGORICAL", "Categorical", "A color for each whole number; seven, which then repeat"),
 )
 _RANGE_MODES = (
     (
         "AUTO",
         "Automatic",
-        "Symmetric for Cool to Warm and values on both sides of zero, Data for Cyclic, Percentile otherwise",
+        "Symmetric for Cool to Warm and signed values, Data for Cyclic, Percentile otherwise",
     ),
     ("DATA", "Data", "From the least to the greatest value"),
-    ("PERCENTILE", "Percentile", "The share of the values that Coverage says, without the outermost ones"),
-    ("SYMMETRIC", "Symmetric", "As far below zero as above, by the share of the values that Coverage says"),
+    ("PERCENTILE", "Percentile", "Between percentiles, so that the share Coverage of the values is inside"),
+    ("SYMMETRIC", "Symmetric", "As far below zero as above, so that the share Coverage of the values is inside"),
     ("LOCKED", "Locked", "The values below, whatever is shown"),
 )
 _CHOICES = {
@@ -36,20 +35,18 @@ _CHOICES = {
         items=_COLOR_MAPS,
         default="AUTO",
     ),
-    "reverse": partial(
-        BoolProperty, name="Reverse", description="Turn the colors round, from high to low values", default=False
-    ),
+    "reverse": partial(BoolProperty, name="Reverse", description="Reverse the color map", default=False),
     "range_mode": partial(
         EnumProperty,
         name="Range",
-        description="Which values the colors stretch over",
+        description="Which values the colors cover",
         items=_RANGE_MODES,
         default="AUTO",
     ),
     "coverage": partial(
         FloatProperty,
         name="Coverage",
-        description="Share of the values inside the color range, so that a few outliers do not wash the rest out",
+        description="Share of the values inside the color range, so that a few outliers do not dominate",
         default=98.0,
         min=50.0,
         max=100.0,
@@ -60,5 +57,5 @@ COLOR_CHOICES = tuple(_CHOICES)
 
 
 def color_choice(name: str, **more):
-    """Return the property of a choice, to annotate a class with; more of its arguments may be given."""
+    """Return the property of a choice, to annotate a class, with further arguments."""
     return _CHOICES[name](**more)

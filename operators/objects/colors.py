@@ -1,4 +1,4 @@
-"""What objects look like without results: the colors of their points, as of a photograph, and their own material."""
+"""How objects look without results: the colors of their points, as of a photograph, and their own material."""
 
 import bpy
 import numpy as np
@@ -22,7 +22,7 @@ def is_color(data, name: str) -> bool:
 def own_colors(data) -> str:
     """Return the name of the attribute with the colors of points: the active one, else the first; empty without any.
 
-    Splats have theirs in harmonics, and keep other numbers in attributes of these types.
+    Splats have theirs in harmonics, and other numbers in attributes of these types.
     """
     names = [] if has_splats(data) else [item.name for item in data.attributes if is_color(data, item.name)]
     active = data.color_attributes.active_color_name if isinstance(data, bpy.types.Mesh) else ""
@@ -30,7 +30,7 @@ def own_colors(data) -> str:
 
 
 def splat_colors(data):
-    """Return the colors that splats have from all sides alike, linear and opaque, (n, 4)."""
+    """Return the view-independent colors of splats, linear and opaque, (n, 4)."""
     base = read_attribute(data, BASE)
     base[:, :3] = np.maximum(core.splats.CONSTANT * base[:, :3] + 0.5, 0.0) ** _GAMMA
     base[:, 3] = 1.0
@@ -44,6 +44,6 @@ def own_material(obj):
 
 
 def shows_own_material(obj) -> bool:
-    """Whether an object is seen in a material of the user's: without a display, or as its display shows that one."""
+    """Whether an object is shown in a material of the user's, without a display or by it."""
     display, material = next(filter(is_display, obj.modifiers), None), own_material(obj)
     return material is not None and (display is None or get_input(display, "Material") == material)

@@ -1,7 +1,7 @@
-"""How many points are in groups, and a checksum of which.
+"""Sizes and checksums of groups of points.
 
-To read a vertex group takes Blender 0.25 s for 100,000 points, too much for a panel. So the window counts larger ones
-bit by bit, between other events, and shows what was counted last until then.
+Reading a vertex group of 100,000 points takes 0.25 s, too much for a panel. So in a window, larger ones are counted in
+small steps, between other events, and the last count is shown until then.
 """
 
 import zlib
@@ -15,25 +15,25 @@ from bpy.app.handlers import persistent
 
 from .attributes import point_count
 from .groups import group_weights, has_group
-from .handlers import add_handlers, remove_handlers, tell
+from .handlers import add_handlers, notify, remove_handlers
 
 _AT_ONCE = 5_000  # points of which all groups are read when a panel is drawn
-_PATIENCE = 30.0  # a glance trusts what was read for this many times the seconds that reading took
-_BIT = 0.008  # seconds that the window is kept waiting
+_PATIENCE = 30.0  # a count is used for so many times the seconds that counting took
+_STEP = 0.008  # seconds that a step blocks the window
 _PAUSE = 0.01  # seconds in between
 _CHUNK = 500  # points
 _MOST = 50  # objects that are remembered
 
 
 class Members(NamedTuple):
-    """Which points a group holds, and which of them it gives a weight above zero.
+    """The points of a group, and which of them have a weight above zero.
 
     Attributes
     ----------
     count : int
-        How many it holds, those of weight zero included.
+        Number of points, those of weight zero included.
     checksum, weighted : int
-        Checksum of which ones have a weight above zero, and one that their weights count in, too.
+        Checksum of the points with a weight above zero, and one of their weights.
     bits : bytes
         One for each point, packed: whether its weight is above zero.
     """
@@ -50,7 +50,7 @@ class Members(NamedTuple):
 
 
 def summarize(weights) -> Members:
-    """Tell what a group holds, given all weights, (n,), which are no numbers for the points outside."""
+    """Summarize a group, given all weights, (n,), NaN for the points outside."""
     inside, count = weights > 0.0, np.count_nonzero(np.isfinite(weights))
     if not inside.any():
         return Members(count)
@@ -65,7 +65,7 @@ def weighted_checksum(weights) -> int:
 
 @dataclass
 class _Known:
-    """What was counted of an object in some mode and with so many points."""
+    """What was counted for an object in a mode, with a number of points."""
 
     state: tuple
     members: dict = field(default_factory=dict)
@@ -74,7 +74,7 @@ class _Known:
 
 @dataclass
 class _Pass:
-    """One pass over the vertices of an object, to count some groups; undo does not reach it."""
+    """A pass over the vertices of an object that counts groups; undo does not affect it."""
 
     names: list
     weights: np.ndarray
@@ -88,17 +88,17 @@ _passes = {}  # by session_uid
 
 
 def members(obj, name: str, glance=False, trusting=False) -> Members | None:
-    """Tell which points a group holds.
+    """Summarize a group.
 
     Parameters
     ----------
     obj : bpy.types.Object
     name : str
-        The group; one that is missing has no points.
+        The group; a missing one has no points.
     glance : bool
-        Be quick: a change may be missed for some seconds, and what was never counted is None until it is.
+        Be quick: a change may be missed for some seconds, and the result is None until the first count.
     trusting : bool
-        Be quicker: for a glance take what was counted last, however long ago, unless it was undone or changed by us.
+        Be quicker: take the last count, however old, unless undo or this extension changed the group.
     """
     if not has_group(obj, name):
         return Members()
@@ -124,11 +124,11 @@ def renew_counts(obj):
     _passes.pop(obj.session_uid, None)
     if obj.session_uid in _known:
         _known[obj.session_uid].until.clear()
-    tell("panels_changed")
+    notify("panels_changed")
 
 
 def _recall(obj):
-    """Return what is known of an object; of an earlier state only to be shown until it is counted again."""
+    """Return the counts of an object; those of an earlier state only until they are renewed."""
     state = point_count(obj.data), obj.mode == "EDIT"
     known = _known.get(obj.session_uid)
     if known is None or known.state != state:
@@ -140,19 +140,19 @@ def _recall(obj):
 
 
 def _tick():
-    """Go on counting for a moment; a timer of the window."""
+    """Count for a moment; a timer of the window."""
     objects = {obj.session_uid: obj for obj in bpy.data.objects if obj.session_uid in _wanted}
     for uid in [*_wanted]:
         if uid not in objects or objects[uid].type != "MESH":
             _wanted.pop(uid), _passes.pop(uid, None)
     for uid, obj in objects.items():
         if uid in _wanted and _go_on(obj):
-            tell("panels_changed")
+            notify("panels_changed")
     return _PAUSE if _wanted else None
 
 
 def _go_on(obj) -> bool:
-    """Count a bit more of an object; return whether all is counted."""
+    """Count for a moment in an object; return whether all is counted."""
     uid, count = obj.session_uid, point_count(obj.data)
     work = _passes.get(uid)
     if work is None or work.weights.shape[1] != count or any(not has_group(obj, name) for name in work.names):
@@ -160,7 +160,7 @@ def _go_on(obj) -> bool:
         work = _passes[uid] = _Pass(names, np.full((len(names), count), np.nan, np.float32))
     rows = {obj.vertex_groups[name].index: row for row, name in enumerate(work.names)}
     began = perf_counter()
-    while work.place < count and perf_counter() < began + _BIT:
+    while work.place < count and perf_counter() < began + _STEP:
         chunk = obj.data.vertices[work.place : work.place + _CHUNK]
         held = [
             (rows[item.group], index, item.weight)
@@ -204,7 +204,7 @@ _HANDLERS = {"undo_post": _undone, "redo_post": _undone, "load_pre": _forget}
 
 
 def attach():
-    """Count again what undo has changed, and forget what was counted of another file."""
+    """Count again after undo, and forget the counts of another file."""
     add_handlers(_HANDLERS)
 
 

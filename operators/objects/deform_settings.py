@@ -12,19 +12,19 @@ from bpy.props import (
 )
 
 from .groups import ANCHOR, HANDLE
-from .handlers import tell
+from .handlers import notify
 
 
 def _follow(settings, context):
-    tell("deform_changed", settings.id_data)
+    notify("deform_changed", settings.id_data)
 
 
 def _find_bound(settings, context):
-    tell("bound_changed")
+    notify("bound_changed")
 
 
 class MESHFREE_PG_handle(bpy.types.PropertyGroup):
-    """What moves one group of handles"""
+    """How one group of handles is moved"""
 
     has_empty: BoolProperty(
         name="Has Empty", description="An empty moves the points; otherwise they are moved in Edit Mode"
@@ -48,26 +48,26 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
     )
     add_empties: BoolProperty(
         name="Add Empties",
-        description="Add an empty to each group of handles, which moves, turns and scales it; without one they are"
+        description="Add an empty to each group of handles, which moves, rotates and scales it; without one they are"
         " moved in Edit Mode",
         default=True,
     )
     rotation_aware: BoolProperty(
-        name="Turn Details",
-        description="Let details turn with the surface, as bending asks for",
+        name="Rotate Details",
+        description="Rotate details with the surface, as bending requires",
         default=True,
         update=_follow,
     )
     soft: BoolProperty(
         name="Soft",
-        description="Let handles and anchors give way to a smoother surface",
+        description="Soft constraints: handles and anchors may deviate for a smoother surface",
         default=False,
         update=_follow,
     )
     weight: FloatProperty(
         name="Weight",
-        description="How strongly soft handles and anchors are pulled, in units of the surface's own resistance; the"
-        " weights of their groups multiply it",
+        description="Stiffness of soft handles and anchors, relative to that of the surface; the weights of their"
+        " groups multiply it",
         default=1.0,
         min=0.0,
         soft_max=100.0,
@@ -75,7 +75,7 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
     )
     steps: IntProperty(
         name="Steps",
-        description="Most steps in which the turns of details are found; it stops when nothing moves any more",
+        description="Maximum number of iterations for these rotations; stops at convergence",
         default=30,
         min=1,
         soft_max=100,
@@ -85,7 +85,7 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
     # What the object is bound with.
     is_bound: BoolProperty(name="Bound", description="The object follows its handles", update=_find_bound)
     handle_items: CollectionProperty(
-        type=MESHFREE_PG_handle, name="Handles", description="What moves the groups of handles"
+        type=MESHFREE_PG_handle, name="Handles", description="How the groups of handles are moved"
     )
     binding_id: StringProperty(name="Binding", description="Name that no other binding has")
     point_count: IntProperty(name="Points", description="How many points were bound", min=0)

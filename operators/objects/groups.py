@@ -1,4 +1,4 @@
-"""Groups of points: vertex groups of meshes; on point clouds, which have none, attributes of truth or weight."""
+"""Groups of points: vertex groups of meshes; boolean or float attributes of point clouds, which have none."""
 
 import re
 
@@ -22,7 +22,7 @@ _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a p
 
 
 def group_kind(obj) -> str:
-    """What the groups of an object are called in Blender."""
+    """Return Blender's word for the groups of an object."""
     return "vertex group" if obj.type == "MESH" else "attribute"
 
 
@@ -35,12 +35,12 @@ def has_group(obj, name: str) -> bool:
 
 
 def rivals(obj, role: str) -> list:
-    """Names of the groups of an object that a point leaves when it is assigned to that of a role."""
+    """Return the groups of an object from which a point is removed when it is assigned to that of a role."""
     return [name for name in _GIVEN if name != role and role in _GIVEN and has_group(obj, name)]
 
 
 def handle_names(obj) -> list:
-    """Names of the groups that are handles: the one that the settings name, and the same with a number."""
+    """Return the groups that are handles: the one in the settings, and those of its name with a number."""
     base = obj.meshfree.deform.handles
     pattern = re.compile(re.escape(base) + r"(\.\d+)?")
     groups = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
@@ -48,7 +48,7 @@ def handle_names(obj) -> list:
 
 
 def group_weights(obj, name: str, outside=0.0):
-    """Read the weight of every point in a group, (n,) float64; those outside get a number of their own.
+    """Read the weight of every point in a group, (n,) float64, with a value for points outside.
 
     On a point cloud the points outside are those of weight 0.
     """
@@ -63,7 +63,7 @@ def group_weights(obj, name: str, outside=0.0):
 
 
 def is_chosen(obj, name: str, default: str) -> bool:
-    """Whether a setting names a group that must be there: any but the default, which may be missing."""
+    """Whether a setting names a group that must exist: any but the default, which may be missing."""
     return bool(name) and (has_group(obj, name) or name != default)
 
 
@@ -76,11 +76,11 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
     name : str
         The group.
     setting : str
-        What the panel calls the setting, for the texts of errors.
+        Label of the setting, for errors.
     least : int
-        How many points must have a weight above zero.
+        Required number of points with a weight above zero.
     outside : float
-        What the points outside the group get.
+        Value of the points outside the group.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
     Raises
     ------
     PointCloudError
-        There is no such group, or too little in it.
+        The group does not exist, or has too few points.
     """
     kind = group_kind(obj)
     if not has_group(obj, name):
@@ -111,12 +111,12 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
 
 
 def chosen_members(obj, name: str, setting: str, least: int = 1):
-    """Read which points the group that a setting names gives a weight above zero, (n,) bool; see `chosen_weights`."""
+    """Read which points have a weight above zero in the group of a setting, (n,) bool; see `chosen_weights`."""
     return chosen_weights(obj, name, setting, least) > 0.0
 
 
 def add_group(obj, name: str, weights):
-    """Add a vertex group of the weights of all points, (n,) from 0 to 1; those of weight 0 stay outside."""
+    """Add a vertex group by the weights of all points, (n,) from 0 to 1, without those of weight 0."""
     group = obj.vertex_groups.new(name=name)
     order = np.argsort(weights, kind="stable")
     for part in np.split(order, np.flatnonzero(np.diff(weights[order])) + 1):
@@ -142,7 +142,7 @@ def check_assignable(obj, name: str, must_exist: bool):
 
 
 def assign(obj, name: str, chosen, action: str, weight: float):
-    """Change a group, or make it.
+    """Change a group, or add it.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def assign(obj, name: str, chosen, action: str, weight: float):
     chosen : ndarray, (n,) bool
         The points.
     action : {"REPLACE", "ADD", "REMOVE"}
-        What becomes of them and of those that the group holds already.
+        Whether they replace the points of the group, are added to them, or removed.
     weight : float
         Of the points in the group.
     """

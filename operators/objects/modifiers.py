@@ -54,43 +54,33 @@ def _inputs(group):
     return {item.identifier: item.name for item in items}
 
 
-def new_group(name: str, tag: str):
-    """Add an empty node group for a modifier, marked as ours, with geometry going in and out."""
+def new_group(name: str, tag: str, inputs=()):
+    """Add an empty node group for a modifier, marked as ours, with geometry going in and out.
+
+    Parameters
+    ----------
+    name, tag : str
+    inputs : sequence of tuple
+        Of each other input its name, by which it is found again should somebody rename it, its kind, its tooltip, and
+        where it differs from other inputs a dict of properties of its socket.
+
+    Returns
+    -------
+    bpy.types.GeometryNodeTree
+    """
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group[tag] = True
     group.is_modifier = True
-    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    new_socket, identifiers = group.interface.new_socket, {}
+    new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    for label, kind, description, *properties in inputs:
+        socket = new_socket(label, in_out="INPUT", socket_type=f"NodeSocket{kind}", description=description)
+        identifiers[label] = socket.identifier
+        for key, value in dict(*properties).items():
+            setattr(socket, key, value)
+    group[_INPUTS] = identifiers
     return group
-
-
-def add_input(group, name: str, kind: str, description: str):
-    """Add an input to a node group of ours, which is found again should somebody rename it; return its socket."""
-    socket = group.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}", description=description)
-    known = group.get(_INPUTS, {})
-    group[_INPUTS] = {**known, name: socket.identifier}
-    return socket
-
-
-def add_node(tree, kind, column, y, **properties):
-    """Add a node at a place in the editor, with properties set."""
-    node = tree.nodes.new(kind)
-    node.location = (200 * column, y)
-    for name, value in properties.items():
-        setattr(node, name, value)
-    return node
-
-
-def add_math(tree, column, y, operation, first, second=0.0, name=""):
-    """Add a node that calculates, from one or two numbers or results of other nodes; return its result."""
-    node = add_node(tree, "ShaderNodeMath", column, y, operation=operation)
-    node.name = name or node.name
-    for number, socket in zip((first, second), node.inputs, strict=False):
-        if isinstance(number, bpy.types.NodeSocket):
-            tree.links.new(number, socket)
-        else:
-            socket.default_value = number
-    return node.outputs[0]
 
 
 def get_input(modifier, name: str):

@@ -1,4 +1,4 @@
-"""What an object keeps of the notices of tools, until somebody dismisses them or the tool runs again."""
+"""Notices of tools, kept on an object until they are dismissed or the tool runs again."""
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
@@ -7,23 +7,23 @@ from ..registration import Registration, Row
 
 
 class MESHFREE_PG_notice(bpy.types.PropertyGroup):
-    """What a tool had to tell of an object"""
+    """A notice of a tool about an object"""
 
-    tool: StringProperty(name="Tool", description="Label of the tool that told it")
-    text: StringProperty(name="Text", description="What it told")
+    tool: StringProperty(name="Tool", description="Label of the tool")
+    text: StringProperty(name="Text", description="Text of the notice")
     level: EnumProperty(
         name="Level",
-        description="How much it matters",
+        description="Importance of the notice",
         items=(
             ("WARNING", "Warning", "Something was guessed, left out or replaced"),
-            ("INFO", "Info", "Figures that one looks at again"),
+            ("INFO", "Info", "Figures to be read again"),
         ),
         default="WARNING",
     )
 
 
 def keep(obj, tool: str, text: str, level: str = "WARNING"):
-    """Keep a notice of a tool on an object; the same one of another tool, which it says anew, goes."""
+    """Keep a notice of a tool on an object, in place of the same one of another tool."""
     notices = obj.meshfree.notices
     _remove(notices, lambda kept: kept.text == text)
     kept = notices.add()
@@ -31,12 +31,12 @@ def keep(obj, tool: str, text: str, level: str = "WARNING"):
 
 
 def forget(obj, tool: str):
-    """Drop what a tool told of an object when it ran before."""
+    """Remove the notices of an earlier run of a tool from an object."""
     _remove(obj.meshfree.notices, lambda kept: kept.tool == tool)
 
 
 def renew(obj, tool: str, texts):
-    """Keep the notices of a tool in place of those of its run before."""
+    """Replace the notices of an earlier run of a tool."""
     forget(obj, tool)
     for text in texts:
         keep(obj, tool, text)
@@ -49,7 +49,7 @@ def _remove(notices, unwanted):
 
 
 class MESHFREE_OT_dismiss(bpy.types.Operator):
-    """Take away a notice that was read"""
+    """Remove a notice"""
 
     bl_idname = "meshfree.dismiss"
     bl_label = "Dismiss Notice"
@@ -61,10 +61,10 @@ class MESHFREE_OT_dismiss(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        told = context.object is not None and len(context.object.meshfree.notices)
-        if not told:
+        any_kept = context.object is not None and len(context.object.meshfree.notices) > 0
+        if not any_kept:
             cls.poll_message_set("The active object has no notices. They come with tools and imports")
-        return bool(told)
+        return any_kept
 
     def execute(self, context):
         notices = context.object.meshfree.notices

@@ -1,4 +1,4 @@
-"""From the settings of an object to the options of core."""
+"""Convert settings of an object to options of core."""
 
 from dataclasses import fields
 
@@ -12,7 +12,7 @@ DEFAULTS, PAPER_DEFAULTS = LaplacianOptions(), PaperOptions()
 _DEFAULT, _PAPER = (tuple(option.name for option in fields(kind)) for kind in (LaplacianOptions, PaperOptions))
 NAMES = ("laplacian", *dict.fromkeys(_DEFAULT + _PAPER))
 
-# Those, and the settings that say what of the object is read.
+# Those, and the settings about reading the object.
 ALL_NAMES = (*NAMES, "boundary_group", "use_modifiers", "leave_out_floaters", "point_budget", "most_points")
 
 # Options for kinds of points.
@@ -25,7 +25,7 @@ PRESETS = {
 
 
 def apply_preset(settings, options):
-    """Give settings the values of options, and the defaults of the other method's."""
+    """Set settings to the values of options, and those of the other method to defaults."""
     settings.laplacian = "PAPER" if isinstance(options, PaperOptions) else "DEFAULT"
     for given in (PAPER_DEFAULTS, DEFAULTS, options):
         for option in fields(given):
@@ -34,22 +34,22 @@ def apply_preset(settings, options):
 
 
 def settings_values(settings) -> dict:
-    """Values of the settings that change results, as core writes them: the method, and its own."""
+    """Return the values of the settings that change results: the method, and its options."""
     return _values(settings, ("laplacian", *_names(settings)))
 
 
 def laplacian_options(settings) -> LaplacianOptions | PaperOptions:
-    """Options of the operator, by the method that the settings name."""
+    """Return the options of the operator, by the method of the settings."""
     return (PaperOptions if settings.laplacian == "PAPER" else LaplacianOptions)(**_values(settings, _names(settings)))
 
 
 def default_options(settings) -> LaplacianOptions:
-    """Options of the default method, for what the paper's operator does not serve."""
+    """Return the options of the default method, where the paper's operator is not usable."""
     return LaplacianOptions(**_values(settings, _DEFAULT))
 
 
 def point_budget(settings):
-    """How many points an analysis takes at most; 0 for as many as fit the memory, None for all."""
+    """Return the maximum number of points of an analysis; 0 for as many as fit into memory, None for all."""
     return {"AUTO": 0, "ALL": None, "NUMBER": settings.most_points}[settings.point_budget]
 
 

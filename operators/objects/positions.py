@@ -17,27 +17,27 @@ TARGETS = (
 
 
 def target_property():
-    """Return the property of an operator that says where moved points go."""
+    """Return the operator property for the target of moved points."""
     return EnumProperty(
         name="Result",
-        description="Where the moved points go; point clouds have no shape keys and are moved in place",
+        description="Where the result is written; point clouds have no shape keys and are moved in place",
         items=TARGETS,
         default="SHAPE_KEY",
     )
 
 
 def check_movable(obj, target: str):
-    """Refuse an object whose points cannot be moved to given places, before anything is computed."""
+    """Refuse an object whose points cannot be moved, before anything is computed."""
     if obj.meshfree.use_modifiers and any(not is_own(item) for item in obj.modifiers):
         raise PointCloudError(
-            f'The points of "{obj.name}" were read after its modifiers, and cannot be written back before'
-            " them. Turn off Use Modifiers, or apply the modifiers."
+            f'The points of "{obj.name}" were read after its modifiers, and cannot be written before them.'
+            " Turn off Use Modifiers, or apply the modifiers."
         )
     keys = shape_keys(obj)
     if keys is not None and target == "IN_PLACE":
         raise PointCloudError(
-            f'"{obj.name}" has shape keys, so that moving its points in place would not be seen. Choose Shape'
-            " Key as the result, or apply the shape keys."
+            f'"{obj.name}" has shape keys, so moving its points in place would have no visible effect. Choose'
+            " Shape Key as the result, or apply the shape keys."
         )
     if keys is not None and not keys.use_relative:
         raise PointCloudError(
@@ -51,7 +51,7 @@ def check_movable(obj, target: str):
 
 
 def write_positions(obj, reading, points, target: str, name: str, gradients=None, discs=None):
-    """Move the points to given places.
+    """Move the points to new positions.
 
     Parameters
     ----------
@@ -59,15 +59,15 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
     reading : Reading
         How the points were read.
     points : ndarray, (n, 3)
-        Their new places, as `reading.points`.
+        Their new positions, in the space of `reading.points`.
     target : str
         One of `TARGETS`.
     name : str
-        Of the shape key; Blender adds a number if there is one already.
+        Of the shape key; Blender adds a number to a name in use.
     gradients : ndarray, (n, 3, 3), optional
-        Of the deformation, as `reading.points`, with which splats go, and discs.
+        Of the deformation, in the space of `reading.points`, for splats and discs.
     discs : ndarray, (n, 3), optional
-        Of the moved points, as the display takes them, even if a shape key moves them; without gradients.
+        Of the moved points, in the form of the display, even if a shape key moves them; without gradients.
 
     Returns
     -------
@@ -92,9 +92,9 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
 
 
 def add_key(obj, name: str, moved):
-    """Add a shape key of value 0 that moves the points by so much, (n, 3), beside what the other keys do.
+    """Add a shape key of value 0 with displacements, (n, 3), relative to the reference key.
 
-    It is the active one, as those that Blender adds are.
+    It becomes the active one, as in Blender.
     """
     if obj.data.shape_keys is None:
         obj.shape_key_add(name="Basis", from_mix=False)

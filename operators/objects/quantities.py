@@ -1,4 +1,4 @@
-"""The results at the points, a row each: all that writes, carries, exports, lists or shows results goes by these.
+"""The table of results at the points, a row each: results are written, transferred, exported and shown by it.
 
 To add a result, add a row. Nothing here needs Blender.
 """
@@ -12,7 +12,7 @@ BOUNDARY, COMPONENT, TRUST = "lb_boundary", "lb_component", "lb_trust"
 SEGMENT = "lb_segment"
 SHAPE_INDEX, CURVEDNESS = "lb_shape_index", "lb_curvedness"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"
-ROUGHNESS = "lb_roughness"
+ROUGHNESS, SURFACE_VARIATION = "lb_roughness", "lb_surface_variation"
 FIELD = "lb_field"
 DISTANCE, SIGNED_DISTANCE, DEVIATION = "lb_distance", "lb_signed_distance", "lb_deviation"
 CELL, DIRECTION, UV = "lb_cell", "lb_direction", "lb_uv"
@@ -29,29 +29,29 @@ class Quantity(NamedTuple):
     attribute : str
         Name of the attribute that holds it; for a numbered one, what comes before the number.
     label, tooltip : str
-        Title, and what it is in the words of the manual.
+        Title, and description in the words of the manual.
     tool : str
         Name of the operator that writes it.
     source : str
-        Where it is in what the tool computes, which is `Built` for the analysis; empty where there is nothing else.
+        Its path in the result of the tool, which is `Built` for the analysis; empty for the result itself.
     data_type : str
         As Blender names it.
     power : int
-        Which power of a length its numbers are.
+        Its physical dimension, as a power of length.
     carried : {"smooth", "label", "share", "normal"}
-        How other points get it from those that have it: interpolated, from the nearest one, divided among those that
-        belong to one, or interpolated as a unit vector. Of principal directions the nearest, for they have no sign.
+        How it is transferred to other points: by interpolation, from the nearest point, divided among the points
+        nearest to one, or interpolated as a unit vector. Principal directions, which have no sign, from the nearest.
     left_out : float, optional
-        What points get that take no part.
+        Value of points that are left out.
     bounds : tuple of float, optional
-        Least and greatest value that there can be.
+        Least and greatest possible value.
     color_range : {"", "symmetric", "positive"}
-        Range of the colors: as the values are, about zero whatever their signs, or from zero on, where numbers below
-        zero say that there is no value.
+        Range of the colors: by the values, symmetric about zero, or from zero, where negative numbers mark points
+        without a value.
     along_surface : bool
         Whether it is a vector in the tangent plane.
     numbered : bool
-        Whether there are several, with a number of three digits: compared with each other, so written without a unit.
+        Whether there are several, with numbers of three digits; written without a unit, since they are compared.
     """
 
     attribute: str
@@ -69,7 +69,7 @@ class Quantity(NamedTuple):
     numbered: bool = False
 
     def of(self, found):
-        """Return its values in what the tool computed."""
+        """Return its values from the result of the tool."""
         return attrgetter(self.source)(found)
 
 
@@ -147,7 +147,7 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         CURVEDNESS,
         "Curvedness",
-        "Root mean square of both curvatures",
+        "Root mean square of both principal curvatures",
         "principal_curvatures",
         "curvedness",
         power=-1,
@@ -179,6 +179,13 @@ QUANTITIES = (  # in the order of the panel
         along_surface=True,
     ),
     Quantity(ROUGHNESS, "Roughness", "Signed height of each point above the smoothed surface", "roughness", power=1),
+    Quantity(
+        SURFACE_VARIATION,
+        "Surface Variation",
+        "Smallest eigenvalue of the covariance of the neighborhood over the sum of all three",
+        "surface_variation",
+        bounds=(0.0, 1.0 / 3.0),
+    ),
     Quantity(FIELD, "Field", "The smoothest field between given values", "harmonic_field"),
     Quantity(
         DISTANCE,
@@ -235,7 +242,7 @@ _NO_RESULT = Quantity("", "", "", "")
 
 
 def quantity(name: str) -> Quantity:
-    """Return the row of the result that an attribute holds; for one that holds no result a row of empty texts."""
+    """Return the row of the result that an attribute holds; a row of empty texts if it holds none."""
     known = _BY_NAME.get(name)
     if known is not None:
         return known
@@ -244,7 +251,7 @@ def quantity(name: str) -> Quantity:
 
 
 def rows_of(tool: str) -> tuple:
-    """Return the rows of what a tool writes, by the name of its operator."""
+    """Return the rows of the results of a tool, by the name of its operator."""
     return tuple(row for row in QUANTITIES if row.tool == tool)
 
 
@@ -253,5 +260,5 @@ def written_by(tool: str) -> tuple:
     return tuple(row.attribute for row in rows_of(tool))
 
 
-RESULTS = written_by("analyze")  # the panel shows these always, and those of tools where they are there
+RESULTS = written_by("analyze")  # always in the panel; those of tools if they exist
 APPLICATIONS = tuple(row.attribute for row in QUANTITIES if row.tool != "analyze" and not row.numbered)

@@ -1,4 +1,4 @@
-"""From a Blender object to its points, in lengths of the world."""
+"""Read the points of a Blender object, in world lengths."""
 
 import zlib
 from dataclasses import dataclass, field, replace
@@ -8,7 +8,7 @@ import numpy as np
 
 from ... import core
 from ...core import PointCloudError
-from .attributes import CORNER, ORIENTATION, own_positions, point_count, read_attribute
+from .attributes import CORNER, ORIENTATION, has_vectors, own_positions, point_count, read_attribute
 from .counting import members
 from .evaluated import evaluated_positions
 from .groups import chosen_members
@@ -16,7 +16,7 @@ from .modifiers import is_own, is_sequence, modifier_settings
 from .splats import LEFT_BEHIND, are_left_behind, has_splats, read_splats
 
 TYPES = ("MESH", "POINTCLOUD")  # of objects that are read
-_CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # such as Blender turns into meshes
+_CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META", "CURVES", "GREASEPENCIL")  # which Blender converts to meshes
 
 
 def shape_keys(obj):
@@ -25,7 +25,7 @@ def shape_keys(obj):
 
 
 def obstacle(obj, modes=("OBJECT",)) -> str:
-    """What keeps an object from being read and written in these modes, and what to do; empty if nothing does."""
+    """Return why an object cannot be read and written in these modes, and what to do; empty if it can."""
     if obj is None:
         return "No active object. Select a mesh with the points of a surface"
     if obj.type == "EMPTY" and obj.instance_collection is not None:
@@ -36,8 +36,8 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
     if obj.type not in TYPES:
         kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
         article = "an" if kind[0] in "AE" else "a"
-        way = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
-        return f'"{obj.name}" is {article} {kind}, not a Mesh. {way} a mesh'
+        advice = "Convert it with Object > Convert > Mesh, or select" if obj.type in _CONVERTIBLE else "Select"
+        return f'"{obj.name}" is {article} {kind}, not a Mesh. {advice} a mesh'
     if not obj.is_editable or not obj.data.is_editable:
         return f'"{obj.name}" is linked from a library. Use Object > Relations > Make Local > Selected Objects and Data'
     if obj.data.override_library is not None:
@@ -45,10 +45,10 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
             f'"{obj.name}" is a library override, whose results would not be saved. Use Object > Relations > Make Local'
             " > Selected Objects and Data"
         )
-    edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object of that mesh
+    edited = getattr(obj.data, "is_editmode", False) and obj.mode != "EDIT"  # by another object with that mesh
     if obj.mode not in modes or edited:
         return f'"{obj.name}" is not in Object Mode. Switch to Object Mode first'
-    # Convert takes what modifiers show, and ours shows dots or discs.
+    # Object > Convert applies the display, which makes dots or discs.
     kind = "vertices" if obj.type == "MESH" else "points"
     lost = obj.meshfree.point_count and not point_count(obj.data)
     if lost or CORNER in obj.data.attributes:
@@ -78,17 +78,17 @@ class Reading:
     Attributes
     ----------
     points : ndarray, (n, 3) float64
-        Positions with the object's scale, rotation and shear, but not its location: float64 of small numbers.
+        Positions with the object's scale, rotation and shear, without its location, to keep numbers small.
     matrix : ndarray, (3, 3) float64
         The linear part of the object's matrix: points = local positions @ matrix.T.
     boundary : ndarray, (n,) bool, or None
-        Points at the boundary, where the user's vertex group names them.
+        Boundary points, where the user's vertex group names them.
     notices : list of str
-        What the user should know about how the object was read.
+        Notices about how the object was read.
     orientation : ndarray, (n, 3) float64, or None
-        Vectors whose side the normals take, where Orient Normals or the user chose it.
+        Vectors that orient the normals, where Orient Normals or the user chose a side.
     splats : Splats or None
-        Those in local space that the points are the middles of, without harmonics, if floaters are to be left out.
+        The splats of the points in local space, without harmonics, if floaters are to be left out.
     """
 
     points: np.ndarray
@@ -99,23 +99,23 @@ class Reading:
     splats: "core.Splats | None" = None
 
     def local(self, vectors):
-        """Turn points or shifts as they were read into local ones."""
+        """Transform points or displacements, as read, to local space."""
         return vectors @ np.linalg.inv(self.matrix).T
 
     def placed(self, vectors):
-        """Turn local points or shifts into such as were read."""
+        """Transform local points or displacements to those as read."""
         return vectors @ self.matrix.T
 
     def local_directions(self, directions):
-        """Turn directions along the surface, as they were read, into local unit vectors."""
+        """Transform tangent directions, as read, to local unit vectors."""
         return _units(self.local(directions))
 
     def local_normals(self, normals):
-        """Turn normals of the points into unit normals of the local positions: covectors, so by M^T, not M^-1."""
+        """Transform normals, as read, to local unit normals: covectors, so by M^T, not M^-1."""
         return _units(normals @ self.matrix)
 
     def placed_normals(self, normals):
-        """Turn normals of the local positions into such of the points as they were read, of any length."""
+        """Transform local normals to those of the points as read, of any length."""
         return normals @ np.linalg.inv(self.matrix)
 
 
@@ -124,12 +124,12 @@ def _units(vectors):
 
 
 def read_points(context, obj) -> Reading:
-    """Read an object's points as the user sees them, apart from modifiers that are not asked for.
+    """Read an object's points as displayed, after modifiers only if the settings ask for them.
 
     Raises
     ------
     PointCloudError
-        The points cannot be read or used as they are; the text says what to do.
+        The points cannot be read or used; the text says what to do.
     """
     positions = seen_positions(context, obj)
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
@@ -141,7 +141,7 @@ def read_points(context, obj) -> Reading:
     notices = []
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
-        notices.append(f"The mesh has {faces} faces: it is taken as its {point_count(obj.data)} vertices.")
+        notices.append(f"The mesh has {faces} faces: only its {point_count(obj.data)} vertices are used.")
     if are_left_behind(obj.data):
         notices.append(f"{obj.name}: {LEFT_BEHIND}.")
     judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)
@@ -152,16 +152,15 @@ def read_points(context, obj) -> Reading:
 
 
 def chosen_sides(obj):
-    """Read the local vectors whose side the normals of an object take, (n, 3) float64; None where nobody chose it."""
-    attribute = obj.data.attributes.get(ORIENTATION)
-    if attribute is None or (attribute.data_type, attribute.domain) != ("FLOAT_VECTOR", "POINT"):
+    """Read the local vectors that orient an object's normals, (n, 3) float64; None if none were chosen."""
+    if not has_vectors(obj.data, ORIENTATION):
         return None
     sides = read_attribute(obj.data, ORIENTATION).astype(np.float64)
     return np.where(np.isfinite(sides).all(axis=1)[:, None], sides, 0.0)
 
 
 def seen_positions(context, obj):
-    """Read the local positions of an object's points as `read_points` takes them, whatever they are, (n, 3) float32."""
+    """Read the local positions of an object's points for `read_points`, unchecked, (n, 3) float32."""
     context.view_layer.update()  # a script may have moved the object a line ago
     if obj.meshfree.use_modifiers or shape_keys(obj) is not None:
         return evaluated_positions(context, obj)
@@ -169,7 +168,7 @@ def seen_positions(context, obj):
 
 
 def boundary_points(obj):
-    """Read which points the boundary group of an object holds, (n,) bool; None if the settings name no group."""
+    """Read the points in an object's boundary group, (n,) bool; None if the settings name no group."""
     name = obj.meshfree.boundary_group
     return chosen_members(obj, name, "Boundary Group", core.geometry.FEWEST) if name else None
 
@@ -182,17 +181,17 @@ def key_positions(key):
 
 
 def metric(obj):
-    """Lengths that the object's matrix gives to its local axes, M^T M: rotation and location do not change results."""
+    """Return the metric of an object's matrix M, M^T M, which rotation and location do not change."""
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     return matrix.T @ matrix
 
 
 def fingerprint(obj, glance=False, left_out=()) -> str:
-    """Checksum of the positions but those of some points, of shape keys and of the boundary group.
+    """Return a checksum of positions, without those of some points, of shape keys and of the boundary group.
 
-    A glance is quick enough for a panel, some milliseconds for 1 million points, may see a change of the boundary group
-    some seconds late, and is empty while that has not been counted yet. Of modifiers, if they are used, both see which
-    ones there are and their settings, not what is in other data that these name.
+    A glance is quick enough for a panel, some milliseconds for 1 million points; it may notice a change of the boundary
+    group some seconds late, and is empty until that is counted. Of modifiers, if they are used, names and settings
+    count, not the contents of other data that they refer to.
     """
     positions = own_positions(obj.data)
     positions[np.asarray(left_out, dtype=int)] = 0.0
@@ -216,23 +215,23 @@ def fingerprint(obj, glance=False, left_out=()) -> str:
 
 
 def sharing_objects(obj) -> list:
-    """All other objects that show the same mesh."""
-    if obj.data.users == 1:  # as most of the time, for the panel's sake
+    """Return all other objects with the same mesh."""
+    if obj.data.users == 1:  # the usual case, quick for panels
         return []
     return [other for other in bpy.data.objects if other.data == obj.data and other != obj]
 
 
 def find_object(uid):
-    """Find an object by its session_uid, which neither undo nor another name changes; None if it is gone."""
+    """Find an object by its session_uid, which is independent of undo and names; None if it was removed."""
     return next((obj for obj in bpy.data.objects if obj.session_uid == uid), None)
 
 
 def spacing(data) -> float:
-    """Typical distance between neighbouring points of a mesh or a point cloud in local lengths; 0 if unknown."""
+    """Return the typical distance of neighbouring points of a mesh or a point cloud, in local lengths; 0 if unknown."""
     return core.geometry.typical_distance(own_positions(data))
 
 
 def discs(normals, radii, points):
-    """Discs as the display takes them, (n, 3): unit normals times radii in spacings."""
-    spacing = core.geometry.typical_distance(points) or np.median(radii)  # none where many points share a place
+    """Return discs in the form of the display, (n, 3): unit normals times radii in units of the spacing."""
+    spacing = core.geometry.typical_distance(points) or np.median(radii)  # zero where many points coincide
     return normals * (radii / spacing)[:, None]

@@ -1,4 +1,4 @@
-"""What an analysis leaves on an object: attributes, eigenvalues, total area, and what tells whether they still hold."""
+"""Writing an analysis to an object: attributes, eigenvalues, total area, and whether they are up to date."""
 
 import zlib
 
@@ -20,7 +20,7 @@ from .options import point_budget, settings_values
 from .quantities import AREA, EIGENVECTOR, NORMAL, RESULTS
 from .reading import chosen_sides, fingerprint, metric, sharing_objects
 
-_DIGITS = 3  # that scans bear
+_DIGITS = 3  # that scans justify
 EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
 
 
@@ -31,11 +31,11 @@ def check_writable(obj, names, make_single_user: bool, among=()):
     ----------
     obj : bpy.types.Object
     names : iterable of str
-        The attributes that will be written.
+        Attributes to be written.
     make_single_user : bool
         Whether the object gets a mesh of its own.
     among : sequence of bpy.types.Object
-        Objects that may share the mesh, because they are worked on too: with the same scale, or a mesh of their own.
+        Objects that may share the mesh, since they are processed too: of the same scale, or to get their own mesh.
     """
     others = [
         other.name
@@ -51,14 +51,14 @@ def check_writable(obj, names, make_single_user: bool, among=()):
 
 
 def analysis_names(modes: int) -> list:
-    """Names of the attributes of an analysis with so many modes."""
+    """Return the attributes of an analysis with a number of modes."""
     return [*RESULTS, *map(eigenvector_name, range(1, modes + 1))]
 
 
 def write_result(obj, analysis, write_limit: int, oriented=False):
     """Write an analysis to its object and those that share its mesh; modes up to `write_limit` become attributes.
 
-    Where it was `oriented`, later ones take the side of its normals.
+    If `oriented`, later analyses take the side of its normals.
     """
     mesh, owners = obj.data, [obj, *sharing_objects(obj)]
     if analysis.spectrum is not None:
@@ -84,7 +84,7 @@ def write_result(obj, analysis, write_limit: int, oriented=False):
 
 
 def _settings(obj):
-    """Write what results depend on besides points; of the budget only where it asks for a smaller number of them."""
+    """Return a text of what results depend on besides points; the budget only where it is below their number."""
     kept = obj.meshfree
     budget = point_budget(kept)
     sides = chosen_sides(obj)
@@ -97,7 +97,7 @@ def _settings(obj):
 
 
 def _note_analysis(obj, analysis, settings):
-    """Keep on an object what tells of an analysis with some settings, as written."""
+    """Keep the figures of an analysis on an object, with its settings as text."""
     kept = obj.meshfree
     kept.total_area = analysis.total_area
     kept.point_count = point_count(obj.data)
@@ -114,7 +114,7 @@ def _note_analysis(obj, analysis, settings):
 
 
 def read_eigenvalues(obj):
-    """Return the eigenvalues that an object holds, (k,) float64; none where somebody keeps something else in place."""
+    """Return the eigenvalues of an object, (k,) float64; empty if the property holds something else."""
     kept = obj.get(EIGENVALUES)
     return np.array(kept if hasattr(kept, "to_list") else (), dtype=np.float64)
 

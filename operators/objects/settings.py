@@ -14,34 +14,34 @@ from bpy.props import (
 
 from . import deform_settings, notices
 from .color_choices import color_choice
-from .handlers import tell
+from .handlers import notify
 from .options import DEFAULTS, PAPER_DEFAULTS
 
 
 def _recolor(settings, context):
-    tell("colors_changed", settings.id_data)
+    notify("colors_changed", settings.id_data)
 
 
 def _recolor_locked(settings, context):
-    """Follow bounds that somebody sets; in other modes they only tell what the range came to."""
+    """Follow bounds that are set; in other modes they only show the resulting range."""
     if settings.range_mode == "LOCKED":
-        tell("colors_changed", settings.id_data)
+        notify("colors_changed", settings.id_data)
 
 
 def _resize(settings, context):
-    tell("size_changed", settings.id_data)
+    notify("size_changed", settings.id_data)
 
 
 def _reshape(settings, _context):
-    tell("shape_changed", settings.id_data)
+    notify("shape_changed", settings.id_data)
 
 
 def _show_groups(settings, context):
-    tell("groups_changed", settings.id_data)
+    notify("groups_changed", settings.id_data)
 
 
 def _redraw(settings, context):
-    tell("views_changed")
+    notify("views_changed")
 
 
 class MESHFREE_PG_stage(bpy.types.PropertyGroup):
@@ -58,24 +58,24 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         name="Method",
         description="How the Laplacian is built",
         items=(
-            ("DEFAULT", "Default", "For scans: kernels as wide as the points need, curvature and boundary respected"),
+            ("DEFAULT", "Default", "For scans: adaptive bandwidths, with corrections for curvature and boundary"),
             ("PAPER", "Paper", "As in the paper: one bandwidth for all points, no boundary, no corrections"),
         ),
         default="DEFAULT",
     )
     bandwidth: EnumProperty(
         name="Bandwidth",
-        description="How far the kernel of each point reaches",
+        description="How the radius of the kernel is chosen at each point",
         items=(
-            ("ADAPTIVE", "Adaptive", "As far as the widest gaps between the points around demand, point by point"),
-            ("LOCAL", "Local", "Follows the spacing of the points alone"),
+            ("ADAPTIVE", "Adaptive", "By the widest gaps between the points around it"),
+            ("LOCAL", "Local", "By the spacing of the points alone"),
             ("GLOBAL", "Global", "The same for all points: for even samples"),
         ),
         default=DEFAULTS.bandwidth.upper(),
     )
     neighbors: IntProperty(
         name="Neighbors",
-        description="The bandwidth is measured by the distance to this neighbor; more are smoother and slower",
+        description="Bandwidths follow the distance to this neighbor; more are smoother and slower",
         default=DEFAULTS.neighbors,
         min=6,
         soft_max=200,
@@ -112,7 +112,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     regularization: FloatProperty(
         name="Regularization",
-        description="Weight of the regularization of the areas, free of the object's size",
+        description="Weight of the regularization of the areas, independent of the object's size",
         default=PAPER_DEFAULTS.regularization,
         min=1e-9,
         soft_max=1.0,
@@ -120,10 +120,10 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     boundary: EnumProperty(
         name="Boundary",
-        description="Where the surface ends, if no Boundary Group is named",
+        description="Where the boundary of the surface is, if no Boundary Group is named",
         items=(
-            ("AUTO", "Automatic", "Find the points at a boundary, and continue the surface beyond it as in a mirror"),
-            ("OFF", "Off (Closed Surface)", "Take the surface as closed, whatever it looks like"),
+            ("AUTO", "Automatic", "Detect the boundary points, and reflect the surface across the boundary"),
+            ("OFF", "Off (Closed Surface)", "Treat the surface as closed"),
         ),
         default=DEFAULTS.boundary.upper(),
     )
@@ -134,19 +134,19 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     projection: EnumProperty(
         name="Noise",
-        description="Whether noise is smoothed within the computation; your points stay where they are, but sharp"
-        " edges count as rounded",
+        description="Whether noise is smoothed within the computation; your points are not moved, but sharp edges count"
+        " as rounded",
         items=(
-            ("AUTO", "Automatic", "Smooth if the measured noise asks for it"),
-            ("OFF", "Off", "Take every point where it is"),
-            ("QUADRIC", "Always", "Take every point onto a curved surface fitted to its neighbors"),
+            ("AUTO", "Automatic", "Smooth if the measured noise requires it"),
+            ("OFF", "Off", "Use the points as they are"),
+            ("QUADRIC", "Always", "Project each point onto a quadric fitted to its neighbors"),
         ),
         default=DEFAULTS.projection.upper(),
     )
     denoise: BoolProperty(
         name="Tangent Planes",
-        description="Take every point onto a plane through its neighbors first, against noise; your points stay where"
-        " they are",
+        description="Project each point onto a plane through its neighbors first, against noise; your points are not"
+        " moved",
         default=PAPER_DEFAULTS.denoise,
     )
     boundary_group: StringProperty(
@@ -155,19 +155,19 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     use_modifiers: BoolProperty(
         name="Use Modifiers",
-        description="Take the points where the modifiers put them; the modifiers must keep their number and order",
+        description="Read the points after the modifiers, which must keep their number and order",
         default=False,
     )
     leave_out_floaters: BoolProperty(
         name="Leave Out Floaters",
-        description="Keep Gaussian splats out of the operator that are hardly seen, huge or alone; they go along where"
-        " others are moved",
+        description="Leave Gaussian splats out of the operator that are nearly transparent, huge or isolated; they"
+        " follow the others",
         default=True,
     )
     point_budget: EnumProperty(
         name="Point Budget",
         description="How many points Analyze Points and Compute Modes work on; results of a subset, evenly spread over"
-        " the surface, are carried to all points. Other tools always take all",
+        " the surface, are transferred to all points. Other tools always take all",
         items=(
             ("AUTO", "Automatic", "All points if the free memory is enough for them, else a subset that fits well"),
             ("ALL", "All Points", "Every point, or a message that says how many fit the free memory"),
@@ -208,18 +208,19 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     outside: EnumProperty(
         name="Out of Range",
-        description="What becomes of points whose values lie outside the range",
+        description="Display of points whose values lie outside the range",
         items=(
-            ("CLAMP", "End Colors", "They have the color of the nearer end"),
-            ("GRAY", "Gray", "They are dark gray"),
-            ("HIDE", "Hidden", "They are not seen, in Material Preview and renders"),
+            ("CLAMP", "End Colors", "In the color of the nearer end"),
+            ("GRAY", "Gray", "In dark gray"),
+            ("HIDE", "Hidden", "Hidden, in Material Preview and renders"),
         ),
         default="CLAMP",
         update=_recolor,
     )
     iso_lines: IntProperty(
         name="Iso Lines",
-        description="Dark lines at so many even steps of the color range, such as lines of equal distance; 0 for none",
+        description="Number of dark lines at even steps of the color range, such as lines of equal distance; 0 for"
+        " none",
         default=0,
         min=0,
         soft_max=50,
@@ -227,7 +228,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     component: EnumProperty(
         name="Vector",
-        description="What of a vector is shown",
+        description="Part of vectors that is shown",
         items=(
             ("AUTO", "Automatic", "The length of displacements, the direction of normals"),
             ("DIRECTION", "Direction", "Red, green and blue for the directions x, y and z"),
@@ -251,12 +252,12 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     point_shape: EnumProperty(
         name="Point Shape",
-        description="What points are drawn as, where Show as Surface has found how they lie",
+        description="Shape of the points, once Show as Surface has computed their discs",
         items=(
             (
                 "DISCS",
                 "Discs",
-                "Discs in the surface, as large as the gaps between the points; of splats ellipsoids",
+                "Discs tangent to the surface, as large as the gaps between the points; of splats ellipsoids",
             ),
             ("DOTS", "Dots", "Round dots of one size"),
         ),
@@ -265,21 +266,21 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     strokes: BoolProperty(
         name="Strokes",
-        description="Draw short strokes along directions that lie in the surface, where such are on show",
+        description="Draw strokes along displayed tangent directions",
         default=True,
         update=_reshape,
     )
     smooth: BoolProperty(
         name="Smooth Colors",
-        description="Let colors run on from each disc to the next, by the slope of what is shown; otherwise each disc"
-        " has the one color of its point, as labels and directions have",
+        description="Interpolate colors within discs by the gradient of the values; otherwise each disc has the one"
+        " color of its point, as labels and directions have",
         default=True,
         update=_recolor,
     )
     shaded: FloatProperty(
         name="Shaded",
-        description="How much the light shows the form: 0 for flat colors, as in the legend, 1 for a surface that is"
-        " nothing but lit. In Material Preview and renders; Solid shades by itself",
+        description="Strength of shading: 0 flat colors, 1 fully shaded. In Material Preview and renders; Solid has"
+        " shading of its own",
         default=0.4,
         min=0.0,
         max=1.0,
@@ -294,7 +295,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     show_groups: BoolProperty(
         name="Group Colors",
-        description="Color the points of the groups below, over what is on show",
+        description="Color the points of the groups below, on top of the display",
         default=False,
         update=_show_groups,
     )
@@ -303,8 +304,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     legend_place: FloatVectorProperty(
         name="Legend Place",
-        description="Where the legend lies in the 3D view, which the mouse moves: shares of the way from left to right"
-        " and from bottom to top",
+        description="Relative position of the legend in the 3D view; drag it with the mouse",
         default=(1.0, 0.0),
         min=0.0,
         max=1.0,
@@ -322,7 +322,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     compare_weyl: BoolProperty(
         name="Weyl's Law",
-        description="Draw a line for comparison at 4 pi k / area, which the eigenvalues of any surface come near to",
+        description="Draw a line for comparison at 4 pi k / area, which the eigenvalues of any surface approach",
         default=True,
         update=_redraw,
     )
@@ -335,16 +335,17 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     own_material: PointerProperty(
         type=bpy.types.Material,
         name="Own Material",
-        description="Material of the first slot that the display shows, and will follow",
+        description="Material of the first slot that the display shows and follows",
     )
     slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
     colors_behind: BoolProperty(
-        name="Colors Behind", description="Whether colors were changed in Edit Mode, where points get none for Solid"
+        name="Colors Behind",
+        description="Whether colors for Solid are outdated, since Edit Mode prevents writing them",
     )
 
     notices: CollectionProperty(
-        type=notices.MESHFREE_PG_notice, name="Notices", description="What tools told of the object, until dismissed"
+        type=notices.MESHFREE_PG_notice, name="Notices", description="Notices of tools, until dismissed"
     )
     deform: PointerProperty(
         type=deform_settings.MESHFREE_PG_deform, name="Deform", description="How the object follows handles"
@@ -355,15 +356,15 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
     subset_count: IntProperty(
         name="Points in the Subset",
-        description="How many points the last analysis worked on, whose results were carried to all; 0 if on all",
+        description="How many points the last analysis worked on, whose results were transferred to all; 0 if on all",
         min=0,
     )
-    component_count: IntProperty(name="Components", description="How many components the surface falls into", min=0)
+    component_count: IntProperty(name="Components", description="How many components the surface has", min=0)
     boundary_count: IntProperty(
         name="Boundary Points", description="How many points lie at a boundary of the surface", min=0
     )
     left_out_count: IntProperty(
-        name="Points Left Out", description="How many points lie too far apart from others to take part", min=0
+        name="Points Left Out", description="How many points are outliers or in small components", min=0
     )
     stages: CollectionProperty(
         type=MESHFREE_PG_stage, name="Stages", description="How long each stage of the last analysis took"
@@ -386,7 +387,7 @@ CLASSES = (MESHFREE_PG_stage, *notices.PROPERTY_GROUPS, *deform_settings.CLASSES
 
 
 def attach():
-    """Give every object its settings."""
+    """Add the settings to objects."""
     bpy.types.Object.meshfree = PointerProperty(
         type=MESHFREE_PG_settings,
         name="Mesh-Free Laplacian",
@@ -395,5 +396,5 @@ def attach():
 
 
 def detach():
-    """Take the settings away again."""
+    """Remove the settings from objects."""
     del bpy.types.Object.meshfree

@@ -1,15 +1,15 @@
-"""What splats keep of their file beside what Blender shows, so that what is not changed is written as it was."""
+"""Data of a splat file that Blender does not show, kept so that unchanged values are written as they were."""
 
 import json
 
 import numpy as np
 
-from .attributes import own_positions, read_attribute, write_attribute, write_own_positions
+from .attributes import own_positions, read_attribute, remove_attributes, write_attribute, write_own_positions
 from .place import OFFSET, offset_of
 
-FORMAT = "lb_splat_format"  # custom property of an object: how the file that it came from was laid out
-OWN_OFFSET = "lb_splat_offset"  # custom property: what `OFFSET` is along the axes that the file had
-DIGITS = "ply_digits"  # attribute: what places in double precision have beyond single precision
+FORMAT = "lb_splat_format"  # custom property of an object: the layout of its file
+OWN_OFFSET = "lb_splat_offset"  # custom property: `OFFSET` in the axes of the file
+DIGITS = "ply_digits"  # attribute: positions in double precision less those in single precision
 # What decoding a file loses: attributes and their columns.
 RAW = {
     "ply_scale": ("FLOAT_VECTOR", ("scale_0", "scale_1", "scale_2")),
@@ -20,13 +20,13 @@ _ORDER, _COMMENTS, _COLUMNS = "order", "comments", "columns"
 
 
 def keep_format(obj, file):
-    """Keep on an object how a file is laid out."""
+    """Keep the layout of a file on an object."""
     types = [[name, values.dtype.str[1:]] for name, values in file.columns.items()]
     obj[FORMAT] = json.dumps({_ORDER: file.order, _COMMENTS: file.comments, _COLUMNS: types})
 
 
 def read_format(obj):
-    """Return the order of bytes, the comments, and the types of columns by their names; None where none are kept."""
+    """Return byte order, comments, and types of columns by name; None if none are kept."""
     kept = obj.get(FORMAT)
     if not kept:
         return None
@@ -35,7 +35,7 @@ def read_format(obj):
 
 
 def add_columns(obj, others):
-    """Let what is written of an object have the columns of the files of other objects, too."""
+    """Add the columns of the files of other objects to the layout of an object."""
     formats = [known for known in map(read_format, (obj, *others)) if known]
     if formats:
         order, comments, _ = formats[0]
@@ -45,14 +45,14 @@ def add_columns(obj, others):
 
 
 def keep_raw(data, columns):
-    """Keep the numbers of columns that decoding loses, those that are not there yet."""
+    """Keep the values of columns that decoding loses, unless they are kept already."""
     for name, (kind, parts) in RAW.items():
         if name not in data.attributes:
             write_attribute(data, name, np.column_stack([columns[part] for part in parts]), kind)
 
 
 def read_raw(data, count) -> dict:
-    """Return the numbers of columns that decoding loses, zeros where nothing was kept."""
+    """Return the values of columns that decoding loses, zeros where none were kept."""
     columns = {}
     for name, (_, parts) in RAW.items():
         values = read_attribute(data, name) if name in data.attributes else np.zeros((count, len(parts)))
@@ -61,17 +61,17 @@ def read_raw(data, count) -> dict:
 
 
 def write_places(data, places):
-    """Move points to places in double precision, (n, 3), and keep the digits that get lost on the way."""
+    """Move points to positions in double precision, (n, 3), and keep the digits that single precision loses."""
     write_own_positions(data, places)
     digits = (places - places.astype(np.float32)).astype(np.float32)
     if digits.any():
         write_attribute(data, DIGITS, digits, "FLOAT_VECTOR")
-    elif DIGITS in data.attributes:
-        data.attributes.remove(data.attributes[DIGITS])
+    else:
+        remove_attributes(data, DIGITS)
 
 
 def with_digits(data, positions):
-    """Return positions, (n, 3) float32, with the digits beyond them, (n, 3) float64, where these still fit."""
+    """Return positions, (n, 3) float32, with their kept digits, (n, 3) float64, where these are still valid."""
     places = positions.astype(np.float64)
     if DIGITS not in data.attributes:
         return places
@@ -80,12 +80,12 @@ def with_digits(data, positions):
 
 
 def own_places(data):
-    """Return the places of points in local space with all their digits, (n, 3) float64."""
+    """Return the positions of points in local space with all digits, (n, 3) float64."""
     return with_digits(data, own_positions(data))
 
 
 def own_offset(obj):
-    """Return what is added to local positions to get those of the file, (3,) float64."""
+    """Return the offset from local positions to those of the file, (3,) float64."""
     if OWN_OFFSET in obj:
         return np.array(obj[OWN_OFFSET], dtype=np.float64)
     if OFFSET not in obj:

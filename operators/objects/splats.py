@@ -22,14 +22,14 @@ from .modifiers import get_input, is_deform
 from .quantities import DISPLACEMENT
 
 SCALE, ROTATION, BASE, HARMONIC = "scale", "rotation", "radiance:base", "radiance:sh_"
-PLACE = ".splat_place"  # attribute: where a splat was when its ellipsoid was written, but for a common step
+PLACE = ".splat_place"  # attribute: where a splat was when its ellipsoid was written, up to a common translation
 LEFT_BEHIND = (
-    "some of its splats were turned or scaled without their ellipsoids, as Blender's own Join and Apply do. Undo that,"
+    "some of its splats were rotated or scaled without their ellipsoids, as Blender's own Join and Apply do. Undo that,"
     " and use Join Splats or Apply Transform to Splats instead"
 )
-_MOST_STEPS = 32  # that splats take with their ellipsoids: those of parts that were moved, not turned or scaled
-_STEP = 1e-5  # of the largest coordinate: a step as large as this is told from none
-_GLANCE = 4000  # splats that a panel looks at
+_MOST_STEPS = 32  # different translations of splats: more of them mean rotation or scaling
+_STEP = 1e-5  # of the largest coordinate: smaller steps count as equal
+_GLANCE = 4000  # splats that a panel checks
 _TYPES = {SCALE: ("FLOAT_VECTOR",), ROTATION: ("QUATERNION",), BASE: ("FLOAT4", "FLOAT_COLOR")}
 
 
@@ -77,7 +77,7 @@ def read_splats(data, with_harmonics=True) -> "core.Splats":
 def write_splats(data, splats):
     """Move the splats of a mesh or a point cloud, and write their sizes, rotations and harmonics, in local space.
 
-    Further lengths that they have grow with their sizes.
+    Other attributes that are lengths are scaled with their sizes.
     """
     moved = splats.positions - own_positions(data)
     write_own_positions(data, splats.positions)
@@ -97,7 +97,7 @@ def write_splats(data, splats):
 
 
 def shown_splats(obj) -> "core.Splats":
-    """Return the splats of an object as its deformation shows them: in between those at rest and those carried."""
+    """Return the splats of an object as its deformation shows them, interpolated from rest by its strength."""
     data = obj.data
     splats = read_splats(data)
     modifier = next(filter(is_deform, obj.modifiers), None)
@@ -108,7 +108,7 @@ def shown_splats(obj) -> "core.Splats":
     if SPLAT_SCALE not in data.attributes:
         return replace(splats, positions=positions)
     scales = _between(splats.scales, read_attribute(data, SPLAT_SCALE), strength)
-    rotations = _turned_between(splats.rotations, read_attribute(data, SPLAT_ROTATION), strength)
+    rotations = _slerp(splats.rotations, read_attribute(data, SPLAT_ROTATION), strength)
     harmonics = splats.harmonics.copy()
     for number in range(harmonics.shape[1]):
         name = f"{SPLAT_HARMONIC}{number}"
@@ -118,22 +118,22 @@ def shown_splats(obj) -> "core.Splats":
 
 
 def growth(before, after):
-    """Return by which factor lengths of splats grow, (n,), as the roots of their volumes; 1 for those without one."""
+    """Return the factors of the lengths of splats, (n,), as the cube roots of their volumes; 1 without a volume."""
     with np.errstate(divide="ignore", invalid="ignore"):
         factors = np.exp(np.mean(np.log(after, dtype=np.float64) - np.log(before, dtype=np.float64), axis=1))
     return np.where(np.isfinite(factors) & (factors > 0.0), factors, 1.0)
 
 
 def remember_places(data):
-    """Remember where splats are whose ellipsoids were just written."""
+    """Keep the positions at which ellipsoids were written."""
     write_attribute(data, PLACE, own_positions(data), "FLOAT_VECTOR")
 
 
 def are_left_behind(data, glance=False) -> bool:
-    """Whether splats were turned or scaled without their ellipsoids, as Blender's own Join and Apply do.
+    """Whether splats were rotated or scaled without their ellipsoids, as Blender's own Join and Apply do.
 
-    Where splats are only moved, they take one step, or few different ones. A glance, quick enough for a panel, looks at
-    some of them.
+    Splats that are only translated share one translation, or few. A glance, quick enough for a panel, checks some of
+    them.
     """
     if PLACE not in data.attributes or not has_splats(data):
         return False
@@ -143,8 +143,8 @@ def are_left_behind(data, glance=False) -> bool:
 
 
 def _count_steps(now, before):
-    """Count how many different steps splats took from where they were, (n, 3) both."""
-    known = before.any(axis=1)  # those of other origin have zeros
+    """Count the different translations of splats from earlier positions, (n, 3) both."""
+    known = before.any(axis=1)  # splats from elsewhere have zeros
     size = max(np.abs(values[known]).max(initial=0.0) for values in (now, before)) or 1.0
     steps = np.round((now - before)[known].astype(np.float64) / (_STEP * size)).astype(np.int64)
     return len(np.unique(steps @ [1, 1 << 20, 1 << 40]))
@@ -154,8 +154,8 @@ def _between(one, other, share):
     return one + share * (other - one)
 
 
-def _turned_between(one, other, share):
-    """Return the quaternions on the short way between unit quaternions, (n, 4)."""
+def _slerp(one, other, share):
+    """Interpolate unit quaternions, (n, 4), on the shortest arc."""
     cosine = np.einsum("nk,nk->n", one, other, dtype=np.float64)
     angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,1 +1,1 @@
-"""Long work: jobs, stages, what is kept of it, and what all operators have in common."""
+"""Jobs, stages, the cache of results, and the base classes of operators."""

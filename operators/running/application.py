@@ -1,4 +1,4 @@
-"""Tools that apply the Laplacian, and what their operators have in common: read all, compute, and only then write."""
+"""Base classes of tools that apply the Laplacian: read all, compute, and only then write."""
 
 from contextlib import contextmanager
 
@@ -8,7 +8,7 @@ from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, write_attribute
 from ..objects.colors import own_material, shows_own_material
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.options import laplacian_options
 from ..objects.reading import TYPES, discs, obstacle, read_points, sharing_objects
 from ..objects.result import check_writable
@@ -18,25 +18,25 @@ from .ready import reporting
 
 
 class Tool:
-    """What is done to objects by some settings: those of an operator, or attributes that the command line gives it.
+    """A computation on objects by settings: those of an operator, or attributes that the command line sets.
 
-    A subclass says what to do by two methods: `plan` reads everything that is needed of an object and returns a
-    function of a progress callback that computes, without touching Blender; `write` puts what that returns on the
-    object and returns texts: notices, and last a line for the status bar.
+    A subclass has two methods: `plan` reads everything that is needed of an object and returns a function of a progress
+    callback that computes, without access to Blender; `write` writes the result to the object and returns texts:
+    notices, and last a line for the status bar.
     """
 
-    asks = ()  # names of the settings that a dialog asks for before the work; without any there is none
-    adjustable = ()  # names of those that Adjust Last Operation, which waits, offers: they compute nothing long again
-    at_zero = {}  # words that stand beside settings of 0, by their names, where that is no number but leaves it open
+    asks = ()  # names of the settings in a dialog before the work; without any there is no dialog
+    adjustable = ()  # names of those in Adjust Last Operation, which blocks: they repeat no long computation
+    at_zero = {}  # texts beside settings of 0, by name, where 0 means automatic or unlimited
     writes = ()  # names of the attributes that `write` makes
 
     @property
     def shown(self) -> str:
-        """Name of the attribute that shows the result; empty if it is none."""
+        """Name of the attribute to show; empty if the result is not an attribute."""
         return self.writes[0] if self.writes else ""
 
     def plan_all(self, context, objects, among=()):
-        """Return name and plan of each object, if it can be written to; for `among` see `check_writable`."""
+        """Return name and plan of each object; for `among` see `check_writable`, which refuses others."""
         plans = []
         for obj in objects:
             with naming(obj.name):
@@ -56,22 +56,22 @@ class Tool:
         return obj.meshfree.make_single_user
 
     def is_repeated(self, context) -> bool:
-        """Whether this has run before, and is run again by Adjust Last Operation."""
+        """Whether Adjust Last Operation runs this again."""
         return False
 
 
 class ApplicationOperator(Tool, JobOperator):
     """An operator on the active object and on all other selected ones that can be read and written.
 
-    Of objects that share a mesh and its scale one is enough.
+    Of objects that share a mesh and its scale, one is computed.
     """
 
-    only_active = False  # for what has one object by nature
-    keeps_line = False  # whether what it says in the end are figures that one looks at again
+    only_active = False  # whether other selected objects are ignored
+    keeps_line = False  # whether its summary is kept as a notice
 
     at_once: BoolProperty(
         name="At Once",
-        description="Do it with these settings, without asking",
+        description="Use these settings, without asking",
         default=False,
         options={"HIDDEN", "SKIP_SAVE"},
     )
@@ -100,14 +100,14 @@ class ApplicationOperator(Tool, JobOperator):
             for reason in self._left_out:
                 self.warn(f"Left out: {reason}.", objects[0])
             for obj, (*notices, line) in zip(objects, texts, strict=True):
-                self.tell(obj, notices, line)
+                self.report_result(obj, notices, line)
         return {"FINISHED"}
 
     def conclude(self, context, objects):
-        """Do what is left when all objects are written."""
+        """Finish after all objects are written."""
 
-    def tell(self, obj, notices, line: str):
-        """Report what one should know of an object, and what was done with it."""
+    def report_result(self, obj, notices, line: str):
+        """Report notices about an object, and a summary."""
         for notice in notices:
             self.warn(notice, obj)
         if self.keeps_line:
@@ -120,7 +120,7 @@ class ApplicationOperator(Tool, JobOperator):
 
 
 class ShownOperator(ApplicationOperator):
-    """An operator whose attribute is shown when it is done."""
+    """An operator that shows its attribute at the end."""
 
     show: BoolProperty(name="Show", description="Show the result as colors on the points", default=True)
     adjustable = ("show",)
@@ -132,25 +132,27 @@ class ShownOperator(ApplicationOperator):
                 _write_discs(context, obj)
             for obj in filter(shows_own_material, [*objects, *sharing]):
                 self.warn(
-                    f'{obj.name}: colors take the place of the material "{own_material(obj).name}". Own Material under'
-                    " Display brings it back.",
+                    f'{obj.name}: the display replaces the material "{own_material(obj).name}". Own Material under'
+                    " Display shows it again.",
                     obj,
                 )
             for obj in [*objects, *sharing]:
-                tell("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
+                notify("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
 
 
 def _write_discs(context, obj):
-    """Keep how the display is to draw the points of an object, where the operator of all of them is known."""
+    """Write the discs of an object's points for the display, if the operator of all of them is kept."""
     reading, options = read_points(context, obj), laplacian_options(obj.meshfree)
     if DISC in obj.vertex_groups or not cache.holds(reading.points, options, reading.boundary, reading.splats):
         return
     laplacian = build_operator(reading, options, lambda *_: None).laplacian
-    write_attribute(obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.reach, reading.points))
+    write_attribute(
+        obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.cell_radius, reading.points)
+    )
 
 
 def compute_all(plans, progress):
-    """Carry out what was planned for some objects, given by name, and return the results."""
+    """Compute plans of objects, given by name, and return the results."""
     results = []
     for number, (name, plan) in enumerate(plans):
 
@@ -164,7 +166,7 @@ def compute_all(plans, progress):
 
 @contextmanager
 def naming(name):
-    """Let errors say which object they are about."""
+    """Add the name of an object to errors."""
     try:
         yield
     except PointCloudError as error:
@@ -180,15 +182,15 @@ def chosen_objects(context, becomes_single):
     ----------
     context : bpy.types.Context
     becomes_single : callable
-        Tells of an object whether it is to get a mesh of its own.
+        Whether an object is to get a mesh of its own.
 
     Returns
     -------
     list of bpy.types.Object
-        All meshes and point clouds that can be read and written. Of those that share a mesh one, but each that is to
+        All meshes and point clouds that can be read and written; one of those that share a mesh, but each that is to
         get its own.
     list of str
-        What the others of these lack.
+        Why others were left out.
     """
     chosen, left_out = {}, []
     for obj in [context.object, *context.selected_objects]:

@@ -1,4 +1,4 @@
-"""What was computed last, so that a change of what is only shown, or how strongly, computes nothing again."""
+"""A cache of recent results, so that changes of display or strength repeat no computation."""
 
 import hashlib
 from collections import OrderedDict
@@ -14,9 +14,9 @@ from bpy.app.handlers import persistent
 from ... import core
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
-_NONE = np.arange(0)  # splats that are left out
-_kept = OrderedDict()  # value and bytes, by what it was computed from; what was used last at the end
-_sources = WeakKeyDictionary()  # what each operator was built from
+_NONE = np.arange(0)  # no splats are left out
+_kept = OrderedDict()  # value and bytes by key, in the order of last use
+_sources = WeakKeyDictionary()  # key of each operator
 _lock = Lock()  # computations run in threads
 
 
@@ -35,13 +35,13 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
     points : ndarray, (n, 3)
     options : LaplacianOptions or PaperOptions
     boundary : ndarray, (n,) bool, or None
-        The points at the boundary; None leaves it to the options.
+        The boundary points; None leaves it to the options.
     progress : callable
         Called as ``progress(stage, fraction)``.
     orientation : ndarray, (n, 3), or None
-        Vectors whose side its normals take; None leaves it to core. The operator is not built anew for another one.
+        Vectors that orient the normals; None leaves it to core. The operator itself is not rebuilt for others.
     splats : Splats or None
-        Those that the points are the middles of: `floating` ones are left out.
+        The splats of the points: `floating` ones are left out.
     """
 
     def compute():
@@ -64,7 +64,7 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
 
 
 def _laplacian(points, options, boundary, out, progress):
-    """Build the operator by the method of the options; the paper's knows no boundary."""
+    """Build the operator by the method of the options; the paper's has no boundary."""
     given = {"left_out": out, "progress": progress}
     if isinstance(options, core.PaperOptions):
         return core.paper.build_laplacian(points, **asdict(options), **given)
@@ -78,12 +78,12 @@ def _oriented(built, orientation):
 
 
 def holds(points, options, boundary, splats=None) -> bool:
-    """Tell whether the operator that `build` returns is kept."""
+    """Whether the operator that `build` returns is kept."""
     return _get(content(points, options, boundary, floating(splats))) is not None
 
 
 def floating(splats):
-    """Return the splats that operators leave out, as indices; see `floating_rows`. Without splats there are none."""
+    """Return the indices of the splats that operators leave out; see `floating_rows`."""
     if splats is None:
         return _NONE
     key = content("floaters", splats.positions, splats.scales, splats.rotations, splats.opacities)
@@ -91,19 +91,19 @@ def floating(splats):
 
 
 def floating_notices(out):
-    """Say that splats were left out, if any were."""
+    """Return a notice of the splats that were left out, if any."""
     if not len(out):
         return []
     return [
-        f"Floaters left out of the operator, splats that are hardly seen, huge or alone: {len(out):,}. Select Floaters"
-        " selects them. They move with the splats next to them."
+        f"Floaters left out of the operator (nearly transparent, huge or isolated splats): {len(out):,}. Select"
+        " Floaters selects them. They move with the nearest splats."
     ]
 
 
 def fitting(count: int, options, modes: int = 0):
-    """Return how many points the free memory is enough for, None if unknown; see `points_that_fit`.
+    """Return how many points fit into the free memory, None if unknown; see `points_that_fit`.
 
-    Where it is not enough for a count, what is kept is given back first.
+    If a count does not fit, the cache is cleared first.
     """
     width = options.cloud if isinstance(options, core.PaperOptions) else options
     most = core.points_that_fit(width, modes)
@@ -114,7 +114,7 @@ def fitting(count: int, options, modes: int = 0):
 
 
 def lowest_modes(laplacian, count: int, progress, dirichlet=False, raw=False) -> "core.Spectrum":
-    """Return the lowest modes of an operator, computed only if there are not as many from before.
+    """Return the lowest modes of an operator, computed only if fewer are kept.
 
     Parameters
     ----------
@@ -143,28 +143,28 @@ def known_modes(laplacian) -> int:
 
 
 def result(laplacian, *settings, compute):
-    """Return what a function without arguments computes by an operator, called only if that is not kept.
+    """Return the result of a function without arguments that uses an operator, called only if it is not kept.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
         From `build`.
     *settings : hashable or ndarray
-        A name, and all else that the result depends on.
+        A name, and everything else that the result depends on.
     compute : callable
     """
     return fetch(content(_sources[laplacian], *settings), compute, laplacian)
 
 
 def geodesics(laplacian, progress) -> "core.Geodesics":
-    """Return what distances from any points have in common by an operator from `build`, computed only once."""
+    """Return the solver of geodesic distances of an operator from `build`, made only once."""
     return result(laplacian, "geodesics", compute=lambda: core.Geodesics(laplacian, progress=progress))
 
 
 def fetch(key, compute, laplacian=None):
-    """Return what is kept for a key; what the function computes, and keep it, if there is nothing.
+    """Return the value of a key, computed by a function and kept if there is none.
 
-    Of an operator that it was computed by, and holds, the bytes are not counted again.
+    The bytes of an operator that the value refers to are not counted again.
     """
     value = _get(key)
     if value is None:
@@ -174,25 +174,25 @@ def fetch(key, compute, laplacian=None):
 
 
 def content(*parts):
-    """Return a key for `fetch` of some parts, hashable or arrays, which go by their content."""
+    """Return a key for `fetch` of hashable parts and arrays, which count by content."""
     return tuple(
         hashlib.blake2b(np.ascontiguousarray(part)).digest() if isinstance(part, np.ndarray) else part for part in parts
     )
 
 
 def clear():
-    """Give the memory back."""
+    """Clear the cache."""
     with _lock:
         _kept.clear()
 
 
 def attach():
-    """Give the memory back when another file is opened."""
+    """Clear the cache when another file is opened."""
     bpy.app.handlers.load_pre.append(_forget)
 
 
 def detach():
-    """Leave nothing behind."""
+    """Remove the handler and clear the cache."""
     bpy.app.handlers.load_pre.remove(_forget)
     clear()
 
@@ -215,13 +215,13 @@ def _get(key):
 
 
 def _put(key, value, laplacian=None):
-    """Keep a value; of the others, those that were used last as long as there is room."""
+    """Keep a value, and drop those of the oldest use beyond the limit."""
     size = memory(value, laplacian)
     with _lock:
         _kept.pop(key, None)
         _kept[key] = value, size
         source = _sources.get(laplacian) if laplacian is not None else None
-        if source in _kept:  # without the operator its results are not found, and hold its memory
+        if source in _kept:  # its results are useless without the operator, and hold its memory
             _kept.move_to_end(source)
         total = sum(size for _, size in _kept.values())
         while total > LIMIT and len(_kept) > 1:
@@ -229,7 +229,7 @@ def _put(key, value, laplacian=None):
 
 
 def memory(value, known=None) -> int:
-    """Return the bytes of all arrays that a value holds, but not those of an object that is known."""
+    """Return the bytes of all arrays that a value refers to, without those of a known object."""
     total, found, pending = 0, {id(known)}, [value]
     while pending:
         item = pending.pop()

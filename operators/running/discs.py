@@ -1,4 +1,4 @@
-"""The discs that the display draws, found anew where a tool moves the points."""
+"""The discs of the display after a tool has moved the points."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from . import cache
 
 
 def disc_finder(obj, reading):
-    """Read what discs an object draws; return a function that finds those of moved points.
+    """Read the discs of an object's display; return a function that computes those of moved points.
 
-    It takes where the points go at full strength, as `reading.points`, and where they go, and returns normals times
-    radii, (n, 3), in local space; None where none are drawn. Discs are found for full strength, and kept; of what lies
-    on the way they are mixed, so that a change of the strength finds nothing anew.
+    Its arguments are the points at full strength, in the space of `reading.points`, and the points; it returns normals
+    times radii, (n, 3), in local space, None without discs. Discs are computed for full strength, and kept;
+    interpolation gives those of lower strengths.
     """
     rest = discs_at_rest(obj)
 

@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core import Cancelled, PointCloudError
-from ..objects.handlers import add_handlers, remove_handlers, tell
+from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..objects.options import point_budget, settings_values
 from ..objects.reading import find_object, fingerprint, metric, obstacle, read_points
 from ..objects.result import same_lengths
@@ -155,7 +155,7 @@ class Job(StageTimes):
         if text != self._shown:
             self._shown = text
             _set_status([window.workspace for window in windows], text)
-            tell("panels_changed")
+            notify("panels_changed")
 
     def open(self, context):
         """Begin to show it; one that has not begun is looked at again and again in the window that it belongs to."""
@@ -174,7 +174,7 @@ class Job(StageTimes):
         if not bpy.app.background:
             # Later: a window that is being closed must not find another context than it had.
             bpy.app.timers.register(_clear_status, persistent=True)
-        tell("panels_changed")
+        notify("panels_changed")
 
 
 class SteppedJob(Job):

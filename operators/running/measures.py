@@ -1,4 +1,4 @@
-"""What the operator tells of each point of an object: built on all of them, or on a subset and carried to all."""
+"""Quantities at each point of an object, by an operator on all of them, or on a subset and transferred to all."""
 
 from typing import NamedTuple
 
@@ -22,11 +22,11 @@ class Measured(NamedTuple):
     subset : ndarray, (k,) int
         Rows of the points that it is built on; none for all.
     measures : dict
-        Values at all points, lengths and axes of the world, by the names of attributes.
+        Values at all points, in lengths and axes of the world, by the names of attributes.
     prolongation : Prolongation or None
         From the subset to all.
     left_out : ndarray, (m,) int
-        Splats that take no part.
+        Splats that are left out.
     """
 
     built: cache.Built
@@ -36,19 +36,19 @@ class Measured(NamedTuple):
     left_out: np.ndarray
 
     def carried(self, vectors):
-        """Return functions on the points of the operator, (k, m), as such on all points, (n, m)."""
+        """Transfer functions from the points of the operator, (k, m), to all points, (n, m)."""
         return vectors if self.prolongation is None else self.prolongation.interpolate(vectors)
 
     @property
     def notices(self) -> list:
-        """What a user should know of the operator, and of how many points it was built on."""
+        """Notices about the operator, and about the number of points that it was built on."""
         if self.prolongation is None:
             return self.built.laplacian.notices
-        told = (
+        notice = (
             f"Analyzed {len(self.subset):,} of {len(self.prolongation.nearest):,} points, evenly spread over the"
-            " surface, and carried the results to all. The setting Point Budget decides how many."
+            " surface, and transferred the results to all. The setting Point Budget decides how many."
         )
-        return [told, *cache.floating_notices(self.left_out), *self.built.laplacian.notices]
+        return [notice, *cache.floating_notices(self.left_out), *self.built.laplacian.notices]
 
 
 def measure(points, options, boundary, budget, modes, progress, orientation=None, splats=None) -> Measured:
@@ -84,12 +84,12 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
 
 
 def _within(progress, stage):
-    """Return a callback without arguments that may end a stage."""
+    """Return a callback without arguments, which may cancel."""
     return lambda: progress(stage, 0.9)
 
 
 def _carry(prolongation, row, values, out):
-    """Carry values of a quantity to all points, of which some take no part."""
+    """Transfer values of a quantity to all points, some of which are left out."""
     if row.carried == "share":
         return prolongation.shares(values, out)
     carried = carry(prolongation, row.carried, values)
@@ -100,19 +100,19 @@ def _carry(prolongation, row, values, out):
     return carried
 
 
-def carry(prolongation, way, values):
-    """Carry values to all points of a `Prolongation`, in one of the ways of `Quantity` but "share"."""
-    if way == "label":
+def carry(prolongation, kind, values):
+    """Transfer values to all points of a `Prolongation`, by a value of `Quantity.carried` other than "share"."""
+    if kind == "label":
         return prolongation.labels(values)
     smooth = prolongation.interpolate(values)
-    if way == "smooth":
+    if kind == "smooth":
         return smooth
     length = np.sqrt(np.einsum("ij,ij->i", smooth, smooth))[:, None]
     return np.divide(smooth, length, out=prolongation.labels(values), where=length > 0.5)
 
 
 def _subset(points, options, boundary, splats, budget, modes, progress):
-    """Return the rows of the points to build the operator on; none for all. The same ones as long as they are kept."""
+    """Return the rows of the points to build the operator on, an empty array for all; kept ones again."""
     count = len(points)
     if budget is None or 0 < count <= budget or (not budget and cache.holds(points, options, boundary, splats)):
         return _ALL

@@ -1,4 +1,4 @@
-"""What all operators have in common: they run on objects that can be read and written, and can be undone."""
+"""The base classes of all operators: when they may run, and how they report."""
 
 from functools import wraps
 
@@ -8,7 +8,7 @@ from ...core import PointCloudError
 from ..objects.notices import forget, keep
 from ..objects.reading import obstacle, sharing_objects
 
-_TEXTS = {  # what may go wrong in any computation, in plain words
+_TEXTS = {  # errors that any computation may raise, and what to report
     PointCloudError: "{}",
     MemoryError: "The memory is used up. Close other programs, or lower the Point Budget",
     LinAlgError: "The equations have no solution ({}). Raise Neighbors, or delete points that lie on each other",
@@ -17,37 +17,37 @@ _TEXTS = {  # what may go wrong in any computation, in plain words
 TROUBLES = tuple(_TEXTS)
 
 
-def told(error) -> str:
-    """What is told of one of the `TROUBLES`."""
+def error_text(error) -> str:
+    """Return the text that reports one of the `TROUBLES`."""
     return next(text for kind, text in _TEXTS.items() if isinstance(error, kind)).format(error)
 
 
 def reporting(method):
-    """Let an operator report what a method of it, such as `execute`, refuses, and what may go wrong in any."""
+    """Let a method of an operator, such as `execute`, report the errors that it raises."""
 
     @wraps(method)
     def guarded(self, context, *more):
         try:
             return method(self, context, *more)
         except TROUBLES as error:
-            self.report({"ERROR"}, told(error))
+            self.report({"ERROR"}, error_text(error))
             return {"CANCELLED"}
 
     return guarded
 
 
-class TellingOperator:
-    """An operator whose warnings stay with the object that they are about, where the panel shows them.
+class NoticeOperator:
+    """An operator whose warnings are kept on the object that they concern, where the panel shows them.
 
-    The line about a report in the status bar is gone with the next one.
+    A report in the status bar disappears with the next one.
     """
 
     def warn(self, text: str, *objects):
-        """Report what somebody should know of some objects, and keep it there."""
+        """Report a warning about objects, and keep it on them."""
         self._keep("WARNING", text, objects)
 
     def note(self, text: str, *objects):
-        """Report figures of some objects that one looks at again, and keep them there."""
+        """Report figures about objects, and keep them on them."""
         self._keep("INFO", text, objects)
 
     def _keep(self, level, text, objects):
@@ -56,18 +56,18 @@ class TellingOperator:
             keep(owner, self.bl_label, text, level)
 
     def begin_notices(self, objects):
-        """Drop what this operator told of objects when it ran before."""
+        """Remove the notices of an earlier run of this operator from objects."""
         for owner in _owners(objects):
             forget(owner, self.bl_label)
 
 
 def _owners(objects):
-    """Some objects, and those that show the same points."""
+    """Return objects with those that share their points."""
     return [owner for obj in objects for owner in (obj, *sharing_objects(obj))]
 
 
-class ReadyOperator(TellingOperator):
-    """An operator for the active object; where that is unfit, the button is gray and its tooltip says why."""
+class ReadyOperator(NoticeOperator):
+    """An operator on the active object; where that cannot be used, the button is gray and its tooltip says why."""
 
     bl_options = {"REGISTER", "UNDO"}
     works_in = ("OBJECT",)  # modes of the object

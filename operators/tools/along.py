@@ -1,4 +1,4 @@
-"""Along the surface from some points or a curve: cells, a map, directions carried to all, distance with a side."""
+"""Along the surface from points or a curve: cells, a map, parallel transport, signed distance."""
 
 import bpy
 import numpy as np
@@ -13,9 +13,9 @@ from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from .select import read_sources
+from .select import read_sources, unreached
 
-OUTSIDE = -1.0  # place in the texture of points that the map does not reach: beyond its border
+OUTSIDE = -1.0  # texture coordinates of points that the map does not reach
 
 
 def _transport(laplacian, progress):
@@ -30,8 +30,8 @@ class NearestSource(Tool):
 
     group: StringProperty(
         name="Sources",
-        description="Vertex group with the points in the middle of cells; where there is none of that name, the points"
-        " selected in Edit Mode",
+        description="Vertex group with the points that are centers of cells; where there is none of that name, the"
+        " points selected in Edit Mode",
         default=SOURCE,
     )
 
@@ -53,13 +53,12 @@ class NearestSource(Tool):
     def write(self, context, obj, result):
         write_attribute(obj.data, CELL, result)
         tag_changed(obj.data)
-        missed, line = np.count_nonzero(result < 0), f"{obj.name}: {len(np.unique(result[result >= 0])):,} cells"
-        far = f"{missed:,} points of {obj.name} are reached by no source. Their cell is -1."
-        return [far, line] if missed else [line]
+        count = len(np.unique(result[result >= 0]))
+        return [*unreached(obj, result >= 0, "Their cell is -1."), f"{obj.name}: {count:,} cells"]
 
 
 class MESHFREE_OT_nearest_source(NearestSource, ShownOperator, bpy.types.Operator):
-    """Divide the surface into cells: the points that are nearest, along the surface, to the same source"""
+    """Divide the surface into geodesic Voronoi cells of the sources"""
 
     bl_idname = "meshfree.nearest_source"
     bl_label = "Nearest Source"
@@ -74,48 +73,48 @@ class Unwrap(Tool):
     at_zero = {"radius": "All Points"}
 
     group: StringProperty(
-        name="Middle",
-        description="Vertex group around the middle of the texture, where the point nearest to the mean of its points"
-        " is; where there is none of that name, the points selected in Edit Mode",
+        name="Center",
+        description="Vertex group around the center of the texture, which is the point nearest to the mean of its"
+        " points; where there is none of that name, the points selected in Edit Mode",
         default=SOURCE,
     )
     radius: FloatProperty(
         name="Radius",
-        description="Distance along the surface from the middle of the texture to its border; 0 for all points",
+        description="Distance along the surface from the center of the texture to its border; 0 for all points",
         default=0.0,
         min=0.0,
         subtype="DISTANCE",
     )
     angle: FloatProperty(
-        name="Angle", description="Turn of the texture around its middle", default=0.0, subtype="ANGLE"
+        name="Angle", description="Rotation of the texture about its center", default=0.0, subtype="ANGLE"
     )
 
     def plan(self, context, obj):
         sources = np.flatnonzero(read_sources(obj, self.group))
         reading, operator = operator_reader(context, obj)
-        places = reading.points[sources]
-        middle = int(sources[np.linalg.norm(places - places.mean(axis=0), axis=1).argmin()])
-        radius, turn = self.radius, np.exp(1j * self.angle)
+        points = reading.points[sources]
+        center = int(sources[np.linalg.norm(points - points.mean(axis=0), axis=1).argmin()])
+        radius, rotation = self.radius, np.exp(1j * self.angle)
 
         def compute(progress):
             laplacian = operator(progress)
-            if laplacian.component[middle] < 0:
+            if laplacian.component[center] < 0:
                 raise PointCloudError(
-                    f'The middle is a point of "{obj.name}" that the operator left out, because it lies apart from the'
-                    " surface. Choose a point of the surface."
+                    f'The center is a point of "{obj.name}" that the operator left out, because it is an outlier.'
+                    " Choose a point of the surface."
                 )
             place = cache.result(
                 laplacian,
                 "map",
-                middle,
+                center,
                 compute=lambda: _transport(laplacian, progress).logarithmic_map(
-                    middle, geodesics=cache.geodesics(laplacian, progress), progress=progress
+                    center, geodesics=cache.geodesics(laplacian, progress), progress=progress
                 ),
             )
             reached = np.isfinite(place[:, 0])
             place = place @ [1.0, 1.0j]
             border = radius or np.abs(place[reached]).max()
-            texture = 0.5 + 0.5j + 0.5 * turn * place / border
+            texture = 0.5 + 0.5j + 0.5 * rotation * place / border
             return np.where(reached[:, None], np.column_stack([texture.real, texture.imag]), OUTSIDE), border
 
         return compute
@@ -124,11 +123,11 @@ class Unwrap(Tool):
         texture, border = result
         write_attribute(obj.data, UV, texture)
         tag_changed(obj.data)
-        return [f"{obj.name}: texture coordinates up to {length_text(border)} from the middle"]
+        return [f"{obj.name}: texture coordinates up to {length_text(border)} from the center"]
 
 
 class MESHFREE_OT_unwrap(Unwrap, ShownOperator, bpy.types.Operator):
-    """Lay the surface around a point out flat as texture coordinates: a decal that follows the surface"""
+    """Map the surface around a point to texture coordinates, like a decal"""
 
     bl_idname = "meshfree.unwrap"
     bl_label = "Unwrap Around Point"
@@ -148,8 +147,7 @@ class ExtendDirection(Tool):
     )
     direction: FloatVectorProperty(
         name="Direction",
-        description="Direction at these points, along the axes of the world; what leads out of the surface does not"
-        " count",
+        description="Direction at these points, along the axes of the world; projected onto the surface",
         default=(0.0, 0.0, -1.0),
         min=-1e6,
         max=1e6,
@@ -180,13 +178,12 @@ class ExtendDirection(Tool):
     def write(self, context, obj, result):
         write_attribute(obj.data, DIRECTION, result)
         tag_changed(obj.data)
-        missed, line = np.count_nonzero(~result.any(axis=1)), f"{obj.name}: directions on {len(result):,} points"
-        far = f"{missed:,} points of {obj.name} are reached by no source. They have no direction."
-        return [far, line] if missed else [line]
+        notices = unreached(obj, result.any(axis=1), "They have no direction.")
+        return [*notices, f"{obj.name}: directions on {len(result):,} points"]
 
 
 class MESHFREE_OT_extend_direction(ExtendDirection, ShownOperator, bpy.types.Operator):
-    """Carry a direction at some points along the surface to all others, for hair, scratches or brush strokes"""
+    """Extend directions at some points to the whole surface by parallel transport"""
 
     bl_idname = "meshfree.extend_direction"
     bl_label = "Extend Direction"
@@ -200,11 +197,11 @@ class SignedDistance(Tool):
 
     curve: StringProperty(
         name="Curve",
-        description="Curve object on the surface; each of its points stands for the nearest one of the cloud",
+        description="Curve object on the surface; each of its points is replaced by the nearest one of the cloud",
     )
 
     def plan(self, context, obj):
-        places, closed = self.way(context, obj)
+        places, closed = self.read_curve(context, obj)
         reading, operator = operator_reader(context, obj)
 
         def compute(progress):
@@ -212,38 +209,37 @@ class SignedDistance(Tool):
             known = np.flatnonzero(laplacian.component >= 0)
             nearest = known[core.geometry.nearest_rows(reading.points[known], places)]
             _, first = np.unique(nearest, return_index=True)
-            way = nearest[np.sort(first)]
-            if len(way) < 2:
+            curve = nearest[np.sort(first)]
+            if len(curve) < 2:
                 raise PointCloudError("All of the curve lies at one point of the cloud. Draw it along the surface.")
             return cache.result(
                 laplacian,
                 "sides of a curve",
-                way,
+                curve,
                 closed,
                 compute=lambda: cache.geodesics(laplacian, progress).signed_distance(
-                    way, closed and len(way) > 2, progress=progress
+                    curve, closed and len(curve) > 2, progress=progress
                 ),
             )
 
         return compute
 
-    def way(self, context, obj):
-        """Return the places that the curve goes through, (k, 3), as points are read, and whether it is closed."""
+    def read_curve(self, context, obj):
+        """Return the points of the curve, (k, 3), relative to the object's location, and whether it is closed."""
         places, closed = _read_curve(context, self.curve)
-        return places - np.array(obj.matrix_world.translation), closed  # points are read without it
+        return places - np.array(obj.matrix_world.translation), closed  # as points are read
 
     def write(self, context, obj, result):
         reached = np.isfinite(result)
         write_attribute(obj.data, SIGNED_DISTANCE, np.where(reached, result, 0.0))
         tag_changed(obj.data)
         low, high = (length_text(value) for value in (result[reached].min(), result[reached].max()))
-        missed, line = np.count_nonzero(~reached), f"{obj.name}: {low} on the right to {high} on the left"
-        far = f"{missed:,} points of {obj.name} are not reached from the curve. Their distance is 0."
-        return [far, line] if missed else [line]
+        notices = unreached(obj, reached, "Their distance is 0.")
+        return [*notices, f"{obj.name}: {low} on the right to {high} on the left"]
 
 
 class MESHFREE_OT_signed_distance(SignedDistance, ShownOperator, bpy.types.Operator):
-    """Measure the distance along the surface from a curve on it: above zero on its left, below zero on its right"""
+    """Geodesic distance from a curve, positive on its left"""
 
     bl_idname = "meshfree.signed_distance"
     bl_label = "Signed Distance"

@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, FloatProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.attributes import COMPARED, tag_changed, write_attribute
+from ..objects.place import activate, hide
 from ..objects.quantities import DEVIATION
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
@@ -122,21 +123,19 @@ class CompareOperator(Compare, ShownOperator):
         """Hide the cloud that covers the colors: when nothing can fail anymore, for nothing would show it again."""
         finished = super().finish(context, objects, results)
         if self.hide_reference:
-            other = objects[0].meshfree.compared_with
-            other.hide_set(True)
-            other.hide_render = True
+            hide(objects[0].meshfree.compared_with)
         return finished
 
 
 class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):
-    """Measure how far the points of the active object are from the surface of the other selected one"""
+    """Measure the signed distance of the active object's points from the surface of the other selected one"""
 
     bl_idname = "meshfree.compare"
     bl_label = "Compare Points"
 
 
 class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
-    """Compare the other way round: show how far the points of the reference are from the active object's surface"""
+    """Exchange the compared objects"""
 
     bl_idname = "meshfree.compare_swap"
     bl_label = "Swap Comparison"
@@ -159,12 +158,8 @@ class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
     def finish(self, context, objects, results):
         """Make the former reference the active object too."""
         finished = super().finish(context, objects, results)
-        objects[0].hide_set(False)
-        objects[0].hide_render = False
-        for other in context.selected_objects:
-            other.select_set(False)
-        objects[0].select_set(True)
-        context.view_layer.objects.active = objects[0]
+        hide(objects[0], False)
+        activate(context, objects[0])
         return finished
 
 

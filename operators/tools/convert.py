@@ -4,16 +4,16 @@ import re
 from contextlib import contextmanager
 
 import bpy
-import numpy as np
 from bpy.props import EnumProperty
 
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import SELECTION, point_count, write_attribute
+from ..objects.attributes import SELECTION, point_count, remove_attributes, write_attribute
 from ..objects.counting import renew_counts
 from ..objects.evaluated import POINTCLOUDS_SINCE, shown_as_own, shown_points
-from ..objects.groups import ROLES, group_weights, handle_names, has_group
+from ..objects.groups import ROLES, add_group, group_weights, handle_names, has_group
 from ..objects.modifiers import inputs_of, is_display, put_inputs, set_input
+from ..objects.place import activate
 from ..objects.result import check_writable
 from ..registration import Registration
 from ..running.application import chosen_objects
@@ -24,7 +24,7 @@ _SEGMENT = re.compile(r"Segment \d+")
 
 
 class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
-    """Turn a mesh into a point cloud or back, and keep groups, results and colors; modifiers are applied"""
+    """Convert a mesh to a point cloud or back, and keep groups, results and colors; modifiers are applied"""
 
     bl_idname = "meshfree.convert"
     bl_label = "Convert Points"
@@ -110,10 +110,7 @@ def _convert(context, obj, target):
     groups = {name: group_weights(obj, name) for name in _group_names(obj)}
     chosen, count = selection(obj), point_count(obj.data)
     display = _take_display(obj)  # whose points Blender would not take for those of the object
-    for other in context.selected_objects:
-        other.select_set(False)
-    obj.select_set(True)
-    context.view_layer.objects.active = obj
+    activate(context, obj)
     with _points_of_nodes(context, obj) as made:
         bpy.ops.object.convert(target=target)
     if not point_count(obj.data):
@@ -123,13 +120,9 @@ def _convert(context, obj, target):
         write_attribute(data, SELECTION, chosen, "BOOLEAN")
     elif same:
         data.vertices.foreach_set("select", chosen)
-        if SELECTION in data.attributes:
-            data.attributes.remove(data.attributes[SELECTION])
+        remove_attributes(data, SELECTION, *groups)
         for name, weights in groups.items():
-            data.attributes.remove(data.attributes[name])
-            group = obj.vertex_groups.new(name=name)
-            for weight in np.unique(weights[weights > 0.0]):
-                group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
+            add_group(obj, name, weights)
     _put_display(obj, display)
     renew_counts(obj)
     return made

@@ -70,7 +70,7 @@ class Curvatures(Tool):
 
 
 class MESHFREE_OT_principal_curvatures(Curvatures, ShownOperator, bpy.types.Operator):
-    """Compute the greatest and the least curvature at each point, their direction, and the kind of shape"""
+    """Compute principal curvatures and directions, shape index and curvedness"""
 
     bl_idname = "meshfree.principal_curvatures"
     bl_label = "Principal Curvatures"
@@ -85,8 +85,7 @@ class Roughness(Tool):
 
     wavelength: FloatProperty(
         name="Wavelength",
-        description="Size of the details that are half rough, half shape: finer ones are rough; 0 for what suits the"
-        " points",
+        description="Wavelength of which half counts as roughness; 0 for a default suited to the points",
         default=0.0,
         min=0.0,
         subtype="DISTANCE",
@@ -116,7 +115,7 @@ class Roughness(Tool):
 
 
 class MESHFREE_OT_roughness(Roughness, ShownOperator, bpy.types.Operator):
-    """Measure how far the points stick out of the smooth surface, or lie within it"""
+    """Measure the signed height of points above the smoothed surface"""
 
     bl_idname = "meshfree.roughness"
     bl_label = "Roughness"

@@ -13,7 +13,7 @@ from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from .select import read_sources
+from .select import read_sources, unreached
 
 UNREACHED = -1.0  # distance of points that no source reaches
 
@@ -150,7 +150,7 @@ class HarmonicField(Tool):
 
 
 class MESHFREE_OT_harmonic_field(HarmonicField, ShownOperator, bpy.types.Operator):
-    """Fill in a smooth field between points with given values, or solve Poisson's equation"""
+    """Interpolate a harmonic field between given values, or solve Poisson's equation"""
 
     bl_idname = "meshfree.harmonic_field"
     bl_label = "Harmonic Field"
@@ -164,8 +164,7 @@ class GeodesicDistance(Tool):
 
     group: StringProperty(
         name="Sources",
-        description="Vertex group with the points to measure from; where there is none of that name, the points"
-        " selected in Edit Mode",
+        description="Vertex group of the sources; where there is none of that name, the points selected in Edit Mode",
         default=SOURCE,
     )
 
@@ -193,13 +192,12 @@ class GeodesicDistance(Tool):
         reached = np.isfinite(result)
         write_attribute(obj.data, DISTANCE, np.where(reached, result, UNREACHED))
         tag_changed(obj.data)
-        missed, line = np.count_nonzero(~reached), f"{obj.name}: distances up to {length_text(result[reached].max())}"
-        far = f"{missed:,} points of {obj.name} are reached by no source. Their distance is {UNREACHED:g}."
-        return [far, line] if missed else [line]
+        notices = unreached(obj, reached, f"Their distance is {UNREACHED:g}.")
+        return [*notices, f"{obj.name}: distances up to {length_text(result[reached].max())}"]
 
 
 class MESHFREE_OT_geodesic_distance(GeodesicDistance, ShownOperator, bpy.types.Operator):
-    """Measure the distance along the surface from a group of points, or from the selected ones"""
+    """Geodesic distance from a group of points, or from the selected ones"""
 
     bl_idname = "meshfree.geodesic_distance"
     bl_label = "Geodesic Distance"

@@ -10,8 +10,8 @@ from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, wr
 from ..objects.color_choices import COLOR_CHOICES
 from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
-from ..objects.handlers import tell
-from ..objects.place import copy_place, hide
+from ..objects.handlers import notify
+from ..objects.place import activate, copy_place, hide
 from ..objects.quantities import quantity
 from ..objects.splats import has_splats
 from ..registration import Registration, Row
@@ -78,18 +78,14 @@ class MeshSurface(Tool):
         made = {name: bpy.data.objects[other] for name, other, _ in self.made}
         self.made = ()
         for obj in objects:
-            tell("mesh_made", obj, made[obj.name])
-        for other in context.selected_objects:
-            other.select_set(False)
-        for obj in objects:
-            made[obj.name].select_set(True)
-        context.view_layer.objects.active = made[objects[0].name]
+            notify("mesh_made", obj, made[obj.name])
+        activate(context, *(made[obj.name] for obj in objects))
         for obj in objects:
             hide(obj)
 
 
 class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Operator):
-    """Make a mesh of the surface that the points lie on, with their results, colors and groups on its vertices"""
+    """Reconstruct a mesh from the points, with their results, colors and groups on its vertices"""
 
     bl_idname = "meshfree.mesh_surface"
     bl_label = "Surface from Points"
@@ -138,10 +134,10 @@ class _Kept:
         return result
 
     def _carry(self, carrying, name, values):
-        way = quantity(name).carried if values.dtype.kind == "f" else "label"
-        if way == "share":  # areas stay those of the points: the area of a mesh is that of its faces
-            way = "smooth"
-        result = carry(carrying, way, values)
+        kind = quantity(name).carried if values.dtype.kind == "f" else "label"
+        if kind == "share":  # areas stay those of the points: the area of a mesh is that of its faces
+            kind = "smooth"
+        result = carry(carrying, kind, values)
         return np.clip(result, 0.0, None) if self._types[name] in COLORS else result
 
     def write(self, obj):

@@ -28,7 +28,7 @@ class MinimalSurface(Tool):
     group: StringProperty(
         name="Fixed",
         description="Vertex group with the points that stay, every boundary at least; where there is none of that"
-        " name, the boundaries that are found",
+        " name, the detected boundaries",
         default=FIXED,
     )
     tolerance: FloatProperty(
@@ -82,7 +82,7 @@ class MinimalSurface(Tool):
 
 
 class MESHFREE_OT_minimal_surface(MinimalSurface, ApplicationOperator, bpy.types.Operator):
-    """Let the points shrink to the least area that their boundary can span, as a soap film does"""
+    """Move the points to the surface of least area with their boundary"""
 
     bl_idname = "meshfree.minimal_surface"
     bl_label = "Minimal Surface"

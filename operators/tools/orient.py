@@ -1,4 +1,4 @@
-"""Which side of the surface the normals point to, for this and all later analyses."""
+"""Orientation of the normals, for this and all later analyses."""
 
 import bpy
 import numpy as np
@@ -28,15 +28,16 @@ class OrientNormals(Tool):
         name="Method",
         description="How the side is found",
         items=[
-            ("WINDING", "Winding Number", "As closed as the surface can be, through gaps and in noise"),
+            ("WINDING", "Winding Number", "By the generalized winding number, through gaps and in noise"),
             (
                 "OUTSIDE",
                 "Outside",
-                "Neighbors agree, each component points away from its middle, terrain up: as analyzed at first",
+                "Consistent with neighbors, away from the center of each component, terrain up: the default of Analyze"
+                " Points",
             ),
-            ("VIEWPOINT", "Viewpoint", "To where an object is, such as the camera"),
-            ("ATTRIBUTE", "Attribute", "By a vector of each point, such as the place of the scanner"),
-            ("KEEP", "As They Are", "The side that they have, to flip it"),
+            ("VIEWPOINT", "Viewpoint", "Towards an object, such as the camera"),
+            ("ATTRIBUTE", "Attribute", "By a vector of each point, such as the scanner position"),
+            ("KEEP", "As They Are", "Keep the present side, to flip it"),
         ],
         default="WINDING",
     )
@@ -46,20 +47,20 @@ class OrientNormals(Tool):
     source: StringProperty(name="Attribute", description="Vector attribute, for Attribute")
     holds: EnumProperty(
         name="Attribute Holds",
-        description="What the vectors of the attribute are",
+        description="Meaning of the vectors of the attribute",
         items=[
-            ("POSITIONS", "Positions", "Places in the object's own coordinates that the points were seen from"),
+            ("POSITIONS", "Positions", "Positions in local coordinates from which the points were seen"),
             ("DIRECTIONS", "Directions", "Directions to the outer side, such as normals from a file"),
         ],
         default="POSITIONS",
     )
-    flip: BoolProperty(name="Flip", description="Take the other side of all of them", default=False)
+    flip: BoolProperty(name="Flip", description="Reverse all normals afterwards", default=False)
 
     def plan(self, context, obj):
         reading = read_points(context, obj)
         method, sign = self.method, -1.0 if self.flip else 1.0
-        viewpoint = self.seen_from(context, obj, reading)
-        way = {"WINDING": "winding", "OUTSIDE": "outside"}.get(method, "viewpoint")
+        viewpoint = self.viewpoints(context, obj, reading)
+        core_method = {"WINDING": "winding", "OUTSIDE": "outside"}.get(method, "viewpoint")
 
         def orient(measured, progress):
             laplacian, normals, areas = measured.built.laplacian, measured.measures[NORMAL], measured.measures[AREA]
@@ -68,14 +69,16 @@ class OrientNormals(Tool):
             progress("Orientation", 0.9)
 
             def compute():
-                return core.orient_normals(reading.points, normals, method=way, viewpoint=viewpoint, areas=areas)
+                return core.orient_normals(
+                    reading.points, normals, method=core_method, viewpoint=viewpoint, areas=areas
+                )
 
-            return sign * cache.result(laplacian, "sides", reading.points, way, viewpoint, compute=compute)
+            return sign * cache.result(laplacian, "sides", reading.points, core_method, viewpoint, compute=compute)
 
         return plan_analysis(context, obj, orient=orient)
 
-    def seen_from(self, context, obj, reading):
-        """Return the places that points, as they are read, were seen from, (3,) or (n, 3); None if no method asks."""
+    def viewpoints(self, context, obj, reading):
+        """Return the positions from which points, as read, were seen, (3,) or (n, 3); None if the method has none."""
         if self.method == "VIEWPOINT":
             return _place(context, obj, self.viewpoint)
         if self.method != "ATTRIBUTE":
@@ -85,26 +88,26 @@ class OrientNormals(Tool):
 
     def write(self, context, obj, result):
         before = obj.data.attributes.get(NORMAL)
-        turned = None if before is None else _turned(read_attribute(obj.data, NORMAL), result.local_normals)
+        count = None if before is None else _count_reversed(read_attribute(obj.data, NORMAL), result.local_normals)
         write_result(obj, result, WRITE_LIMIT, oriented=True)
-        told = "normals oriented" if turned is None else f"{turned:,} of {len(result.local_normals):,} normals reversed"
-        return [*result.notices, f"{obj.name}: {told}"]
+        done = "normals oriented" if count is None else f"{count:,} of {len(result.local_normals):,} normals reversed"
+        return [*result.notices, f"{obj.name}: {done}"]
 
 
 class MESHFREE_OT_orient_normals(OrientNormals, ShownOperator, bpy.types.Operator):
-    """Choose the side that normals point to, for this object's results and all that is computed of it later"""
+    """Choose the sign of the normals, for this object's results and all that is computed from it later"""
 
     bl_idname = "meshfree.orient_normals"
     bl_label = "Orient Normals"
 
 
-def _turned(before, after):
-    """Return how many normals point to the other side."""
+def _count_reversed(before, after):
+    """Count normals that have been reversed."""
     return int(np.count_nonzero(np.einsum("ij,ij->i", before, after) < 0.0))
 
 
 def _place(context, obj, name):
-    """Read where the named object is, or the scene's camera, in the coordinates that points are read in."""
+    """Read the position of the named object, or of the scene's camera, in the coordinates of points as read."""
     found = context.scene.objects.get(name) if name else context.scene.camera
     if found is None:
         missing = f'The scene has no object "{name}"' if name else "The scene has no camera"

@@ -28,7 +28,7 @@ class Segment(Tool):
         name="Method",
         description="What makes a part",
         items=[
-            ("PARTS", "Parts", "As many parts as asked for, each connected, divided at narrow places"),
+            ("PARTS", "Parts", "As many connected parts as requested, divided where the shape is narrow"),
             ("NODAL", "Signs of a Mode", "Connected regions in which a vibration mode keeps its sign"),
         ],
         default="PARTS",
@@ -127,7 +127,7 @@ def _check_groups(obj):
 
 
 class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
-    """Make an object of each part; the largest one stays in this object"""
+    """Make each part an object; the largest one stays in this object"""
 
     bl_idname = "meshfree.separate_by_segment"
     bl_label = "Separate by Segment"
@@ -239,7 +239,7 @@ class Signature(Tool):
 
 
 class MESHFREE_OT_signature(Signature, ShownOperator, bpy.types.Operator):
-    """Compute signatures that tell points apart by the shape around them, at several scales, however it is bent"""
+    """Compute heat or wave kernel signatures, which are unchanged by bending"""
 
     bl_idname = "meshfree.signature"
     bl_label = "Signatures"

@@ -32,7 +32,7 @@ from ..objects.groups import (
     is_chosen,
     rivals,
 )
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.splats import read_splats
 from ..registration import Registration, Row
@@ -150,6 +150,12 @@ def selected(obj):
     return chosen
 
 
+def unreached(obj, reached, consequence: str) -> list:
+    """Return a notice of the points of an object that no source reaches, given those that one does, (n,) bool."""
+    missed = np.count_nonzero(~reached)
+    return [f"{missed:,} points of {obj.name} are reached by no source. {consequence}"] if missed else []
+
+
 def read_sources(obj, group):
     """Read the points of a group or, where there is none of the default's name, the selected ones, (n,) bool."""
     return chosen_members(obj, group, "Sources") if is_chosen(obj, group, SOURCE) else selected(obj)
@@ -175,7 +181,7 @@ def select(context, obj, chosen) -> str:
 def groups_changed(obj):
     """Let the panel count the groups of an object again, and the display color them, if it does."""
     renew_counts(obj)
-    tell("groups_changed", obj)
+    notify("groups_changed", obj)
 
 
 def analyzed(context, obj):
@@ -227,7 +233,7 @@ class FrontOnly:
 
     direction: FloatVectorProperty(
         name="Viewing Direction",
-        description="Direction in which one looks at the object; zero for that of the viewport",
+        description="Direction of view; zero for that of the viewport",
         default=(0.0, 0.0, 0.0),
         subtype="XYZ",
     )
@@ -250,7 +256,7 @@ class FrontOnly:
 
 
 class MESHFREE_OT_select_front(SelectionOperator, FrontOnly, bpy.types.Operator):
-    """Deselect the points whose normals point away from the viewer, which Box Select takes too"""
+    """Deselect points facing away from the view, which Box Select selects too"""
 
     bl_idname = "meshfree.select_front"
     bl_label = "Front Only"
@@ -261,7 +267,7 @@ class MESHFREE_OT_select_front(SelectionOperator, FrontOnly, bpy.types.Operator)
 
 
 class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.Operator):
-    """Put the selected points into a vertex group that the tools take, such as Handle or Anchor"""
+    """Assign the selected points to a group that the tools use, such as Handle or Anchor"""
 
     bl_idname = "meshfree.group_from_selection"
     bl_label = "Assign to Group"
@@ -284,7 +290,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
     name: StringProperty(name="Name", description="Name of the group; empty for that of its role", maxlen=63)
     action: EnumProperty(
         name="Action",
-        description="What happens to points that the group holds already",
+        description="Whether to replace, add to or remove from the points of the group",
         items=[
             ("REPLACE", "Replace", "The group holds the selected points only"),
             ("ADD", "Add", "The selected points come to those that the group holds"),
@@ -295,9 +301,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
     weight: FloatProperty(
         name="Weight", description="Weight of the points in the group", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
     )
-    front_only: BoolProperty(
-        name="Front Only", description="Leave out points whose normals point away from the viewer", default=False
-    )
+    front_only: BoolProperty(name="Front Only", description="Leave out points facing away from the view", default=False)
 
     @classmethod
     def description(cls, context, properties):
@@ -318,8 +322,8 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             chosen &= self.facing(context, obj)
             if not chosen.any():
                 raise PointCloudError(
-                    f'All selected points of "{obj.name}" face away from the viewer. Turn off Front Only, or'
-                    " look from the other side."
+                    f'All selected points of "{obj.name}" face away from the view. Turn off Front Only, or view them'
+                    " from the other side."
                 )
         role = self.role.title()
         name = self.name or role
@@ -349,7 +353,7 @@ def _replaced(obj, name, chosen):
 
 
 class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
-    """Select the point that is seen along a ray, and not one behind it: what a click in Edit Mode does"""
+    """Select the frontmost point under the mouse"""
 
     bl_idname = "meshfree.select_point"
     bl_label = "Select Point"
@@ -361,7 +365,7 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
     )
     extend: BoolProperty(
         name="Extend",
-        description="Keep what is selected already, and deselect the point if it is",
+        description="Keep the selection, and deselect the point if it is selected",
         default=False,
         options={"SKIP_SAVE"},
     )
@@ -445,7 +449,7 @@ def _hidden(obj):
 
 
 class MESHFREE_OT_select_boundary(SelectionOperator, bpy.types.Operator):
-    """Select the points at the boundaries of the surface, as they are found or named by the Boundary Group"""
+    """Select the boundary points of the surface, as detected or named by the Boundary Group"""
 
     bl_idname = "meshfree.select_boundary"
     bl_label = "Select Boundary"
@@ -461,7 +465,7 @@ class MESHFREE_OT_select_boundary(SelectionOperator, bpy.types.Operator):
 
 
 class MESHFREE_OT_select_floaters(SelectionOperator, bpy.types.Operator):
-    """Select the Gaussian splats that show no surface: hardly seen ones, huge ones, and such as float alone"""
+    """Select Gaussian splats that belong to no surface: nearly transparent, huge or isolated"""
 
     bl_idname = "meshfree.select_floaters"
     bl_label = "Select Floaters"
@@ -476,7 +480,7 @@ class MESHFREE_OT_select_floaters(SelectionOperator, bpy.types.Operator):
 
 
 class MESHFREE_OT_select_group(SelectionOperator, bpy.types.Operator):
-    """Select the points of a group that the tools take"""
+    """Select the points of a group that the tools use"""
 
     bl_idname = "meshfree.select_group"
     bl_label = "Select Group"

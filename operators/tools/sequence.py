@@ -11,7 +11,7 @@ from ... import core
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import eigenvector_name
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.modifiers import COLLECTION, get_input, is_sequence
 from ..objects.quantities import AREA, MEAN_CURVATURE
 from ..objects.reading import obstacle, read_points, sharing_objects
@@ -33,8 +33,8 @@ def frames_of(obj) -> list:
 
 
 def _natural(name):
-    pieces = re.split(r"(\d+)", name.lower(), flags=re.ASCII)
-    return [int(piece) if index % 2 else piece for index, piece in enumerate(pieces)]
+    parts = re.split(r"(\d+)", name.lower(), flags=re.ASCII)
+    return [int(part) if index % 2 else part for index, part in enumerate(parts)]
 
 
 def continue_modes(analysis, points, earlier):
@@ -67,7 +67,7 @@ def continue_modes(analysis, points, earlier):
 
 
 class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
-    """Analyze all frames of a sequence, with modes that keep their order and signs, and show them in one range"""
+    """Analyze all frames of a sequence, with modes that keep their order and signs, and show them in one color range"""
 
     bl_idname = "meshfree.analyze_sequence"
     bl_label = "Analyze Sequence"
@@ -112,7 +112,7 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
         return self.work(context, frames, lambda progress: _compute(plans, progress))
 
     def finish(self, context, objects, results):
-        """Write all frames, show them, and tell of what is in doubt."""
+        """Write all frames, show them, and report warnings."""
         name = eigenvector_name(self.shown_mode) if self.shown_mode else MEAN_CURVATURE
         with all_or_nothing(objects):
             for obj, (analysis, _) in zip(objects, results, strict=True):
@@ -120,16 +120,16 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
                     obj.data = obj.data.copy()
                 write_result(obj, analysis, max(self.modes, WRITE_LIMIT))
             if self.show:
-                tell("sequence_written", objects, name)
-            self._tell(objects, results)
+                notify("sequence_written", objects, name)
+            self._warn_of(objects, results)
         areas = [analysis.total_area for analysis, _ in results]
         span = f"area {area_text(min(areas))} to {area_text(max(areas))}"
         modes = f", {self.modes} modes" if self.modes else ""
         self.report({"INFO"}, f"{len(objects)} frames, {span}{modes}")
         return {"FINISHED"}
 
-    def _tell(self, frames, results):
-        """Tell of what is in doubt, on frames and on what shows them, since nobody selects frames."""
+    def _warn_of(self, frames, results):
+        """Keep warnings on frames, and on the objects that show them, since frames are seldom selected."""
         sequences = [obj for obj in bpy.data.objects if frames_of(obj) == frames]
         self.begin_notices([*sequences, *frames])
         for obj, (analysis, overlaps) in zip(frames, results, strict=True):
@@ -154,12 +154,12 @@ def _compute(plans, progress):
         def report(_stage, fraction, number=number):
             progress(f"Frame {number + 1} of {len(plans)}", (number + fraction) / len(plans))
 
-        report("", 0.0)  # of a frame that is known from before there is no other
+        report("", 0.0)  # a frame that is kept reports no other
         with naming(name):
             analysis, overlaps = plan(report), np.empty(0)
             if analysis.spectrum is not None:
                 analysis, overlaps, earlier = continue_modes(analysis, points, earlier)
-        results.append((replace(analysis, built=None), overlaps))  # the largest part, which nothing is written of
+        results.append((replace(analysis, built=None), overlaps))  # which is large, and not written
     return results
 
 

@@ -32,15 +32,15 @@ class Smooth(Tool):
         description="What is smoothed, and how",
         items=[
             ("NOISE", "Remove Noise", "Remove the noise of single points and keep the shape"),
-            ("HEAT", "Soften", "Fade details out as heat spreads, the finer the more"),
-            ("MODES", "Keep Modes", "Keep what the lowest vibration modes can show, a coarse shape"),
+            ("HEAT", "Soften", "Attenuate details as heat diffusion does, the finer the more"),
+            ("MODES", "Keep Modes", "Project the shape onto the lowest vibration modes"),
             ("DETAIL", "Scale Details", "Make details stronger or weaker and keep the coarse shape"),
         ],
         default="NOISE",
     )
     wavelength: FloatProperty(
         name="Wavelength",
-        description="Size of the details that are halved, or from which on details count as such; 0 for what suits the"
+        description="Wavelength that is halved, or the longest one that is scaled; 0 for a default suited to the"
         " points",
         default=0.0,
         min=0.0,
@@ -52,7 +52,7 @@ class Smooth(Tool):
     gain: FloatProperty(name="Gain", description="How much stronger details become", default=1.5, min=0.0, soft_max=3.0)
     strength: FloatProperty(
         name="Strength",
-        description="Share of the way from the points to their smooth places",
+        description="Factor of the displacements to the smooth positions",
         default=1.0,
         min=0.0,
         max=1.0,
@@ -65,7 +65,7 @@ class Smooth(Tool):
         name="Keep",
         description="Scale the result so that it keeps its size",
         items=[
-            ("NONE", "Nothing", "Let the shape shrink as it will"),
+            ("NONE", "Nothing", "Let the shape shrink"),
             ("AREA", "Area", "Keep the area of each component"),
             ("VOLUME", "Volume", "Keep the volume of each component; for closed surfaces"),
         ],
@@ -105,8 +105,8 @@ class Smooth(Tool):
             dirichlet = keep_boundary and bool(laplacian.boundary.any())
             if dirichlet and shared["keep"]:
                 raise PointCloudError(
-                    f'"{name}" has a boundary, which stays and fixes the size already. Set Keep to Nothing, or turn'
-                    " off Keep Boundary."
+                    f'"{name}" has a boundary, which determines the size already. Set Keep to Nothing, or turn off'
+                    " Keep Boundary."
                 )
             check_wavelength(wavelength, reading.points, name)
             blend = core.PointBlend(laplacian, dirichlet=dirichlet, **shared)
@@ -264,7 +264,7 @@ def _animated_value(key, frame):
 
 
 class MESHFREE_OT_mode_shape(ModeShape, ApplicationOperator, bpy.types.Operator):
-    """Move the points along their normals by a vibration mode, on demand as an animated shape key"""
+    """Displace the points along their normals by a vibration mode, optionally animated"""
 
     bl_idname = "meshfree.mode_shape"
     bl_label = "Deform by Mode"

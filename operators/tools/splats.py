@@ -9,7 +9,7 @@ from ...core import PointCloudError
 from ...core.files import is_coarse
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import point_count, read_attribute, write_attribute
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.modifiers import is_deform
 from ..objects.place import OFFSET, offset_of
 from ..objects.positions import check_movable
@@ -57,12 +57,12 @@ class MESHFREE_OT_show_splats(SplatOperator, bpy.types.Operator):
     @reporting
     def execute(self, context):
         with all_or_nothing([context.object]):
-            tell("splats_found", context.object)
+            notify("splats_found", context.object)
         return {"FINISHED"}
 
 
 class MESHFREE_OT_apply_to_splats(SplatOperator, bpy.types.Operator):
-    """Apply location, rotation and scale of the object to its splats: to their sizes, rotations and harmonics, too"""
+    """Apply location, rotation and scale of the object to its splats, with their sizes, rotations and harmonics"""
 
     bl_idname = "meshfree.apply_to_splats"
     bl_label = "Apply Transform to Splats"
@@ -86,12 +86,12 @@ class MESHFREE_OT_apply_to_splats(SplatOperator, bpy.types.Operator):
             context.view_layer.update()
             for child, place in children:
                 child.matrix_world = place
-        self.report({"INFO"}, f"{obj.name}: its place is in its {len(splats):,} splats now")
+        self.report({"INFO"}, f"{obj.name}: its transform is applied to its {len(splats):,} splats")
         return {"FINISHED"}
 
 
 class MESHFREE_OT_join_splats(SplatOperator, bpy.types.Operator):
-    """Join the splats of all selected objects into the active one as they are seen, with their sizes and colors"""
+    """Join the splats of all selected objects into the active one, with their transforms applied"""
 
     bl_idname = "meshfree.join_splats"
     bl_label = "Join Splats"
@@ -101,7 +101,7 @@ class MESHFREE_OT_join_splats(SplatOperator, bpy.types.Operator):
         reason = super().obstacle(context)
         if reason or _others(context):
             return reason
-        return f'Select further objects of splats, which "{context.object.name}" is to take up'
+        return f'Select further objects of splats, to join with "{context.object.name}"'
 
     @reporting
     def execute(self, context):
@@ -118,7 +118,7 @@ class MESHFREE_OT_join_splats(SplatOperator, bpy.types.Operator):
             _join(context, obj, others, parts)
             _remove(context, others)
         if left_alone:
-            self.warn(f"{left_alone} selected objects hold no splats and were left alone", obj)
+            self.warn(f"{left_alone} selected objects have no splats and were skipped", obj)
         self.report({"INFO"}, f"{obj.name}: the splats of {len(parts) + 1} objects, {count:,} in all")
         return {"FINISHED"}
 

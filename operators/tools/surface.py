@@ -4,7 +4,7 @@ import bpy
 
 from ... import core
 from ..objects.attributes import DISC, tag_changed, write_attribute
-from ..objects.handlers import tell
+from ..objects.handlers import notify
 from ..objects.reading import chosen_sides, discs, read_points
 from ..registration import Registration, Row
 from ..running import cache
@@ -12,7 +12,7 @@ from ..running.application import ApplicationOperator
 
 
 class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
-    """Draw each point as a disc in the surface, as large as the gaps around it, lit as a surface is"""
+    """Draw each point as a disc tangent to the surface, sized by its Voronoi cell"""
 
     bl_idname = "meshfree.show_surface"
     bl_label = "Show as Surface"
@@ -38,7 +38,7 @@ class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
 
     def conclude(self, context, objects):
         for obj in objects:
-            tell("surface_found", obj)
+            notify("surface_found", obj)
 
 
 TOOLS = (Registration(MESHFREE_OT_show_surface, menu=Row("Object", 1, 1)),)

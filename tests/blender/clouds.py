@@ -5,9 +5,6 @@ from collections import Counter
 import bpy
 import numpy as np
 
-from operators.objects.quantities import written_by
-
-RESULTS = sorted([*written_by("analyze"), "lb_disc"])
 CORNERS, FACES = 8, 12  # of a disc that the display draws: two cones with a common rim
 _KEYS = {
     "FLOAT_VECTOR": ("vector", 3, np.float32),

@@ -185,4 +185,4 @@ class TestSignedDistance:
         add_curve(np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1), cyclic=True)
         assert run("signed_distance", curve="Line") == {"FINISHED"}
         assert (attribute(two, "lb_signed_distance")[900:] == 0.0).all()
-        assert "300 points of Cloud are not reached from the curve" in capfd.readouterr().out
+        assert "300 points of Cloud are reached by no source" in capfd.readouterr().out

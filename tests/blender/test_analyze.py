@@ -6,7 +6,8 @@ import pytest
 from mathutils import Matrix
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import RESULTS, add_object, attribute, local_points, result_names, sphere_points
+from tests.blender.clouds import add_object, attribute, local_points, result_names, sphere_points
+from tests.results import RESULTS
 
 
 def expected(core, obj):
@@ -20,7 +21,7 @@ def expected(core, obj):
         "lb_area": laplacian.areas,
         "lb_boundary": laplacian.boundary,
         "lb_component": laplacian.component,
-        "lb_disc": normals / np.linalg.norm(normals, axis=1)[:, None] * (laplacian.reach / spacing)[:, None],
+        "lb_disc": normals / np.linalg.norm(normals, axis=1)[:, None] * (laplacian.cell_radius / spacing)[:, None],
         "lb_gaussian_curvature": laplacian.gaussian_curvature,
         "lb_mean_curvature": core.mean_curvature(laplacian),
         "lb_normal": normals / np.linalg.norm(normals, axis=1)[:, None],
@@ -140,7 +141,7 @@ def test_another_object_can_be_named_by_a_script(core):
 def test_mesh_with_faces_is_taken_as_its_vertices_with_a_notice(core, capfd):
     obj = add_object(sphere_points(), faces=[(0, 1, 2)])
     bpy.ops.meshfree.analyze()
-    assert "has 1 faces: it is taken as its 1000 vertices" in capfd.readouterr().out
+    assert "has 1 faces: only its 1000 vertices are used" in capfd.readouterr().out
     assert_result(core, obj)
 
 

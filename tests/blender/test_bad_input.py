@@ -31,7 +31,7 @@ CLOUDS = {
     "collinear": (lambda points: points * (1, 0, 0), "1000 points.*line"),
     "all at one place": (lambda points: 0 * points, "there are 1 among 1000"),
     "far from the origin": (far_away, "from the origin.*Move"),
-    "lone points only": (scattered, "of 1000 points lie apart from each other.*delete"),
+    "lone points only": (scattered, "of 1000 points are in components of too few points.*delete"),
 }
 
 

@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from operators.objects.quantities import rows_of
-from tests.blender.clouds import RESULTS, add_object, attribute, everything, local_points, result_names, sphere_points
+from tests.blender.clouds import add_object, attribute, everything, local_points, result_names, sphere_points
+from tests.results import RESULTS
 
 
 @pytest.fixture

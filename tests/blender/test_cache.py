@@ -56,7 +56,7 @@ COSTLY = {  # where each is called from
     "core.algebra.cholesky": ("dpotrf",),
     "core.algebra.solvers": ("conjugate_gradients",),
     "core.operator.spectrum": ("coarse_to_fine", "lift_lowest"),
-    "core.applications.filters": ("eigsh",),
+    "core.algebra.eigenvalue": ("eigsh",),
     "core.applications.geodesics": ("dijkstra",),
     "core.applications.smoothing": ("match_size",),
 }

@@ -15,7 +15,7 @@ from tests.blender.test_splats import close, turned
 
 PLACED = Matrix.Translation((5, 0, 1)) @ Euler((0.4, 0.9, -0.3)).to_matrix().to_4x4() @ Matrix.Scale(2.0, 4)
 FIRST = Matrix.Translation((-1, 2, 0)) @ Euler((0.0, 0.3, 0.5)).to_matrix().to_4x4()
-MESSAGE = "turned or scaled without their ellipsoids"
+MESSAGE = "rotated or scaled without their ellipsoids"
 
 
 def seen(splats, matrix):
@@ -102,7 +102,7 @@ class TestJoin:
         empty.select_set(True)
         assert bpy.ops.meshfree.join_splats() == {"FINISHED"}
         assert set(bpy.data.objects) == {one, empty}
-        assert "1 selected objects hold no splats" in capfd.readouterr().out
+        assert "1 selected objects have no splats" in capfd.readouterr().out
 
     def test_what_cannot_be_joined_is_refused(self, core):
         one, other, *_ = pair(core)

@@ -13,7 +13,7 @@ from tests.blender.clouds import add_object, grid_points, sphere_points
 from tests.blender.test_panel import Layout, draw
 
 ROOT = Path(__file__).parents[2]
-FACES = "The mesh has 1 faces: it is taken as its 1000 vertices."
+FACES = "The mesh has 1 faces: only its 1000 vertices are used."
 
 
 def kept(obj):
@@ -30,7 +30,7 @@ def sphere_with_a_face(name="Cloud"):
 
 
 def test_no_operator_warns_without_keeping_it():
-    """The status bar forgets; `TellingOperator` in operators/running/ready.py does not."""
+    """The status bar forgets; `NoticeOperator` in operators/running/ready.py does not."""
     files = [path for wing in ("operators", "ui") for path in (ROOT / wing).rglob("*.py")]
     found = [path.name for path in files if re.search(r"report\(\s*\{\s*.WARNING", path.read_text(encoding="utf-8"))]
     assert found == []

@@ -223,7 +223,7 @@ class TestColor:
         assert module("ui.overlay").pictures(obj, scene) == []
         scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
         scene.collection.objects.link(scene.camera)
-        with pytest.raises(RuntimeError, match="its own colors, which stand for no values"):
+        with pytest.raises(RuntimeError, match="its own colors, which are not values"):
             bpy.ops.meshfree.legend()
         bpy.ops.meshfree.analyze()
         bpy.ops.meshfree.legend()
@@ -334,7 +334,7 @@ class TestOwnMaterial:
         material = add_material(obj, BLUE)
         bpy.ops.meshfree.analyze()
         assert shown(obj) == "lb_mean_curvature"
-        told = 'Cloud: colors take the place of the material "Mine"'
+        told = 'Cloud: the display replaces the material "Mine"'
         assert told in capfd.readouterr().out
         bpy.ops.meshfree.analyze()
         assert told not in capfd.readouterr().out

@@ -402,7 +402,7 @@ folder = user / "extensions/user_default/meshfree_laplacian"
 print("OLD", (folder / "core/former.py").exists())
 install(sys.argv[2])
 print("NEW", (folder / "core/former.py").exists(), obj.meshfree.neighbors, NAME in bpy.context.preferences.addons)
-for _ in range(20):
+for _ in range(3):
     bpy.ops.preferences.addon_disable(module=NAME)
     bpy.ops.preferences.addon_enable(module=NAME)
 print("AGAIN", obj.meshfree.neighbors, len([name for name in dir(bpy.types) if name == "MESHFREE_OT_analyze"]))

@@ -165,7 +165,7 @@ def test_panel_of_a_handle_says_what_to_do():
     obj = add_object(sphere_points())
     bpy.ops.meshfree.deform_bind(at_once=True)
     assert bpy.context.object != obj
-    assert draw()[:2] == ['Handle of "Cloud"', "G moves it, R turns it"]
+    assert draw()[:2] == ['Handle of "Cloud"', "G moves it, R rotates it"]
 
 
 def test_panel_of_a_new_object():
@@ -194,12 +194,12 @@ def test_panel_tells_of_splats_that_blender_joined(tmp_path):
     for number in range(2):
         splat_files.write_ply(tmp_path / "a.ply", splat_files.some_columns(100, seed=number))
         bpy.ops.meshfree.import_points(filepath=str(tmp_path / "a.ply"))
-    assert not any("turned or scaled without" in text for text in draw())
+    assert not any("rotated or scaled without" in text for text in draw())
     bpy.context.object.rotation_euler.x = 0.5
     for obj in bpy.data.objects:
         obj.select_set(True)
     bpy.ops.object.join()
-    assert any("turned or scaled without" in text for text in draw())
+    assert any("rotated or scaled without" in text for text in draw())
 
 
 def test_panel_follows_the_order_of_work():

@@ -152,7 +152,7 @@ class TestUseModifiers:
         [
             (("points", "points"), "into 800 points, so.* node Points to Vertices at the end of the nodes and apply"),
             (("cubes",), "into 3,200 points of instances, so.* node Realize Instances at the end of the nodes"),
-            (("nothing",), "into 0, so results have no place. Apply these modifiers, or turn off Use Modifiers"),
+            (("nothing",), "to 0, so results cannot be written. Apply these modifiers, or turn off Use Modifiers"),
         ],
     )
     def test_more_or_fewer_have_no_place_for_results(self, obj, parts, reason):

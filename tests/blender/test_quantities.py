@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from operators.objects.quantities import QUANTITIES, quantity, rows_of
-from tests.blender.clouds import RESULTS, add_group, add_object, attribute, sphere_points
+from tests.blender.clouds import add_group, add_object, attribute, sphere_points
+from tests.results import RESULTS
 
 CALLS = {  # of tools that need arguments, or write more in several calls
     "signed_distance": ({"curve": "Line"},),

@@ -685,7 +685,7 @@ def test_presets_are_options_of_core(module, core, preset):
     assert obj.meshfree.regularization == pytest.approx(core.PaperOptions().regularization)
 
 
-def test_own_presets_are_files_in_the_users_folder(extension, installed):
+def test_own_presets_are_files_in_the_users_folder(extension, installed, capfd):
     obj = add_object(sphere_points())
     obj.meshfree.neighbors, obj.meshfree.projection, obj.meshfree.sheets = 44, "OFF", False
     bpy.ops.meshfree.add_preset(name="My Scanner")
@@ -693,8 +693,11 @@ def test_own_presets_are_files_in_the_users_folder(extension, installed):
     assert path.exists()
     bpy.ops.meshfree.apply_preset(preset="DEFAULT")
     assert obj.meshfree.neighbors == 100
-    bpy.ops.script.execute_preset(filepath=str(path), menu_idname="MESHFREE_MT_presets")
+    older = "bpy.context.object.meshfree.curvature_correction = True\nbpy.context.object.meshfree.normals = 'QUADRIC'\n"
+    path.write_text(path.read_text() + older)
+    bpy.ops.meshfree.apply_preset(filepath=str(path))
     assert (obj.meshfree.neighbors, obj.meshfree.projection, obj.meshfree.sheets) == (44, "OFF", False)
+    assert "settings or values that no longer exist: normals, curvature_correction" in capfd.readouterr().out
     assert bpy.types.MESHFREE_MT_presets.bl_label == "My Scanner"
     bpy.ops.meshfree.add_preset(remove_active=True)
     assert not path.exists()

@@ -49,7 +49,7 @@ def flat_boundary(points):
     """Find and measure the boundary of points in the plane z = 0."""
     nearest, normals = find_nearest(points), np.tile(UP, (len(points), 1))
     cells = measure_cells(nearest, normals, np.zeros(len(points)), no_boundary(len(points)))
-    at_boundary = find_boundary(nearest, normals, mean_gaps(nearest, cells.reach, 1))
+    at_boundary = find_boundary(nearest, normals, mean_gaps(nearest, cells.radius, 1))
     return measure_boundary(nearest, normals, at_boundary)
 
 

@@ -112,5 +112,5 @@ def test_measured_alone():
     nearest = find_nearest(cloud.pairs.points)
     cells = measure_cells(nearest, cloud.normals, np.ones(600), cloud.boundary)
     np.testing.assert_allclose(cells.areas, cloud.cell_areas, rtol=1e-2)
-    assert np.all(cells.reach > 0.5 * nearest.spacing)
-    assert np.all(cells.reach < nearest.spacing)
+    assert np.all(cells.radius > 0.5 * nearest.spacing)
+    assert np.all(cells.radius < nearest.spacing)

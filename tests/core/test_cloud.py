@@ -29,7 +29,7 @@ def gaps_of(surface, oriented):
     """How wide the gaps between points are, before a boundary is known."""
     nearest, count = surface.sample.nearest, len(oriented)
     gaussian = surface.quadrics.gaussian_curvature
-    return mean_gaps(nearest, measure_cells(nearest, oriented, gaussian, no_boundary(count)).reach, 1)
+    return mean_gaps(nearest, measure_cells(nearest, oriented, gaussian, no_boundary(count)).radius, 1)
 
 
 def sample_of(points):
@@ -59,7 +59,7 @@ def test_components_are_divided_and_lone_points_left_out():
 
 def test_too_few_points_left_are_an_error():
     clusters = [fibonacci_sphere(30) + [9.0 * number, 0.0, 0.0] for number in range(10)]
-    with pytest.raises(core.ComponentError, match="270 of 300 points lie apart from each other"):
+    with pytest.raises(core.ComponentError, match="270 of 300 points are in components of too few points"):
         sample_of(np.concatenate(clusters))
 
 

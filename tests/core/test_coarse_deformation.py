@@ -218,7 +218,7 @@ def test_bad_input_is_refused_as_by_all_points():
     with pytest.raises(core.PointCloudError, match="no handles"):
         core.CoarseDeformer(sphere(), [], count=COUNT)
     deformer = core.CoarseDeformer(sphere(), [0, 1], [2], count=COUNT)
-    with pytest.raises(core.InvalidPointsError, match="handle positions"):
+    with pytest.raises(core.InvalidPointsError, match="Handle positions"):
         deformer.solve(np.zeros((3, 3)))
     with pytest.raises(core.InvalidPointsError, match="[Ss]tarting points"):
         deformer.solve(np.zeros((2, 3)), start=np.zeros((2, 3)))

@@ -123,7 +123,7 @@ class TestIslands:
         laplacian = core.build_laplacian(points)
         small = laplacian.component == 1
         assert np.count_nonzero(small) == count
-        assert not any("apart" in notice for notice in laplacian.notices)
+        assert not any("left out" in notice for notice in laplacian.notices)
         # 60 points hardly resolve a sphere.
         assert laplacian.areas[small].sum() == pytest.approx(4.0 * np.pi * 0.04, rel=0.3)
         assert laplacian.areas[~small].sum() == pytest.approx(4.0 * np.pi, rel=3e-3)
@@ -182,8 +182,8 @@ class TestIslands:
 
 class TestLonePoints:
     def test_a_notice_counts_them(self, parts):
-        assert [notice for notice in parts.notices if "apart" in notice] == [
-            "Points that lie apart from the rest or off the surface, left out of the operator: 4 (0.17 %)."
+        assert [notice for notice in parts.notices if "left out" in notice] == [
+            "Outliers and small components left out of the operator: 4 (0.17 %)."
         ]
 
     def test_neutral_values(self, parts, spectrum):
@@ -246,10 +246,10 @@ class TestLonePoints:
 class TestTooLittleLeft:
     def test_fewer_points_than_the_neighborhoods_need(self):
         points = np.concatenate([fibonacci_sphere(90), 50.0 + 10.0 * fibonacci_sphere(90)[:60:5]])
-        with pytest.raises(core.ComponentError, match="12 of 102 points lie apart"):
+        with pytest.raises(core.ComponentError, match="12 of 102 points are in components of too few points"):
             core.build_laplacian(points)
 
     def test_most_points_in_small_components(self):
         components = [0.1 * fibonacci_sphere(30) + [3.0 * i, 3.0, 0.0] for i in range(10)]
-        with pytest.raises(core.ComponentError, match="300 of 500 points lie apart"):
+        with pytest.raises(core.ComponentError, match="300 of 500 points are in components of too few points"):
             core.build_laplacian(np.concatenate([fibonacci_sphere(200), *components]))

@@ -38,7 +38,7 @@ def test_arcs_are_exact_to_sixth_order(points, normals, exact, sign):
         cloud,
         pairs=pairs,
         normals=(normals(pairs.points).T * sides).T,
-        roughness=np.zeros(len(pairs.points)),
+        squared_slope=np.zeros(len(pairs.points)),
     )
     length = exact(pairs.points[i], pairs.points[j])
     known = length < 0.5  # where normals turn more there may be an edge between them

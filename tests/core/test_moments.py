@@ -31,8 +31,7 @@ CLOUDS = {
 
 def prepared(points, vary=None):
     """Return a cloud, distances, areas and pair weights, as the operator has them before they are balanced."""
-    options = core.LaplacianOptions()
-    cloud = read_cloud(points, options)
+    cloud = read_cloud(points, core.LaplacianOptions())
     pairs = cloud.pairs
     if vary is not None:
         lengths = vary(pairs.points)
@@ -40,7 +39,7 @@ def prepared(points, vary=None):
         cloud = replace(cloud, pairs=Pairs(pairs.points, lengths, *found))
         pairs = cloud.pairs
     distance = arc_length(cloud)
-    areas = solve_areas(cloud, distance, options).areas
+    areas = solve_areas(cloud, distance)
     h = pairs.mean(pairs.lengths)
     weights = pair_kernel(distance / h) / h**4 * areas[pairs.first] * areas[pairs.second]
     return cloud, distance, areas, weights * pairs.mean(1.0 + SECOND_MOMENT / 4.0 * pairs.lengths**2)

@@ -223,7 +223,7 @@ class TestNodalDomains:
             (np.ones(7), "Give one real number for each of 2500 points"),
             (np.ones((2500, 2)), "Give one real number for each of 2500 points"),
             (np.full(2500, "a"), "Give one real number for each of 2500 points"),
-            (np.where(np.arange(2500) < 3, np.nan, 1.0), "3 of 2500 points have values"),
+            (np.where(np.arange(2500) < 3, np.nan, 1.0), "3 of 2500 values are not finite"),
         ],
     )
     def test_values_that_make_no_sense(self, square, values, match):

@@ -283,7 +283,7 @@ HUGE = 2 * ("element camera 999999999999999\n" + 400 * "property double a\n")
         (
             "a.ply",
             ply_head("ascii", 1) + b"1 " * 100_000,
-            "characters or more, which is not a point. Exp",
+            "line of 100,000 characters or more, which is not a point. Exp",
         ),
         ("a.ply", ply_head("ascii", 1) + b"1 2 1e300\n", "1 of 1 points .* beyond 1e.30, the first of them is point 1"),
         (

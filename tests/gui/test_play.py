@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from tests.results import RESULTS
+
 ANALYZED = "'lb_area' in bpy.context.object.data.attributes"
 WORKING = "[operator.bl_idname for operator in main_window().modal_operators]"
 UNCHANGED = "everything(bpy.data.objects['Cloud']) == before"
@@ -91,7 +93,7 @@ class TestAnalysis:
         assert gui.python(UNCHANGED)
         gui.key("ctrl+shift+z")
         gui.wait_until(ANALYZED)
-        assert gui.python("result_names(bpy.context.object)") == sorted([*gui.python("RESULTS"), *MODES])
+        assert gui.python("result_names(bpy.context.object)") == sorted([*RESULTS, *MODES])
 
     def test_colors_after_four_clicks(self, gui):
         add_sphere(gui)
