@@ -312,7 +312,7 @@ class Deformer:
         points[self._lone] = points[first] + step
 
     def gradients(self, points: ArrayLike) -> Floats:
-        """Find what a deformation does to small steps around each point; see `deformation_gradients`.
+        """Return the gradients of a deformation; see `deformation_gradients`.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ from .graph import coupled_components, mean_spacing
 _MEAN = 1e-2  # of the source's mean size: a larger mean is intended, a smaller one is an error of the quadrature
 _DEEP = 0.6  # share of a point's weights that lead to fixed points, where it lies deep inside a set of them
 _NARROW = 60  # neighbours of the narrow operator: fewer are too noisy at random points, more leak more
-# Distances from thin sets, in units of h, between which the narrow operator gives way to the wide one.
+# Distances from thin sets, in units of h, between which the narrow operator is blended into the wide one.
 _NEAR = 1.5, 3.0
 _LEAST = 2e-3  # share of the wide operator everywhere: it connects what the narrow one does not
 _GRAZING = 0.1  # least distance from the edge of a set of fixed points, in spacings

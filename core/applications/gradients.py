@@ -25,7 +25,7 @@ class DeformationGradients:
 
     See Also
     --------
-    deformation_gradients : Does it once.
+    deformation_gradients : For one deformation.
     """
 
     def __init__(self, laplacian: LaplaceBeltrami) -> None:

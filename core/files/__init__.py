@@ -8,5 +8,6 @@ from .lines import brief
 from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse
 from .ply import PlyVertices, read_elements, read_vertex_columns, read_vertex_names, write_vertex_columns
+from .rows import unpacks_too_far
 from .table import FARTHEST, PointTable, check_places, unit_colors
 from .whole import replacing

@@ -44,20 +44,20 @@ class Digits(NamedTuple):
 
 
 def split_digits(values: Array, known: Digits | None = None) -> tuple[list[Array], Digits | None]:
-    """Return numbers in parts of 32 bits, and how these are put together.
+    """Split numbers into parts of 32 bits, which `join_digits` combines.
 
     Parameters
     ----------
     values : ndarray, (n,) or (n, 3)
     known : Digits, optional
-        How numbers of that name are kept elsewhere, taken if it serves.
+        How numbers of that name are kept elsewhere, used if it suits these.
 
     Returns
     -------
     list of ndarray
-        One or two parts, the first of which tells most; the numbers themselves if they need no care.
+        One or two parts, the more significant first; the numbers themselves if single precision keeps them.
     Digits or None
-        None if they need no care.
+        None if single precision keeps them.
     """
     if values.ndim == 2:
         return _split_vectors(values)
@@ -69,7 +69,7 @@ def split_digits(values: Array, known: Digits | None = None) -> tuple[list[Array
 
 
 def join_digits(parts: list[Array], digits: Digits) -> Array:
-    """Return the numbers that `split_digits` gave in parts, or those that users made of them."""
+    """Combine the parts of numbers from `split_digits`, which users may have edited."""
     first = parts[0]
     if digits.part == "high" and [part.dtype for part in parts] == [np.int32, np.int32]:
         bits = parts[1].astype(np.int64).view(np.uint64) << np.uint64(32) | first.view(np.uint32).astype(np.uint64)
@@ -92,7 +92,7 @@ def shortest(values: Array) -> Floats:
     """
     doubles = values.astype(np.float64)
     for decimals in range(_MOST_DECIMALS + 1):
-        for rows in slice(_FIRST), slice(None):  # a few tell it mostly
+        for rows in slice(_FIRST), slice(None):  # a few mostly decide it
             rounded = np.round(doubles[rows], decimals)
             if not _same(rounded.astype(np.float32), values[rows]):
                 break
@@ -123,7 +123,7 @@ def _fit(low: int, high: int) -> bool:
 def _whole_offsets(bits: Ints, low: int, high: int, known: Digits | None) -> Iterator[tuple[int, int]]:
     """Yield what may be subtracted from whole numbers, and what divides the rest.
 
-    That is what serves others, a round number, or the middle; and at last what all differences are multiples of.
+    First those of other numbers, then a round number and the middle, and last the common divisor of all differences.
     """
     if known is not None and isinstance(known.offset, int) and not known.part:
         yield known.offset, known.step
@@ -193,7 +193,7 @@ def _decimals(values: Floats) -> int | None:
     for decimals in range(_MOST_DECIMALS + 1):
         if largest * 10.0**decimals >= _EXACT:
             break
-        if all(_same(np.round(part, decimals), part) for part in (values[:_FIRST], values)):  # a few tell it mostly
+        if all(_same(np.round(part, decimals), part) for part in (values[:_FIRST], values)):  # a few mostly decide it
             return decimals
     return None
 

@@ -52,8 +52,8 @@ def _extents(points: Floats) -> tuple[float, Floats]:
 def _allowed(points: Floats, degrees: bool) -> Floats:
     """Steps of single precision that do not hurt, (3,).
 
-    What does not hurt lengths in one unit goes by the longest side. An axis of another unit goes by its own side, if
-    single precision changes its numbers, and degrees by the ground.
+    For axes of one unit they follow from the longest side. For an axis of another unit they follow from its own side,
+    if single precision changes its numbers, and for degrees from lengths on the ground.
     """
     longest, extents = _extents(points)
     allowed = np.full(3, min(_FINE * longest, _FINEST))
@@ -67,7 +67,7 @@ def _allowed(points: Floats, degrees: bool) -> Floats:
 
 
 def choose_origin(points: Floats, known: ArrayLike | None = None, *, degrees: bool = False) -> Floats:
-    """Choose what is subtracted from points before they are stored in single precision.
+    """Choose the origin that is subtracted from points before they are stored in single precision.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ def choose_origin(points: Floats, known: ArrayLike | None = None, *, degrees: bo
     Returns
     -------
     ndarray, (3,) float64
-        Zero if the points do well without. Otherwise the middle of the points, rounded to a power of ten below their
-        extent, so that it is easily told; along axes that have units of their own, of those alone that need it.
+        Zero if single precision suffices. Otherwise the middle of the points, rounded to a power of ten below their
+        extent, so that it is easily read; along axes with units of their own, only of those that need it.
     """
     longest, extents = _extents(points)
     allowed = _allowed(points, degrees or look_like_degrees(points))

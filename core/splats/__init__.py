@@ -1,4 +1,4 @@
-"""Gaussian splats: points with an ellipsoid and a colour that depends on the direction of view, and what bends them."""
+"""Gaussian splats: points with an ellipsoid and a view-dependent colour, their files, and their deformation."""
 
 from .columns import LENGTHS, NEEDED
 from .file import SplatFile, encoded, holds_splats, read_file, read_splats, write_splats

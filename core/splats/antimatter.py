@@ -1,4 +1,4 @@
-"""Files .splat, as the viewer antimatter15/splat reads them: 32 bytes a splat, without any header."""
+"""Files .splat of the viewer antimatter15/splat: 32 bytes per splat, without a header."""
 
 import os
 from pathlib import Path
@@ -14,7 +14,7 @@ _RECORD = np.dtype([("place", "<f4", 3), ("scale", "<f4", 3), ("color", "u1", 4)
 
 
 def read_antimatter(path: Path) -> PlyVertices:
-    """Read a .splat file as the columns that trainers write.
+    """Read a .splat file as the columns of trainers.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""The columns that files of Gaussian splats have as trainers write them: their names, and how numbers are coded."""
+"""The columns of files of Gaussian splats by trainers: their names, and encodings of numbers."""
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from ..types import Array, Floats
 
@@ -20,7 +20,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 _NEAR = 2.0**-25  # half a step of single precision below one
 
 
-def stack(columns: dict[str, Array], names: list[str] | tuple[str, ...], dtype: type[Any] = np.float64) -> Array:
+def stack(columns: dict[str, Array], names: Sequence[str], dtype: DTypeLike = np.float64) -> Array:
     """Return columns by their names as one array, (n, k)."""
     count = len(next(iter(columns.values())))
     result = np.empty((count, len(names)), dtype)
@@ -29,9 +29,9 @@ def stack(columns: dict[str, Array], names: list[str] | tuple[str, ...], dtype: 
     return result
 
 
-def split(names: list[str] | tuple[str, ...], values: Array) -> dict[str, Array]:
+def split(names: Sequence[str], values: Array) -> dict[str, Array]:
     """Return an array (n, k) as columns of single precision by their names; the reverse of `stack`."""
-    return {name: np.ascontiguousarray(part, np.float32) for name, part in zip(names, values.T, strict=True)}
+    return {name: np.ascontiguousarray(column, np.float32) for name, column in zip(names, values.T, strict=True)}
 
 
 def rest_names(per_channel: int, used: int) -> list[str]:
@@ -40,18 +40,18 @@ def rest_names(per_channel: int, used: int) -> list[str]:
 
 
 def decode_scales(logarithms: Floats) -> Floats:
-    """Return half axes of their logarithms; zero for what is no number."""
+    """Return half axes of their logarithms; zero for NaN."""
     with np.errstate(over="ignore"):
         return np.nan_to_num(np.exp(logarithms), nan=0.0, posinf=_LARGEST)
 
 
 def encode_scales(scales: Floats) -> Floats:
-    """Return the logarithms of half axes, of those without a length that of the smallest number."""
+    """Return the logarithms of half axes; for zero that of the smallest number."""
     return np.log(np.maximum(scales, _SMALLEST))
 
 
 def decode_opacities(logits: Floats) -> Floats:
-    """Return opacities from 0 to 1 of their logits; zero for what is no number."""
+    """Return opacities from 0 to 1 of their logits; zero for NaN."""
     with np.errstate(over="ignore"):
         return np.nan_to_num(1.0 / (1.0 + np.exp(-logits)), nan=0.0)
 
@@ -63,10 +63,10 @@ def encode_opacities(opacities: ArrayLike) -> Array:
 
 
 def decode_rotations(quaternions: Floats) -> Floats:
-    """Return unit quaternions; no turn for those without a length."""
+    """Return unit quaternions; the identity for those of zero length."""
     length = np.sqrt(np.einsum("nk,nk->n", quaternions, quaternions))[:, None]
-    sound = np.isfinite(length) & (length > 0.0)
-    return np.where(sound, quaternions / np.where(sound, length, 1.0), [1.0, 0.0, 0.0, 0.0])
+    valid = np.isfinite(length) & (length > 0.0)
+    return np.where(valid, quaternions / np.where(valid, length, 1.0), [1.0, 0.0, 0.0, 0.0])
 
 
 def encode_rotations(rotations: Floats) -> Floats:

@@ -1,6 +1,4 @@
-"""Ellipsoids R S^2 R^T: unit quaternions R, half axes S, and what a linear map makes of them."""
-
-from typing import Any
+"""Ellipsoids R S^2 R^T: unit quaternions R, half axes S, and their images under linear maps."""
 
 import numpy as np
 
@@ -9,10 +7,10 @@ from ..types import Floats, Ints
 
 _BLOCK = 1 << 13  # ellipsoids worked on at one time
 _SWEEPS = 12  # of Jacobi's method; six reach full precision even for axes of a millionth
-_TOLERANCE = 1e-14  # of the cosine between two axes, below which they are not turned
-_LAST = 1e-8  # cosines of which a sweep leaves less than that: about their squares
+_TOLERANCE = 1e-14  # of the cosine between two axes, below which they are not rotated
+_LAST = 1e-8  # cosines below which no further sweep is needed, which leaves about their squares
 _LOST = 1e-14  # of the longest axis
-_OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # numbers of a quaternion beside one
+_OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # components of a quaternion beside one
 
 
 def matrices_of(quaternions: Floats) -> Floats:
@@ -30,7 +28,7 @@ def matrices_of(quaternions: Floats) -> Floats:
 def quaternions_of(matrices: Floats) -> Floats:
     """Return the unit quaternions w x y z, (n, 4), of rotations, (3, 3, n)."""
     (a, b, c), (d, e, f), (g, h, i) = matrices
-    # Four times the products of the quaternion's numbers: each row is a multiple of it, the longest one the best.
+    # Four times the products of the quaternion's components: each row is a multiple of it, the longest most accurate.
     products = np.array(
         [
             [1.0 + a + e + i, h - f, c - g, d - b],
@@ -45,7 +43,7 @@ def quaternions_of(matrices: Floats) -> Floats:
 
 
 def completed_quaternions(missing: Ints, others: Floats) -> Floats:
-    """Return unit quaternions, (n, 4), of three of their numbers, (n, 3), and which one above zero is missing, (n,)."""
+    """Return unit quaternions, (n, 4), of three components, (n, 3), and the index of the missing positive one, (n,)."""
     left = 1.0 - np.einsum("nk,nk->n", others, others)
     result = np.empty((len(others), 4))
     rows = np.arange(len(others))
@@ -70,27 +68,28 @@ def mapped(scales: Floats, rotations: Floats, gradients: Floats) -> tuple[Floats
     -------
     ndarray, (n, 3)
     ndarray, (n, 4)
-        Each on the same side as the quaternion before, so that the way between them is the short one.
+        Each on the same side as the quaternion before, so that interpolation between them is the short one.
 
     Notes
     -----
-    One-sided Jacobi: the columns of F R S are turned among each other until they are the axes. It keeps their order, as
-    long as no turn of 45 degrees is needed, and the digits of axes that are far shorter than others.
+    One-sided Jacobi: pairs of columns of F R S are rotated until all are orthogonal. It keeps their order, as long as
+    no rotation of 45 degrees is needed, and the digits of axes that are far shorter than others.
 
     References
     ----------
     Demmel, Veselic. Jacobi's method is more accurate than QR. SIAM J. Matrix Anal. Appl. 13, 1992.
     """
-    lengths, turns = np.empty(scales.shape), np.empty(rotations.shape)
+    lengths, quaternions = np.empty(scales.shape), np.empty(rotations.shape)
 
-    def split(rows: Any) -> None:
-        lengths[rows], turns[rows] = _split(scales[rows], rotations[rows], gradients[rows])
+    def split(rows: slice) -> None:
+        lengths[rows], quaternions[rows] = _split(scales[rows], rotations[rows], gradients[rows])
 
     on_all_cores(split, blocks(len(scales), _BLOCK))
-    return lengths, turns
+    return lengths, quaternions
 
 
 def _split(scales: Floats, rotations: Floats, gradients: Floats) -> tuple[Floats, Floats]:
+    """Return half axes and rotations of a block of mapped ellipsoids."""
     maps = np.ascontiguousarray(np.moveaxis(gradients, 0, 2), dtype=np.float64)  # a tenth of the time of strided ones
     axes = np.einsum("abn,bcn->acn", maps, matrices_of(rotations)) * np.asarray(scales, dtype=np.float64).T
     size = np.sqrt(np.einsum("acn,acn->n", axes, axes))
@@ -104,21 +103,21 @@ def _split(scales: Floats, rotations: Floats, gradients: Floats) -> tuple[Floats
         if not len(rows):
             break
     lengths = np.sqrt(np.einsum("acn,acn->cn", axes, axes))
-    lost = lengths <= _LOST * lengths.max(axis=0)  # to rounding, and with that the direction
+    lost = lengths <= _LOST * lengths.max(axis=0)  # rounding leaves no direction
     unit = axes / np.where(lost, np.inf, lengths)
-    # A column is turned over where the map mirrors; those without a direction complete the others.
+    # A column is reversed where the map mirrors; those without a direction complete the others.
     mirrored = np.einsum("an,an->n", unit[:, 0], np.cross(unit[:, 1], unit[:, 2], axis=0)) < 0.0
     unit[:, 2] *= np.where(mirrored, -1.0, 1.0)
     flat = np.flatnonzero(lost.any(axis=0))
     if len(flat):
         unit[:, :, flat] = nearest_rotations(unit[:, :, flat])
-    turns = quaternions_of(unit)
-    sides = np.where(np.einsum("nk,nk->n", turns, rotations) < 0.0, -1.0, 1.0)
-    return (lengths * size).T, turns * sides[:, None]
+    quaternions = quaternions_of(unit)
+    sides = np.where(np.einsum("nk,nk->n", quaternions, rotations) < 0.0, -1.0, 1.0)
+    return (lengths * size).T, quaternions * sides[:, None]
 
 
 def _orthogonalize(axes: Floats, p: int, q: int) -> Floats:
-    """Turn two columns of each matrix until they are orthogonal; return the cosines between them before, (n,)."""
+    """Rotate two columns of each matrix to be orthogonal; return the cosines between them before, (n,)."""
     one, other = axes[:, p], axes[:, q]
     product = np.einsum("an,an->n", one, other)
     squares = np.einsum("an,an->n", one, one), np.einsum("an,an->n", other, other)

@@ -1,8 +1,8 @@
-"""Files of Gaussian splats: PLY as trainers write it, and the layouts that hold as much."""
+"""Files of Gaussian splats: PLY by trainers, and other layouts."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, Self
+from typing import NamedTuple, NoReturn, Self
 
 import numpy as np
 
@@ -48,11 +48,11 @@ from .layouts import completed, hold_enough, near_miss
 from .splats import Splats
 from .spz import is_spz, read_spz
 
-_LOST = 1e-6  # of the extent: rounding of places that matters
+_LOST = 1e-6  # of the extent: rounding of positions that matters
 
 
 class SplatFile(NamedTuple):
-    """What a file of splats held, from which what was not changed is written again.
+    """The contents of a file of splats, from which unchanged data are written again.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class SplatFile(NamedTuple):
 
 
 def holds_splats(path: FilePath) -> bool:
-    """Tell whether a file is one of splats, by how it begins, or by its name; PLY files that are broken are none."""
+    """Whether a file is one of splats, by its first bytes or name; broken PLY files are not."""
     path = _path(path)
     try:
         with reading(path):
@@ -85,24 +85,24 @@ def holds_splats(path: FilePath) -> bool:
         return False
 
 
-def read_file(path: FilePath, read: Callable[..., Any] = read_points) -> PointTable | Splats:
-    """Read the splats of a file; of one that holds none its points.
+def read_file(path: Path, read: Callable[[Path], PointTable] = read_points) -> PointTable | Splats:
+    """Read the splats of a file, or its points if it has no splats.
 
     Parameters
     ----------
     path : pathlib.Path
     read : callable
-        What reads points, of a path.
+        Reader of points.
 
     Returns
     -------
     Splats or PointTable
-        With a notice, where splats were meant but something that they need is missing.
+        With a notice, where properties of splats are incomplete.
 
     Raises
     ------
     PointCloudError
-        There is no such file, or it is broken, or of no kind that is read.
+        There is no such file, or it is broken, or of an unknown kind.
     """
     if holds_splats(path):
         return read_splats(path)
@@ -114,19 +114,19 @@ def read_file(path: FilePath, read: Callable[..., Any] = read_points) -> PointTa
 
 
 def read_splats(path: FilePath) -> Splats:
-    """Read Gaussian splats from a file of one of these kinds, whatever it is called.
+    """Read Gaussian splats from a file of one of these kinds, whatever its name.
 
     Parameters
     ----------
     path : path-like
         PLY with the properties x y z, f_dc_0 to f_dc_2, opacity, scale_0 to scale_2 and rot_0 to rot_3, and f_rest_0 on
-        for splats whose colour depends on the direction of view; with red green blue instead of f_dc, or one or two
-        scales, too. PLY packed by SuperSplat, .spz up to version 3, and .splat.
+        for splats of view-dependent colour; also with red green blue instead of f_dc, or one or two scales. PLY packed
+        by SuperSplat, .spz up to version 3, and .splat.
 
     Returns
     -------
     Splats
-        What was guessed, and how many were left out since their numbers are not finite, is among its notices.
+        Notices state guesses, and how many splats were left out since their numbers are not finite.
 
     Raises
     ------
@@ -140,8 +140,8 @@ def read_splats(path: FilePath) -> Splats:
         return _from_vertices((_reader(path) or _refuse)(path), path)
 
 
-def _reader(path: Path) -> Callable[..., Any] | None:
-    """Return what reads the vertices of a file as columns that trainers write; None if it holds no splats."""
+def _reader(path: Path) -> Callable[[Path], PlyVertices] | None:
+    """Return the reader of a file as columns of trainers; None if it holds no splats."""
     suffix = path.suffix.lower()
     with open(path, "rb") as file:
         is_ply = file.read(3) == b"ply"
@@ -156,7 +156,7 @@ def _reader(path: Path) -> Callable[..., Any] | None:
 
 
 def _refuse(path: Path) -> NoReturn:
-    """Say what a file lacks."""
+    """Report the missing properties of a file."""
     missing = [name for name in NEEDED if name not in read_vertex_names(path)]
     raise InvalidPointsError(
         f"{path} holds no Gaussian splats: it has no {', '.join(missing)} among its properties. Give a file of splats:"
@@ -165,14 +165,15 @@ def _refuse(path: Path) -> NoReturn:
 
 
 def _read_ply(path: Path) -> PlyVertices:
+    """Read a PLY file as columns of trainers."""
     vertices = read_vertex_columns(path)
     columns, guesses = completed(vertices.columns)
-    told = [f"{path.name}: {'; '.join(guesses)}. Export Splats writes the common layout."] if guesses else []
-    return vertices._replace(columns=columns, notices=[*vertices.notices, *told])
+    notices = [f"{path.name}: {'; '.join(guesses)}. Export Splats writes the common layout."] if guesses else []
+    return vertices._replace(columns=columns, notices=[*vertices.notices, *notices])
 
 
 def _from_vertices(vertices: PlyVertices, path: Path) -> Splats:
-    """Make splats of the vertices of a file that has all properties they need, but those that are not finite."""
+    """Return the finite splats of the vertices of a file with all necessary properties."""
     columns, left_out = _without_broken(vertices.columns, path)
     positions = stack(columns, PLACES)
     check_places(positions, path)
@@ -191,8 +192,8 @@ def _from_vertices(vertices: PlyVertices, path: Path) -> Splats:
     )
 
 
-def _without_broken(columns: dict[str, Array], path: Path) -> tuple[dict[str, Array], list[Any]]:
-    """Leave out splats with numbers that are not finite, or too far away, as training leaves them; tell how many.
+def _without_broken(columns: dict[str, Array], path: Path) -> tuple[dict[str, Array], list[str]]:
+    """Leave out splats with numbers that are not finite, or too far away, as training leaves them; report how many.
 
     Logarithms of sizes may be minus infinity, of sizes zero, and logits of opacities infinite, of 0 and 1.
     """
@@ -209,9 +210,9 @@ def _without_broken(columns: dict[str, Array], path: Path) -> tuple[dict[str, Ar
         raise InvalidPointsError(
             f"{path}: all {broken} splats have numbers that are not finite (NaN or infinity). Train or export it again."
         )
-    far = f", or places beyond {FARTHEST:g}" if any(_any_far(columns[name]) for name in PLACES) else ""
-    told = f"{path.name}: left out {broken:,} splats with numbers that are not finite (NaN or infinity){far}."
-    return {name: values[sound] for name, values in columns.items()}, [told]
+    far = f", or positions beyond {FARTHEST:g}" if any(_any_far(columns[name]) for name in PLACES) else ""
+    notice = f"{path.name}: left out {broken:,} splats with numbers that are not finite (NaN or infinity){far}."
+    return {name: values[sound] for name, values in columns.items()}, [notice]
 
 
 def _any_far(values: Array) -> bool:
@@ -221,7 +222,7 @@ def _any_far(values: Array) -> bool:
 def write_splats(path: FilePath, splats: Splats) -> None:
     """Write Gaussian splats to a PLY file, in the layout of the file that they came from.
 
-    What was read and not changed is written bit for bit as it was.
+    Unchanged data of a file are written bit for bit as they were.
 
     Parameters
     ----------
@@ -237,7 +238,7 @@ def write_splats(path: FilePath, splats: Splats) -> None:
     path = _path(path)
     if not isinstance(splats, Splats):
         raise PointCloudError(
-            f"What is to be written to {path} is {type(splats).__name__}, not Splats. Make Splats first."
+            f"The data to be written to {path} are {type(splats).__name__}, not Splats. Make Splats first."
         )
     if path.suffix.lower() != ".ply":
         raise PointCloudError(f"Splats cannot be written to {path}. Give it a name that ends in .ply.")
@@ -251,17 +252,18 @@ def write_splats(path: FilePath, splats: Splats) -> None:
     for name, values in encoded(splats, columns).items():
         kind = columns[name].dtype if name in columns else np.float32
         columns[name] = values.astype(np.float64 if double and name in PLACES else kind)
-    with replacing(path) as part:
-        write_vertex_columns(part, columns, file.order, file.comments)
+    with replacing(path) as temporary:
+        write_vertex_columns(temporary, columns, file.order, file.comments)
 
 
 def _needs_double(positions: Floats) -> bool:
-    """Whether single precision would hurt places, other than such as came from there."""
+    """Whether single precision would lose digits of positions that were not read in it."""
     lost = np.abs(positions.astype(np.float32) - positions).max()
     return is_coarse(positions) and lost > _LOST * np.ptp(positions, axis=0).max()
 
 
 def _path(given: FilePath) -> Path:
+    """Return the path of a name."""
     try:
         return Path(given)
     except TypeError as error:
@@ -290,8 +292,8 @@ def encoded(splats: Splats, columns: dict[str, Array]) -> dict[str, Floats]:
     return result
 
 
-def _harmonic_columns(columns: dict[str, Array], path: Path) -> tuple[list[Any], list[Any]]:
-    """Return the names of the harmonics that can be used, channel by channel, and what to tell about the others."""
+def _harmonic_columns(columns: dict[str, Array], path: Path) -> tuple[list[str], list[str]]:
+    """Return the names of the usable harmonics, channel by channel, and notices about the others."""
     count = sum(name.startswith(REST) for name in columns)
     whole = count % 3 == 0 and count // 3 <= COUNTS[-1] and all(f"{REST}{number}" in columns for number in range(count))
     per_channel = count // 3
@@ -300,6 +302,6 @@ def _harmonic_columns(columns: dict[str, Array], path: Path) -> tuple[list[Any],
     if used != per_channel or not whole:
         notices.append(
             f"{path.name}: {count} numbers f_rest are not those of whole degrees up to 4, and {3 * used} of them are"
-            " used. Colors may not turn with the surface."
+            " used. View-dependent colors may not be rotated with the surface."
         )
     return rest_names(per_channel, used), notices

@@ -1,30 +1,29 @@
-"""Floaters: splats that show no surface, which training leaves in the air and where few pictures look."""
-
-from typing import Any
+"""Floaters: splats off the surface, which training leaves in empty space and where few pictures look."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
+from ..arguments import check_finite
 from ..errors import InvalidPointsError
-from ..types import Bools, Floats
+from ..types import Bools, Floats, Ints
 from .splats import Splats
 
-_SEEN = 0.05  # opacity in the middle: nobody sees that less of what lies behind comes through
-_HUGE = 10.0  # times the median length: the middle of such a splat tells nothing of the shape
+_SEEN = 0.05  # opacity at the center below which a splat is invisible
+_HUGE = 10.0  # times the median length: the center of such a splat is not on the surface
 _APART = 3.0  # standard deviations, and times the median, at which a splat touches no other one
 _AGREEING = 3  # neighbours that it must touch, as on each of the three faces at a corner
-_NEIGHBORS = 12  # nearest middles, of which these are chosen
-_BLOCK = 1 << 13  # splats looked at at one time
+_NEIGHBORS = 12  # nearest centers, of which these are chosen
+_BLOCK = 1 << 13  # splats worked on at one time
 
 
 def floaters(splats: Splats) -> Bools:
-    """Find splats that show no surface: hardly seen ones, huge ones, and such as float alone.
+    """Find splats that belong to no surface: nearly transparent, huge or isolated ones.
 
-    Splats cover a surface without gaps, so that each of them touches others. How far two are apart is measured by the
-    Mahalanobis distance of their middles, in standard deviations of both ellipsoids together: along flat splats far,
-    across them near. Isolated are those whose third such distance is above three, and above three times the median,
-    which serves splats that leave gaps everywhere.
+    Splats cover a surface without gaps, so that each of them touches others. The distance of two is the Mahalanobis
+    distance of their centers, in standard deviations of both ellipsoids together: large along flat splats, small
+    across them. Isolated are those whose third such distance is above three, and above three times the median, for
+    splats with gaps everywhere.
 
     Parameters
     ----------
@@ -33,8 +32,8 @@ def floaters(splats: Splats) -> Bools:
     Returns
     -------
     ndarray, (n,) bool
-        Those with an opacity below 0.05, those ten times as long as the median of the others, and of what is left the
-        isolated ones. Turning or scaling all splats, or giving them in another order, changes nothing.
+        Those with an opacity below 0.05, those ten times as long as the median of the others, and of the rest the
+        isolated ones. Rotating or scaling all splats, or their order, makes no difference.
 
     Raises
     ------
@@ -52,13 +51,11 @@ def floaters(splats: Splats) -> Bools:
     """
     if not hasattr(splats, "covariances"):
         raise InvalidPointsError(f"These are {type(splats).__name__}, not Splats. Use read_splats, or Splats(...).")
-    positions, opacities = np.asarray(splats.positions, dtype=np.float64), splats.opacities
+    for name in ("positions", "scales", "rotations", "opacities"):
+        check_finite(getattr(splats, name), f"{name} of splats", "Delete these splats.")
+    positions = np.asarray(splats.positions, dtype=np.float64)
     lengths = np.max(splats.scales, axis=1, initial=0.0)
-    for values in (positions, splats.scales, splats.rotations, opacities):
-        bad = np.count_nonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
-        if bad:
-            raise InvalidPointsError(f"{bad} of {len(values)} splats have values that are not finite. Delete these.")
-    kept = opacities >= _SEEN
+    kept = splats.opacities >= _SEEN
     if kept.any():
         kept &= lengths <= _HUGE * np.median(lengths[kept])
     rows = np.flatnonzero(kept)
@@ -68,7 +65,7 @@ def floaters(splats: Splats) -> Bools:
     return ~kept
 
 
-def floating_rows(splats: Any) -> Any:
+def floating_rows(splats: Splats) -> Ints:
     """Return the floaters that operators leave out, as indices: all, or none where these are the larger part."""
     rows = np.flatnonzero(floaters(splats))
     return rows if 2 * len(rows) < len(splats) else rows[:0]
@@ -78,18 +75,16 @@ def _gaps(positions: Floats, covariances: Floats) -> Floats:
     """Return the third of the Mahalanobis distances from each splat to its neighbors, (m,)."""
     result = np.empty(len(positions))
     index = cKDTree(positions).query(positions, k=_NEIGHBORS + 1, workers=-1)[1][:, 1:]
-    # Flat ones have no inverse: a millionth of the length is no thickness that matters.
-    ridge = 1e-12 * np.trace(covariances, axis1=1, axis2=2)[:, None, None] * np.eye(3) + np.finfo(float).tiny * np.eye(
-        3
-    )
-    covariances = covariances + ridge
+    # Flat ones have no inverse: a thickness of a millionth of the length is negligible.
+    ridge = 1e-12 * np.trace(covariances, axis1=1, axis2=2) + np.finfo(float).tiny
+    covariances = covariances + ridge[:, None, None] * np.eye(3)
 
-    def measure(part: Any) -> None:
-        near = index[part]
-        steps = positions[near] - positions[part][:, None]
-        both = covariances[near] + covariances[part][:, None]
+    def measure(rows: slice) -> None:
+        near = index[rows]
+        steps = positions[near] - positions[rows][:, None]
+        both = covariances[near] + covariances[rows][:, None]
         squares = np.einsum("nki,nki->nk", steps, np.linalg.solve(both, steps[..., None])[..., 0])
-        result[part] = np.sqrt(np.partition(squares, _AGREEING - 1, axis=1)[:, _AGREEING - 1])
+        result[rows] = np.sqrt(np.partition(squares, _AGREEING - 1, axis=1)[:, _AGREEING - 1])
 
     on_all_cores(measure, blocks(len(positions), _BLOCK))
     return result

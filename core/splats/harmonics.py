@@ -1,11 +1,9 @@
-"""Real spherical harmonics as Gaussian splats use them, and how functions on the sphere turn.
+"""Real spherical harmonics of Gaussian splats, and rotation of functions on the sphere.
 
 The functions of degree 1 to 4 follow each other, without the constant one: 3, 8, 15 or 24 of them. Their signs are
 those of the files of Kerbl, Kopanas, Leimkuehler, Drettakis: 3D Gaussian Splatting for Real-Time Radiance Field
 Rendering. ACM Trans. Graph. 42, 2023.
 """
-
-from typing import Any
 
 import numpy as np
 
@@ -33,19 +31,19 @@ def harmonics(directions: Floats, count: int) -> Floats:
     ndarray, (..., count)
         Orthonormal on the unit sphere.
     """
-    parts = [_of_degree(degree, directions) for degree in range(1, COUNTS.index(count) + 1)]
-    return np.concatenate([np.empty((*np.shape(directions)[:-1], 0)), *parts], axis=-1)
+    values = [_of_degree(degree, directions) for degree in range(1, COUNTS.index(count) + 1)]
+    return np.concatenate([np.empty((*np.shape(directions)[:-1], 0)), *values], axis=-1)
 
 
-def turned(coefficients: Array, turns: Floats) -> Array:
-    """Turn functions on the sphere that are given by their coefficients.
+def rotated(coefficients: Array, rotations: Floats) -> Array:
+    """Rotate functions on the sphere that are given by their coefficients.
 
     Parameters
     ----------
     coefficients : ndarray, (n, count, m)
         Of m functions each, such as three colours.
-    turns : ndarray, (n, 3, 3)
-        Orthogonal matrices Q, also such that mirror.
+    rotations : ndarray, (n, 3, 3)
+        Orthogonal matrices Q, which may mirror.
 
     Returns
     -------
@@ -54,18 +52,18 @@ def turned(coefficients: Array, turns: Floats) -> Array:
 
     Notes
     -----
-    Harmonics of one degree l turn among themselves. What the turned function is in 2 l + 1 fixed directions is the old
-    one in these directions turned back, and a constant matrix gives its coefficients.
+    Rotations map harmonics of one degree l to each other. Values of the rotated function in 2 l + 1 fixed directions
+    are those of the given one in the inversely rotated directions, and a constant matrix gives its coefficients.
     """
     result = np.empty_like(coefficients)
 
-    def turn(rows: Any) -> None:
+    def rotate(rows: slice) -> None:
         for degree, (directions, fit) in enumerate(_FITS[: COUNTS.index(coefficients.shape[1])], 1):
             own = slice(COUNTS[degree - 1], COUNTS[degree])
-            back = np.einsum("kd,nde->nke", directions, turns[rows])
+            back = np.einsum("kd,nde->nke", directions, rotations[rows])
             result[rows, own] = fit @ (_of_degree(degree, back) @ coefficients[rows, own])
 
-    on_all_cores(turn, blocks(len(coefficients), _BLOCK))
+    on_all_cores(rotate, blocks(len(coefficients), _BLOCK))
     return result
 
 
@@ -114,7 +112,7 @@ _DEGREES = (
 
 def _fit(degree: int) -> tuple[Floats, Array]:
     """Return 2 degree + 1 directions, and the matrix from values there to coefficients."""
-    # Of one half of the sphere, for on the other one the values are the same, or the opposite.
+    # Of one half of the sphere: on the other one values are the same, or opposite.
     z = 1.0 - (np.arange(2 * degree + 1) + 0.5) / (2 * degree + 1)
     angle = _GOLDEN * np.arange(2 * degree + 1)
     ring = np.sqrt(1.0 - z * z)

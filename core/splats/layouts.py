@@ -1,6 +1,6 @@
-"""Layouts of vertices that are nearly those of trainers: which hold enough for Gaussian splats, and what they lack."""
+"""Layouts of vertices that are nearly those of trainers: whether they suffice for Gaussian splats, and completions."""
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,10 +13,10 @@ _RGB = (("red", "green", "blue"), ("r", "g", "b"))
 _THIN = 1e-3  # of the shorter axis in the plane: how thick a splat without a third axis becomes
 
 
-def hold_enough(names: list[str] | tuple[str, ...]) -> bool:
-    """Whether properties of these names hold enough for splats: sizes, and at least one thing more that splats have.
+def hold_enough(names: Sequence[str]) -> bool:
+    """Whether properties of these names suffice for splats: sizes, and opacities, colours or rotations.
 
-    Colours and rotations are there or not, but not by halves. Of sizes one or two do: balls, and flat ones.
+    Colours and rotations must be complete if there are any. One size suffices for balls, two for flat splats.
     """
     there = set(names)
     sizes = [name in there for name in SCALES]
@@ -25,24 +25,24 @@ def hold_enough(names: list[str] | tuple[str, ...]) -> bool:
     return there.issuperset(PLACES) and sizes[0] and sizes[2] <= sizes[1] and not halves and bool(marks)
 
 
-def near_miss(names: tuple[str, ...]) -> str:
+def near_miss(names: Sequence[str]) -> str:
     """Return what is missing in a file that seems to hold splats but not enough of them; empty for other files."""
     if hold_enough(names) or not {COLORS[0], SCALES[0], ROTATIONS[0]}.intersection(names):
         return ""
     return f"no {', '.join(name for name in NEEDED if name not in names)}"
 
 
-def completed(columns: dict[str, Array]) -> tuple[dict[str, Array], list[Any]]:
-    """Return the columns as trainers write them, for columns that `hold_enough`, and what was taken for missing ones.
+def completed(columns: dict[str, Array]) -> tuple[dict[str, Array], list[str]]:
+    """Return the columns as trainers write them, for columns that `hold_enough`, and how missing ones were completed.
 
     Returns
     -------
     dict of str to ndarray, (n,)
     list of str
-        What to tell, a clause each.
+        Clauses for a notice.
     """
     columns = dict(columns)
-    return columns, [told for add in (_add_colors, _add_opacity, _add_sizes, _add_rotations) if (told := add(columns))]
+    return columns, [*filter(None, (add(columns) for add in (_add_colors, _add_opacity, _add_sizes, _add_rotations)))]
 
 
 def _add_colors(columns: dict[str, Array]) -> str:
@@ -56,7 +56,7 @@ def _add_colors(columns: dict[str, Array]) -> str:
     columns.update(split(COLORS, (colors[:, :3] - 0.5) / CONSTANT))
     for name in named:
         del columns[name]
-    return f"colors by {' '.join(named)}: the same from all sides"
+    return f"colors by {' '.join(named)}: the same from all directions"
 
 
 def _add_opacity(columns: dict[str, Array]) -> str:
@@ -80,4 +80,4 @@ def _add_rotations(columns: dict[str, Array]) -> str:
     if ROTATIONS[0] in columns:
         return ""
     columns.update(split(ROTATIONS, np.tile([1.0, 0.0, 0.0, 0.0], (len(columns["x"]), 1))))
-    return "no rotations: ellipsoids lie along the axes of coordinates"
+    return "no rotations: ellipsoids are aligned with the coordinate axes"

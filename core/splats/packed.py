@@ -1,7 +1,7 @@
-"""Packed PLY files of Gaussian splats, as PlayCanvas and SuperSplat write them: four whole numbers a splat.
+"""Packed PLY files of Gaussian splats by PlayCanvas and SuperSplat: four whole numbers per splat.
 
-Each element "chunk" holds the least and greatest places, logarithms of sizes, and colors of 256 splats, between which
-the numbers of these lie. An element "sh", if it is there, holds the harmonics by bytes.
+Each element "chunk" holds the least and greatest positions, logarithms of sizes, and colors of 256 splats, between
+which their numbers are quantized. An optional element "sh" holds the harmonics as bytes.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ _SINGLE = np.float32
 
 
 def read_packed(path: Path) -> PlyVertices:
-    """Read the splats of a packed PLY file as the columns that trainers write.
+    """Read the splats of a packed PLY file as the columns of trainers.
 
     Raises
     ------
@@ -44,14 +44,14 @@ def read_packed(path: Path) -> PlyVertices:
     columns = _unpack({name: vertices[name].astype(np.uint32) for name in _PACKED}, chunks)
     harmonics = elements.get("sh", {})
     if any(len(values) != count for values in harmonics.values()):
-        raise InvalidPointsError(f"{path}: {count} packed splats, but harmonics of others. Save it again.")
+        raise InvalidPointsError(f"{path}: {count} packed splats, but another number of harmonics. Save it again.")
     columns.update((name, _decode_harmonics(values)) for name, values in harmonics.items())
     columns.update((name, values) for name, values in vertices.items() if name not in _PACKED)
     return PlyVertices(columns, order, comments, [])
 
 
 def _unpack(packed: dict[str, Ints], chunks: dict[str, Array]) -> dict[str, Array]:
-    """Return places, sizes, rotations, colours and opacities."""
+    """Return positions, sizes, rotations, colours and opacities."""
     rows = np.arange(len(packed[MARK])) // _CHUNK
     places = _between(chunks, _PLACES, rows, _shares(packed[MARK], (11, 10, 11)))
     sizes = _between(chunks, _SIZES, rows, _shares(packed["packed_scale"], (11, 10, 11)))
@@ -78,14 +78,14 @@ def _shares(packed: Ints, widths: tuple[int, ...]) -> list[Floats]:
 
 
 def _between(chunks: dict[str, Array], axes: tuple[str, str, str], rows: Ints, shares: Sequence[Floats]) -> Floats:
-    """Return what lies at some shares between the bounds of chunks, (n, 3)."""
+    """Interpolate between the bounds of chunks by shares, (n, 3)."""
     low, high = (stack(chunks, [f"{end}_{axis}" for axis in axes])[rows] for end in ("min", "max"))
     share = np.stack(shares, axis=1)
     return low * (1.0 - share) + high * share
 
 
 def _decode_harmonics(values: Ints) -> Array:
-    """Return harmonics of bytes: the middles of 256 equal steps, and both ends as they are."""
+    """Return harmonics of bytes: the centers of 256 equal steps, and both ends exactly."""
     values = values.astype(_SINGLE)
     share = np.where(values == 0.0, 0.0, np.where(values == 255.0, 1.0, (values + 0.5) / 256.0))
     return (_HARMONICS * (share - 0.5)).astype(_SINGLE)

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..algebra import nearest_rotations
-from ..arguments import as_array, check_array
-from ..errors import InvalidPointsError
+from ..arguments import as_array, check_array, check_finite
 from ..types import Array, Floats
 from .ellipsoids import mapped, matrices_of
-from .harmonics import COUNTS, turned
+from .harmonics import COUNTS, rotated
 
 if TYPE_CHECKING:
     from .file import SplatFile
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Splats:
-    """Gaussian splats: points with an ellipsoid each, and a colour that depends on the direction of view.
+    """Gaussian splats: points with an ellipsoid each, and a view-dependent colour.
 
     Attributes
     ----------
@@ -30,7 +29,7 @@ class Splats:
     scales : ndarray, (n, 3)
         Half axes of the ellipsoids at one standard deviation [L].
     rotations : ndarray, (n, 4)
-        Unit quaternions w x y z that turn the axes of coordinates to those of the ellipsoids.
+        Unit quaternions w x y z that rotate the coordinate axes to those of the ellipsoids.
     opacities : ndarray, (n,)
         In the centre, from 0 to 1.
     colors : ndarray, (n, 3)
@@ -38,19 +37,19 @@ class Splats:
     harmonics : ndarray, (n, k, 3)
         Coefficients of the harmonics of degree 1 on; k is 0, 3, 8, 15 or 24 for the highest degree 0 to 4.
     notices : list of str
-        What of a file was left out.
+        Which data of a file were left out.
     file : SplatFile or None
-        What a file held, so that what is not changed is written as it was.
+        The contents of a file, so that unchanged data are written as they were.
 
     Raises
     ------
     InvalidPointsError
-        Arrays of wrong shapes, or no real numbers.
+        Arrays of wrong shapes, or not of real numbers.
 
     See Also
     --------
     read_splats, write_splats : Files of splats.
-    deformation_gradients : What a moved surface does to the splats on it.
+    deformation_gradients : The maps by which a moved surface deforms splats.
 
     References
     ----------
@@ -91,60 +90,56 @@ class Splats:
         return np.einsum("abn,cbn->nac", axes, axes)
 
     def deformed(self, positions: ArrayLike, gradients: ArrayLike) -> Self:
-        """Return these splats carried along by a deformation.
+        """Return these splats after a deformation.
 
         Parameters
         ----------
         positions : array_like, (n, 3)
-            Where they are after it [L].
+            Their positions after it [L].
         gradients : array_like, (n, 3, 3)
-            How it maps small steps around each of them: F, of `deformation_gradients` or any other.
+            Its gradients F: maps of small steps around each of them, of `deformation_gradients` or any other.
 
         Returns
         -------
         Splats
-            With the covariances F R S^2 R^T F^T. Harmonics turn by the rotation next to F, mirrored where F mirrors.
-            Further lengths of their file grow as the root of the volume.
+            With the covariances F R S^2 R^T F^T. Harmonics are rotated by the orthogonal matrix next to F. Further
+            lengths of their file are scaled by the cubic root of its determinant.
 
         Raises
         ------
         InvalidPointsError
             Arrays of wrong shapes, or with numbers that are not finite.
         """
-        places = _numbers(positions, self.positions.shape, "positions")
+        moved = _numbers(positions, self.positions.shape, "positions")
         maps = _numbers(gradients, (len(self), 3, 3), "gradients")
-        bad = int(np.count_nonzero(~(np.isfinite(places).all(axis=1) & np.isfinite(maps).all(axis=(1, 2)))))
-        if bad:
-            raise InvalidPointsError(
-                f"{bad} of {len(self)} splats get positions or gradients that are not finite (NaN or infinity). Give a"
-                " place and a map for each."
-            )
+        check_finite(moved, "positions of splats", "Give a position for each.")
+        check_finite(maps, "gradients of splats", "Give a map for each.")
         shapes = self.scales, self.rotations, self.harmonics
         rows = np.flatnonzero((maps != np.eye(3)).any(axis=(1, 2)))
         if len(rows) == len(self):
             shapes = _mapped(*shapes, maps)
         elif len(rows):  # the others keep every bit
-            moved = _mapped(self.scales[rows], self.rotations[rows], self.harmonics[rows], maps[rows])
+            changed = _mapped(self.scales[rows], self.rotations[rows], self.harmonics[rows], maps[rows])
             shapes = (shapes[0].copy(), shapes[1].copy(), shapes[2].copy())
-            for part, new in zip(shapes, moved, strict=True):
-                part[rows] = new
+            for values, new in zip(shapes, changed, strict=True):
+                values[rows] = new
         scales, rotations, harmonics = shapes
         file = self.file and self.file.scaled(np.cbrt(np.abs(np.linalg.det(maps))))
-        return replace(self, positions=places, scales=scales, rotations=rotations, harmonics=harmonics, file=file)
+        return replace(self, positions=moved, scales=scales, rotations=rotations, harmonics=harmonics, file=file)
 
 
 def _mapped(scales: Floats, rotations: Floats, harmonics: Array, maps: Floats) -> tuple[Floats, Floats, Array]:
     """Return half axes, rotations and harmonics after linear maps, (n, 3, 3)."""
     if harmonics.shape[1]:
-        harmonics = turned(harmonics, orthogonal_parts(maps))
+        harmonics = rotated(harmonics, orthogonal_parts(maps))
     return *mapped(scales, rotations, maps), harmonics
 
 
 def orthogonal_parts(gradients: Floats) -> Floats:
     """Return the orthogonal matrices nearest to maps, (n, 3, 3): rotations, mirrored where the maps mirror."""
     sign = np.where(np.linalg.det(gradients) < 0.0, -1.0, 1.0)
-    parts = nearest_rotations(np.ascontiguousarray(np.moveaxis(gradients * sign[:, None, None], 0, 2)))
-    return np.moveaxis(parts * sign, 2, 0)
+    rotations = nearest_rotations(np.ascontiguousarray(np.moveaxis(gradients * sign[:, None, None], 0, 2)))
+    return np.moveaxis(rotations * sign, 2, 0)
 
 
 def _numbers(given: ArrayLike, shape: tuple[int, ...], name: str) -> Array:

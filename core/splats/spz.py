@@ -9,7 +9,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from ..errors import InvalidPointsError
-from ..files import PlyVertices
+from ..files import PlyVertices, unpacks_too_far
 from ..types import Array, Floats, Ints
 from .columns import COLORS, OPACITY, PLACES, ROTATIONS, SCALES, encode_opacities, rest_names, split
 from .ellipsoids import completed_quaternions
@@ -18,12 +18,11 @@ from .harmonics import COUNTS
 MAGIC = b"NGSP"
 GZIP = b"\x1f\x8b"
 _HEADER = struct.Struct("<4sIIBBBB")
-_NEWEST = 3  # version that is read; later ones are packed by Zstandard
+_NEWEST = 3  # version that is read; later ones are compressed by Zstandard
 _BEFORE_SMALLEST_THREE = 2  # version, up to which rotations have three bytes
-_EXTENDED = 2  # flag of what vendors added
+_EXTENDED = 2  # flag of vendor extensions
 _COLORS = 0.15  # of a byte from 0 to 1 for each unit of the constant harmonic
-_RATIO = 100  # of unpacked to packed bytes; those of splats have 1 to 4 ...
-_HARMLESS = 64e6  # ... or fewer bytes than this
+
 _BLOCK = 1 << 16  # bytes that are unpacked at one time
 
 
@@ -44,7 +43,7 @@ class _Header(NamedTuple):
 
 
 def is_spz(path: Path) -> bool:
-    """Whether a file is one of .spz, of any version, by how it begins, packed or not."""
+    """Whether a file is one of .spz, of any version, by its first bytes, compressed or not."""
     with open(path, "rb") as file:
         try:
             return bytes(_Unpacked(file).read(len(MAGIC))) == MAGIC
@@ -53,19 +52,19 @@ def is_spz(path: Path) -> bool:
 
 
 def read_spz(path: Path) -> PlyVertices:
-    """Read an .spz file as the columns that trainers write, in the file's own axes, of which y points upwards.
+    """Read an .spz file as the columns of trainers, in the file's own axes, of which y points upwards.
 
     Raises
     ------
     InvalidPointsError
-        It is none, broken, of a later version, or would unpack to what splats never have.
+        It is no .spz file, broken, of a later version, or would unpack to more bytes than splats ever do.
     """
     with open(path, "rb") as file:
         unpacked = _Unpacked(file)
         header = _read_header(unpacked.read(_HEADER.size), path)
         widths = header.widths
         length, size = header.count * sum(widths), os.fstat(file.fileno()).st_size
-        if length > max(_RATIO * size, _HARMLESS):
+        if unpacks_too_far(length, size):
             raise InvalidPointsError(
                 f"{path} would unpack to {length / 1e6:,.0f} MB from {size / 1e6:,.1f} MB, which splats never do. Copy"
                 " or export it again."
@@ -81,12 +80,12 @@ def read_spz(path: Path) -> PlyVertices:
     columns = _decode(header, *(part.reshape(header.count, width) for part, width in zip(parts, widths, strict=True)))
     notices = []
     if header.flags & _EXTENDED:
-        notices.append(f"{path.name}: left out what a vendor added. It may tell of other axes of coordinates.")
+        notices.append(f"{path.name}: ignored vendor extensions, which may define other coordinate axes.")
     return PlyVertices(columns, "<", [], notices)
 
 
 class _Unpacked:
-    """What is in a file, out of gzip if it is packed, as far as it is asked for."""
+    """The contents of a file, decompressed by gzip if need be, as far as requested."""
 
     def __init__(self, file: BinaryIO) -> None:
         packed = file.read(len(GZIP)) == GZIP
@@ -94,15 +93,15 @@ class _Unpacked:
         self._file, self._unpacker = file, zlib.decompressobj(wbits=zlib.MAX_WBITS | 16) if packed else None
 
     def read(self, count: int) -> bytearray | bytes:
-        """Return the next bytes, fewer if there are not so many; memory is taken for what is there."""
+        """Return the next bytes, fewer at the end of the file; memory is allocated for existing bytes only."""
         if self._unpacker is None:
             return self._file.read(min(count, os.fstat(self._file.fileno()).st_size))
         result, more = bytearray(), True
         while more and len(result) < count and not self._unpacker.eof:
             block = self._unpacker.unconsumed_tail or self._file.read(_BLOCK)
-            part = self._unpacker.decompress(block, count - len(result))
-            result += part
-            more = bool(block or part)
+            data = self._unpacker.decompress(block, count - len(result))
+            result += data
+            more = bool(block or data)
         return result
 
 

@@ -7,8 +7,9 @@ from scipy.special import sph_harm_y
 
 import core
 from benchmarks.samplings import fibonacci_sphere
+from core.splats import joined
 from core.splats.ellipsoids import mapped, matrices_of, quaternions_of
-from core.splats.harmonics import COUNTS, harmonics, turned
+from core.splats.harmonics import COUNTS, harmonics, rotated
 
 RNG = np.random.default_rng(20)
 TURNS = Rotation.random(500, random_state=1)
@@ -67,7 +68,7 @@ def test_turned_harmonics_are_the_old_ones_in_directions_turned_back(count, sign
     coefficients = RNG.standard_normal((500, count, 3))
     turns = sign * TURNS.as_matrix()  # proper ones, and such that mirror
     directions = Rotation.random(200, random_state=3).apply([0.0, 0.0, 1.0])
-    found = harmonics(directions, count) @ turned(coefficients, turns)
+    found = harmonics(directions, count) @ rotated(coefficients, turns)
     back = np.einsum("dk,nke->nde", directions, turns)
     np.testing.assert_allclose(found, harmonics(back, count) @ coefficients, atol=1e-12)
 
@@ -164,6 +165,24 @@ def test_new_splats_are_written_in_the_common_layout(tmp_path):
     for name in ("positions", "scales", "opacities", "colors", "harmonics"):
         np.testing.assert_allclose(getattr(found, name), getattr(splats, name), rtol=2e-6, atol=1e-6)
     close_covariances(found.covariances, splats.covariances, 1e-5)
+
+
+def test_joined_splats_keep_the_columns_of_all_files(tmp_path):
+    """One set is of a big-endian file with a column more, one of a file without harmonics, one of none."""
+    written_ply(tmp_path / "a.ply", 24, ">", extra=("confidence",), comments=["comment first"])
+    written_ply(tmp_path / "b.ply", 0, count=30)
+    sets = [core.read_splats(tmp_path / "a.ply"), core.read_splats(tmp_path / "b.ply"), some_splats(20, 3)]
+    core.write_splats(tmp_path / "joined.ply", joined(sets))
+    found = core.read_splats(tmp_path / "joined.ply")
+    np.testing.assert_array_equal(found.positions[:80], np.concatenate([sets[0].positions, sets[1].positions]))
+    np.testing.assert_allclose(found.scales, np.concatenate([each.scales for each in sets]), rtol=1e-5)
+    np.testing.assert_array_equal(found.harmonics[:50], sets[0].harmonics)
+    assert not found.harmonics[50:80].any()
+    np.testing.assert_allclose(found.harmonics[80:, :3], sets[2].harmonics, atol=1e-6)
+    assert (found.file.order, list(found.file.comments)) == (">", ["comment first"])
+    np.testing.assert_array_equal(found.file.columns["confidence"][:50], sets[0].file.columns["confidence"])
+    assert not found.file.columns["confidence"][50:].any()
+    assert joined([some_splats(2), some_splats(3)]).file is None
 
 
 def test_extreme_numbers_of_a_file_are_read_and_written_again(tmp_path):
