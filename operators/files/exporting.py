@@ -25,13 +25,13 @@ from .splats import splats_in_world, splats_to_write
 
 
 class ExportOperator(JobOperator, ExportHelper):
-    """An operator that writes one file about the active object; an older file stays if that fails.
+    """An operator that writes a file about the active object; an older file is kept if that fails.
 
-    A subclass has a method `plan`, which reads all that is needed and returns a function of a path and a progress
-    callback that writes the file, without touching Blender, and returns a line for the status bar, or notices and it.
+    A subclass has a method `plan`, which reads everything needed and returns a function of a path and a progress
+    callback that writes the file, without access to Blender, and returns a line for the status bar, or notices and it.
     """
 
-    bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
+    bl_options = {"REGISTER", "PRESET"}  # the scene is not changed
 
     def invoke(self, context, event):
         self._attended = True
@@ -53,7 +53,7 @@ class ExportOperator(JobOperator, ExportHelper):
         return self.work(context, [], lambda progress: write(path, progress))
 
     def finish(self, context, objects, results):
-        """Tell what was written."""
+        """Report what was written."""
         *notices, line = [results] if isinstance(results, str) else results
         for notice in notices:
             self.warn(notice, context.object)
