@@ -249,11 +249,11 @@ def paint(name, color, normals=""):
     tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
     if normals:
         attribute = add_node(tree, "ShaderNodeAttribute", 0, 0, attribute_name=normals)
-        turned = add_node(
+        rotated = add_node(
             tree, "ShaderNodeVectorTransform", 1, 0, vector_type="NORMAL", convert_from="OBJECT", convert_to="WORLD"
         )
-        tree.links.new(attribute.outputs["Vector"], turned.inputs[0])
-        tree.links.new(turned.outputs[0], diffuse.inputs["Normal"])
+        tree.links.new(attribute.outputs["Vector"], rotated.inputs[0])
+        tree.links.new(rotated.outputs[0], diffuse.inputs["Normal"])
     return material
 
 
@@ -351,14 +351,14 @@ def harmonic_field(obj, low, high):
     bpy.ops.meshfree.harmonic_field(values="GROUPS", low_group="Low", high_group="High")
 
 
-def deform(obj, move, turn=(0.0, 0.0, 0.0)):
-    """Deform an object by its groups: move the empty of its handles by a way and turn it by angles, in the world."""
+def deform(obj, move, rotate=(0.0, 0.0, 0.0)):
+    """Deform an object by its groups: move the empty of its handles, and rotate it by Euler angles, in world space."""
     activate(obj)
     bpy.ops.meshfree.deform_bind()
     empty = obj.meshfree.deform.handle_items[0].empty
     place = empty.matrix_world.translation.copy()
-    turned = Euler(turn).to_matrix().to_4x4() @ Matrix.Translation(-place) @ empty.matrix_world
-    empty.matrix_world = Matrix.Translation(place + Vector(move)) @ turned
+    rotated = Euler(rotate).to_matrix().to_4x4() @ Matrix.Translation(-place) @ empty.matrix_world
+    empty.matrix_world = Matrix.Translation(place + Vector(move)) @ rotated
     bpy.ops.meshfree.deform_update()
 
 

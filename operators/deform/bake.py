@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, IntProperty
 from ...core import NotEnoughMemoryError, PointCloudError
 from ...core.memory import available_memory
 from ..objects.all_or_nothing import all_or_nothing
+from ..objects.animation import TRANSFORM
 from ..objects.attributes import point_count, read_attribute, write_attribute
 from ..objects.carried import carried, carries, moved_names
 from ..objects.quantities import DISPLACEMENT
@@ -23,7 +24,6 @@ from .pose import POSE, State, write_displacement
 from .tools import BoundOperator, check_fresh, delete_bake
 
 _LAST = 1048574  # frame of Blender
-_PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
 class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
@@ -180,7 +180,7 @@ class _Kept:
         settings = obj.meshfree.deform
         things = {item.empty.session_uid: item.empty for item in settings.handle_items if item.empty}
         places = {
-            uid: {name: tuple(getattr(thing, name)) for name in _PLACE}
+            uid: {name: tuple(getattr(thing, name)) for name in TRANSFORM}
             for uid, thing in (things | {obj.session_uid: obj}).items()
         }
         return scene.frame_current, settings.binding_id, places

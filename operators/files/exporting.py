@@ -20,6 +20,7 @@ from ..running import cache
 from ..running.application import build_operator
 from ..running.job import JobOperator
 from ..running.ready import reporting
+from ..tools.splats import SplatOperator
 from .objects import analysis_arrays, file_filter, point_table, save_arrays
 from .splats import splats_in_world, splats_to_write
 
@@ -108,7 +109,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
         return write
 
 
-class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
+class MESHFREE_OT_export_splats(ExportOperator, SplatOperator, bpy.types.Operator):
     """Export Gaussian splats to a PLY file, as deformations show them: of the active object, or of all selected ones"""
 
     bl_idname = "meshfree.export_splats"
@@ -123,13 +124,6 @@ class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
         description="Write all selected objects of splats to one file, in world space",
         default=True,
     )
-
-    @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or has_splats(context.object.data):
-            return reason
-        return f'"{context.object.name}" holds no Gaussian splats. Import a file of splats'
 
     def plan(self, context, obj):
         objects = [each for each in context.selected_objects if each.type in TYPES and has_splats(each.data)]
