@@ -1,4 +1,4 @@
-"""What there is for each tool, said once, beside its operator: panels, menus and the command line list it from here."""
+"""The registry of tools, from which panels, menus and the command line are built."""
 
 from dataclasses import dataclass
 from itertools import groupby
@@ -8,23 +8,23 @@ _registered = []
 
 
 class Row(NamedTuple):
-    """Where a tool stands: in which panel or menu, in which group of rows there, and at which place of it, from 1."""
+    """The position of a tool: panel or menu, group of rows in it, and index in that, from 1."""
 
     home: str
     group: int
     place: int
-    text: str = ""  # on the button, where it is not the name of the operator
+    text: str = ""  # of the button, if not the label of the operator
 
 
 @dataclass(frozen=True)
 class Registration:
-    """An operator with its rows, and what the command line runs: listed in its module as one of `TOOLS`."""
+    """An operator with its rows and its verb: an item of `TOOLS` in its module."""
 
     operator: type
-    panel: Row | None = None  # of a panel, by its label
-    menu: Row | None = None  # of the menu "Object", or of "Points" in Edit Mode
-    quick: Row | None = None  # of what one click does, in the menus that a right click opens on objects and on points
-    verb: type | None = None  # a `Tool`; the verb has the name of the operator
+    panel: Row | None = None  # home: the label of a panel
+    menu: Row | None = None  # home: "Object", or "Points" in Edit Mode
+    quick: Row | None = None  # of context menus, with the same homes: run by one click
+    verb: type | None = None  # the `Tool` of its verb on the command line
 
     @property
     def name(self) -> str:
@@ -33,12 +33,12 @@ class Registration:
 
 
 def add(tools):
-    """Let the interface list the tools of a module, when their operators are registered in Blender."""
+    """Add the tools of a module, after their operators are registered in Blender."""
     _registered.extend(tools)
 
 
 def clear():
-    """Forget all tools."""
+    """Remove all tools."""
     _registered.clear()
 
 
@@ -48,13 +48,13 @@ def registered() -> tuple:
 
 
 def groups(kind: str, home: str) -> list:
-    """Return the tools with a row in a panel or a menu, in their order, as lists of those that stand together.
+    """Return the tools with a row in a panel or a menu, in order, as lists by group.
 
     Parameters
     ----------
     kind : {"panel", "menu", "quick"}
     home : str
-        As rows name it.
+        Of the rows.
     """
     rows = [(getattr(tool, kind), tool) for tool in _registered]
     rows = sorted(((row, tool) for row, tool in rows if row and row.home == home), key=lambda pair: pair[0])

@@ -36,18 +36,18 @@ def write_pages(folder):
 
 
 def _body(text, path, known):
-    pieces = re.split(r"^```\w*\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+    parts = re.split(r"^```\w*\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
     found = []
-    for number, piece in enumerate(pieces):
+    for number, part in enumerate(parts):
         if number % 2:
-            found.append(f"<pre>{html.escape(piece)}</pre>")
+            found.append(f"<pre>{html.escape(part)}</pre>")
         else:
-            found += [_block(block, path, known) for block in re.split(r"\n{2,}", piece.strip("\n"))]
+            found += [_block(block, path, known) for block in re.split(r"\n{2,}", part.strip("\n"))]
     return "\n".join(found)
 
 
 def _block(block, path, known):
-    """Return a heading, table, list, piece of code or paragraph."""
+    """Return a heading, table, list, code block or paragraph."""
 
     def written(words):
         return _inline(words, path, known)

@@ -68,10 +68,10 @@ def mesh(path):
 def compare(path):
     """A shape, and a later scan of it with a longer arm and a shorter one, colored by that."""
     before, points = coral(), demo.Coral().sample(demo.POINTS, seed=5)
-    ways, arms = points / np.linalg.norm(points, axis=1)[:, None], spread_directions(9)
+    directions, arms = points / np.linalg.norm(points, axis=1)[:, None], spread_directions(9)
     for toward, growth in (((1.0, -1.0, 0.0), 0.15), ((-1.0, -1.0, 0.0), -0.15)):
         arm = arms[(arms @ toward).argmax()]
-        points *= 1.0 + growth * np.exp(8.0 * (ways @ arm - 1.0))[:, None]
+        points *= 1.0 + growth * np.exp(8.0 * (directions @ arm - 1.0))[:, None]
     after = studio.make_object(points, "Later")
     for obj in (before, after):
         obj.select_set(True)
@@ -89,7 +89,7 @@ def shape_index(path):
 
 
 def curvature_direction(path):
-    """Where the shape bends most: around its arms, and through the valleys between them."""
+    """Directions of the greatest curvature: around the arms, and through the valleys between them."""
     obj = coral()
     bpy.ops.meshfree.principal_curvatures(display="DIRECTION")
     single(obj, "lb_direction_1", path)
@@ -277,7 +277,7 @@ def deform(path):
     rest, obj = coral(), coral()
     studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.5)), "HANDLE", grown=0.35)
     studio.group(obj, studio.world_points(obj)[:, 2] < -0.7, "ANCHOR")
-    studio.deform(obj, move=(0.0, 0.0, 1.0), turn=(-0.5, -0.5, 0.0))
+    studio.deform(obj, move=(0.0, 0.0, 1.0), rotate=(-0.5, -0.5, 0.0))
     studio.deformed_row(rest, obj, path)
 
 

@@ -1,6 +1,6 @@
 """Play with a real Blender window: play.py [SCRIPT]; without a script at a Python prompt, where `gui` is the window.
 
-scripts/window.py tells what `gui` can do. The extension is built and installed anew; --no-build takes the zip that is
+scripts/window.py documents `gui`. The extension is built and installed anew; --no-build takes the zip that is
 in dist/. Pictures go to build/gui/.
 """
 

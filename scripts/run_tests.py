@@ -21,7 +21,7 @@ import pythons
 from environments import ROOT, ensure, ensure_blender, isolated, run
 
 RESULTS = ROOT / "build" / "tests"
-MEASURED = "core-3.13"  # runs whose coverage is told: by a Python that measures it almost for nothing
+MEASURED = "core-3.13"  # environment whose coverage is measured, at almost no cost
 LIMIT = 2700  # seconds for one run of pytest
 _SHOWN = 40  # lines of a run that ended without a word of pytest about what failed
 

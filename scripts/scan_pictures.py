@@ -82,7 +82,7 @@ def splats(path):
     height = studio.world_points(obj)[:, 2]
     studio.group(obj, height > 3.6, "HANDLE")
     studio.group(obj, height < 1.6, "ANCHOR")
-    studio.deform(obj, move=(1.0, 0.0, -0.4), turn=(0.0, 1.0, 0.0))
+    studio.deform(obj, move=(1.0, 0.0, -0.4), rotate=(0.0, 1.0, 0.0))
     bpy.ops.meshfree.deform_apply()
     bpy.ops.meshfree.deform_unbind()
     studio.row([rest, obj], path, legend=None, view=(1.0, 0.3, 0.1), size=(700, 420))

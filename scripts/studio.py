@@ -349,14 +349,14 @@ def harmonic_field(obj, low, high):
     bpy.ops.meshfree.harmonic_field(values="GROUPS", low_group="Low", high_group="High")
 
 
-def deform(obj, move, turn=(0.0, 0.0, 0.0)):
-    """Deform an object by its groups: move the empty of its handles by a way and turn it by angles, in the world."""
+def deform(obj, move, rotate=(0.0, 0.0, 0.0)):
+    """Deform an object by its groups: move the empty of its handles, and rotate it by Euler angles, in world space."""
     activate(obj)
     bpy.ops.meshfree.deform_bind()
     empty = obj.meshfree.deform.handle_items[0].empty
     place = empty.matrix_world.translation.copy()
-    turned = Euler(turn).to_matrix().to_4x4() @ Matrix.Translation(-place) @ empty.matrix_world
-    empty.matrix_world = Matrix.Translation(place + Vector(move)) @ turned
+    rotated = Euler(rotate).to_matrix().to_4x4() @ Matrix.Translation(-place) @ empty.matrix_world
+    empty.matrix_world = Matrix.Translation(place + Vector(move)) @ rotated
     bpy.ops.meshfree.deform_update()
 
 

@@ -114,7 +114,7 @@ def _carry_out(code):
 
 
 def _plain(value):
-    """Turn what JSON does not know into lists and texts."""
+    """Convert what JSON does not support to lists and texts."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):
@@ -127,7 +127,7 @@ def _plain(value):
 def _answer(code):
     try:
         return json.dumps({"value": _carry_out(code)}, default=_plain)
-    except Exception:  # whatever it is, the one who asked is told
+    except Exception:  # reported to the caller
         return json.dumps({"error": traceback.format_exc()})
 
 

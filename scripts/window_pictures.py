@@ -29,11 +29,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from mathutils import Euler
 core = importlib.import_module("bl_ext.user_default.meshfree_laplacian.core")
-turns = importlib.import_module(core.__name__ + ".splats.ellipsoids")
+ellipsoids = importlib.import_module(core.__name__ + ".splats.ellipsoids")
 frames = importlib.import_module(core.__name__ + ".geometry.quadrics").frames
 points = Coral().sample(8000)
 laplacian = core.build_laplacian(points)
-axes = turns.quaternions_of(np.moveaxis(frames(laplacian.normals)[:, :, ::-1], 0, 2))  # two tangents and the normal
+axes = ellipsoids.quaternions_of(np.moveaxis(frames(laplacian.normals)[:, :, ::-1], 0, 2))  # tangents and normal
 size = np.sqrt(laplacian.areas)[:, None] * [0.6, 0.6, 0.05]
 colors = 1.6 * np.sin(points @ np.array([[2.0, 1.0, 0.0], [0.0, 2.0, 1.0], [1.0, 0.0, 2.0]]))
 given = core.Splats(points, size, axes, np.full(len(points), 0.95), colors, np.zeros((len(points), 0, 3)))
@@ -128,7 +128,7 @@ def groups(gui):
 
 
 def deform(gui):
-    """A handle on its way."""
+    """A handle while it is moved."""
     begin(gui, "MESHFREE_PT_deform", count=6000)
     gui.python(FRONT)
     gui.point_at_view()
@@ -149,7 +149,7 @@ def deform(gui):
 
 
 def splats(gui):
-    """Gaussian splats on their way with a handle."""
+    """Gaussian splats while their handle is moved."""
     gui.open_panels("MESHFREE_PT_deform")
     gui.new_file()
     gui.python((ROOT / "scripts" / "coral.py").read_text(encoding="utf-8"))

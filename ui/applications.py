@@ -1,4 +1,4 @@
-"""The panels of what the operator is for."""
+"""The panels of applications of the operator."""
 
 import bpy
 
@@ -6,7 +6,7 @@ from .panel import ReadyPanel, draw_tools
 
 
 class ToolPanel(ReadyPanel):
-    """A panel that holds the tools whose rows name it by its label."""
+    """A panel with the tools whose rows have its label as home."""
 
     bl_options = {"DEFAULT_CLOSED"}
 

@@ -1,4 +1,4 @@
-"""Flat pictures drawn over a view: a list of shapes first, which tests can read, and then Blender's gpu module."""
+"""Overlays of views: lists of shapes, which tests can read, drawn by Blender's gpu module."""
 
 from typing import NamedTuple
 
@@ -7,29 +7,29 @@ import gpu
 from gpu_extras.batch import batch_for_shader
 
 FONT, FONT_SIZE = 0, 11  # Blender's own font, and its size in panels
-PLATE_CORNERS = 6  # the first places of a picture
+PLATE_CORNERS = 6  # the first vertices of a picture
 WHITE, DIM, PLATE = (1.0, 1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 0.45), (0.08, 0.08, 0.08, 0.75)
 
 
 class Text(NamedTuple):
-    """A line of text at a place: its left end, middle or right end there, and its middle in height."""
+    """A line of text, aligned at a position by its left end, center or right end, vertically centered."""
 
     text: str
     x: float
     y: float
     align: str  # "LEFT", "CENTER", "RIGHT"
     color: tuple
-    part: str = ""  # what it is, for a legend in renders
+    part: str = ""  # its part of a legend in renders
 
 
 class Picture:
-    """Shapes on a plate of some width and height, in units of the user interface, from its lower left corner."""
+    """Shapes on a background plate, in units of the user interface from its lower left corner."""
 
     movable = False  # by the mouse
 
     def __init__(self, width, height):
         self.width, self.height = width, height
-        self.places, self.colors, self.texts = [], [], []  # three places and colours make a triangle
+        self.places, self.colors, self.texts = [], [], []  # three vertices and colours make a triangle
         self.rectangle(0.0, 0.0, width, height, PLATE)
 
     def rectangle(self, left, bottom, right, top, color, top_color=None):
@@ -59,7 +59,7 @@ class Picture:
 
 
 def draw(picture, x, y, scale):
-    """Draw a picture with its lower left corner at a place of the view, in pixels, so many to a unit."""
+    """Draw a picture with its lower left corner at a position of the view in pixels, scaled to pixels per unit."""
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     places = [(x + scale * px, y + scale * py, 0.0) for px, py in picture.places]
     batch = batch_for_shader(shader, "TRIS", {"pos": places, "color": picture.colors})

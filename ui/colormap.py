@@ -45,18 +45,18 @@ class MESHFREE_OT_colormap(ReadyOperator, bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        return quantity(properties.attribute).tooltip  # of what is no result none, which leaves that of the class
+        return quantity(properties.attribute).tooltip  # empty without a result: the tooltip of the class
 
     @reporting
     def execute(self, context):
         obj = context.object
         with all_or_nothing([obj]):
             show_attribute(obj, self.attribute, self.radius)
-            for name in COLOR_CHOICES:  # the settings of the object keep what they are unless given
+            for name in COLOR_CHOICES:  # options that are not given keep the object's settings
                 if not self.properties.is_property_set(name):
                     setattr(self, name, getattr(obj.meshfree, name))
                 elif getattr(self, name) != getattr(obj.meshfree, name):
-                    setattr(obj.meshfree, name, getattr(self, name))  # which colors the points again
+                    setattr(obj.meshfree, name, getattr(self, name))  # whose update colors the points again
             if self.switch_shading and is_colored(obj):
                 show_in_solid(obj)
             elif self.switch_shading:

@@ -12,14 +12,14 @@ _COOL_WARM = (
     "3b4cc0 4e68d8 6282ea 779af7 8db0fe a3c2fe b9d0f9 ccd9ed dddcdc ecd3c5 f5c4ac f7b093 f4987a eb7d62 dd5f4b ca3b37"
     " b40426"
 )
-# A circle in OKLab, so that all steps look alike and the ends meet: centre (0.6, 0.03, -0.04), radius 0.16, tilted by
-# 40 degrees, so that lightness tells its halves apart where hues do not.
+# A circle in OKLab, for uniform steps and equal ends: centre (0.6, 0.03, -0.04), radius 0.16, tilted by 40 degrees, so
+# that lightness distinguishes its halves where hues do not.
 _CYCLIC = (
     "40b2bb 2aaed4 25a6e8 349af5 488cfc 5b7bfc 6a6af5 775ae7 814cd5 8941bf 9039a7 96348e 9d3376 a3355f a83c49 ac4634"
     " ae541e ae6307 aa7409 a28526 969443 86a162 71ab81 5ab09f 40b2bb"
 )
 _MAPS = {"VIRIDIS": _VIRIDIS, "MAGMA": _MAGMA, "COOL_WARM": _COOL_WARM, "CYCLIC": _CYCLIC}
-# For -1 as "none", then 0 to 6, which any colour vision tells apart: M. Okabe, K. Ito, Color Universal Design, 2008.
+# For -1 as "none", then 0 to 6, distinct in any colour vision: M. Okabe, K. Ito, Color Universal Design, 2008.
 _NONE, *_CLASSES = ("555555", "0072b2", "e69f00", "009e73", "d55e00", "56b4e9", "cc79a7", "f0e442")
 _TRUTH = ("bdbdbd", "d55e00")
 # The same for groups of points, by the names of `operators.groups`.
@@ -36,7 +36,7 @@ _GROUPS = {
 
 
 def colors(name: str, reverse: bool = False) -> list:
-    """Colours of a map as linear (r, g, b, 1), low to high: what shaders and colour ramps take.
+    """Return the colours of a map as linear (r, g, b, 1), low to high, as for shaders and colour ramps.
 
     Those of "TRUTH" are for 0 and 1, those of "CATEGORICAL" for -1, and for 0 to 6 and so on.
     """
@@ -51,17 +51,17 @@ def colors(name: str, reverse: bool = False) -> list:
 
 
 def group_color(role: str):
-    """Colour of the points of a group by what they are for, as linear (r, g, b, 1)."""
+    """Return the colour of the groups of a role, as linear (r, g, b, 1)."""
     return _color(_GROUPS[role])
 
 
 def to_display(color):
-    """Turn a linear (r, g, b, a) into what screens take, sRGB."""
+    """Convert linear (r, g, b, a) to sRGB."""
     return (*(12.92 * v if v <= 0.0031308 else 1.055 * v ** (1.0 / 2.4) - 0.055 for v in color[:3]), color[3])
 
 
 def to_linear(color):
-    """Turn what screens take into a linear (r, g, b, 1)."""
+    """Convert sRGB to linear (r, g, b, 1)."""
     return (*(v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in color[:3]), 1.0)
 
 

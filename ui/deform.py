@@ -70,7 +70,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
                     grid.operator(tool.operator.bl_idname)
 
 
-_STATES = {  # what the panel says of them, with a detail, and its icon
+_STATES = {  # text, with a detail, and icon in the panel
     State.BAKED: ("Baked. {}", "INFO"),
     State.STALE: ("Not up to date. {}", "ERROR"),
     State.PREPARING: ("Not up to date. Binding: {}", "SORTTIME"),
@@ -80,7 +80,7 @@ _STATES = {  # what the panel says of them, with a detail, and its icon
 
 
 def _draw_state(layout, context, obj):
-    """Draw whether the points follow the handles, and what to do if not."""
+    """Draw the state of the deformation, with what to do if it is stale."""
     state, detail = live.state(obj)
     text, icon = _STATES[state]
     if state is State.STALE and copied_from(obj) is not None:

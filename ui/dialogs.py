@@ -1,4 +1,4 @@
-"""The layouts of dialogs and of Adjust Last Operation, from what operators say that they ask for."""
+"""The layouts of dialogs and of Adjust Last Operation, by the settings that operators list."""
 
 import bpy
 
@@ -12,11 +12,11 @@ from ..operators.tools.select import MESHFREE_OT_select_grow, selection
 from ..operators.tools.sequence import MESHFREE_OT_analyze_sequence
 from .wrapping import draw_text
 
-_OPTIONAL = LOW, HIGH, VALUE  # one or two of them do
+_OPTIONAL = LOW, HIGH, VALUE  # not all of them are needed
 
 
 def draw_setting(layout, settings, name: str, obj):
-    """Draw a setting; one that names a group or an attribute of an object with a list of those."""
+    """Draw a setting; that of a group or an attribute with a list of those of an object."""
     if name.endswith("group"):
         search_group(layout, settings, name, obj)
     elif name in {"viewpoint", "curve"}:
@@ -32,9 +32,9 @@ def draw_setting(layout, settings, name: str, obj):
 
 
 def search_group(layout, settings, name: str, obj):
-    """Draw a setting that names a group of an object, in red where that is missing, unless it is one to be assigned.
+    """Draw a setting that names a group of an object, in red if that is missing, unless it has the default name.
 
-    Where one is missing, it says what counts instead.
+    Then a text says what is used instead.
     """
     group = getattr(settings, name)
     owner, groups = (obj, "vertex_groups") if obj.type == "MESH" else (obj.data, "attributes")
@@ -45,7 +45,7 @@ def search_group(layout, settings, name: str, obj):
 
 
 def _instead(obj, group):
-    """Say what counts where a group is missing that is to be assigned."""
+    """Return what is used instead of a missing default group."""
     if group != SOURCE:
         return "Uses the detected boundaries" if group == FIXED else "No points assigned yet"
     count = int(selection(obj).sum())
@@ -63,7 +63,7 @@ def _draw_tool(operator, context):
 
 
 def _draw_apply(operator, context):
-    if keyed_empties(operator.subject(context)):  # which it asks about; afterwards they are gone
+    if keyed_empties(operator.subject(context)):  # not in Adjust Last Operation, when they are removed
         column = operator.layout.column(align=True)
         column.label(text=f"The shape of frame {context.scene.frame_current} will be at rest.", icon="INFO")
         column.label(text="Keyframes of its handles would deform it", icon="BLANK1")
@@ -77,7 +77,7 @@ def _draw(operator, context, names):
         draw_setting(operator.layout, operator, name, context.object)
 
 
-# Here, and not when they are registered: it is then that Blender looks whether a class has a layout of its own.
+# At import: Blender checks at registration whether a class has a layout of its own.
 ApplicationOperator.draw = _draw_tool
 _ASKING = (
     MESHFREE_OT_export_points,

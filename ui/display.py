@@ -1,4 +1,4 @@
-"""What an object shows: its display modifier, with the size of the points, and its material."""
+"""The state of an object's display: its modifier, with the size of the points, and its material."""
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def is_in_solid(obj) -> bool:
 
 
 def draws_faces(obj) -> bool:
-    """Whether viewports draw faces of an object, those of a mesh or discs, and no dots."""
+    """Whether viewports draw faces of an object, of a mesh or of discs, rather than dots."""
     modifier = find_display(obj)
     known = modifier is not None and has_input(modifier.node_group, DISCS)
     discs = known and get_input(modifier, DISCS) and draws_discs(obj)
@@ -45,7 +45,7 @@ def draws_faces(obj) -> bool:
 
 
 def draws_discs(obj) -> bool:
-    """Whether the viewport would draw all points of an object as discs: they are not more than a limit lets it."""
+    """Whether the points of an object are few enough for the viewport to draw all as discs."""
     modifier = find_display(obj)
     most = get_input(modifier, MOST) if has_input(modifier.node_group, MOST) else 0
     return not most or DISC_COST * point_count(obj.data) <= most
@@ -59,7 +59,7 @@ def shown_attribute(obj) -> str:
 
 def range_node(obj):
     """Return the node with the bounds of the colours; None if vectors are shown as directions, or nothing is."""
-    return _find_node(obj, RANGE) if _find_node(obj, COLORS) else None  # somebody may have deleted either
+    return _find_node(obj, RANGE) if _find_node(obj, COLORS) else None  # either may have been deleted
 
 
 def color_node(obj):
@@ -122,14 +122,14 @@ def shown_values(obj):
 
 
 def component(name: str, settings) -> str:
-    """What is shown of an attribute if it holds vectors: "DIRECTION", "LENGTH", "X", "Y" or "Z"."""
+    """Return what is shown of an attribute of vectors: "DIRECTION", "LENGTH", "X", "Y" or "Z"."""
     if settings.component != "AUTO":
         return settings.component
     return "LENGTH" if quantity(name).power else "DIRECTION"
 
 
 def numbers(values, part: str):
-    """Return what of an attribute's values are the numbers to show; None for directions and texture coordinates."""
+    """Return the numbers to show of an attribute's values; None for directions and texture coordinates."""
     if values.ndim == 1:
         return values
     if is_texture(values):
@@ -150,14 +150,14 @@ def is_texture(values) -> bool:
 
 
 def without_unreached(name: str, values):
-    """Leave out the numbers that say that no source reaches a point, which do not count for the range."""
+    """Leave out the negative numbers of unreached points, which do not count for the range."""
     return values[values >= 0.0] if quantity(name).color_range == "positive" else values
 
 
 def sloping(name: str, values, part: str) -> list:
-    """Return the numbers to show that change from point to point, (n,) each: two for texture coordinates.
+    """Return the displayed numbers that can be interpolated, (n,) each: two for texture coordinates.
 
-    Labels do not, nor truth values, and directions have colours of their own. Those that no source reaches are NaN.
+    Labels, truth values and directions cannot. Unreached points have NaN.
     """
     shown = numbers(values, part)
     if values.dtype.kind != "f" or (shown is None and not is_texture(values)):
@@ -173,7 +173,7 @@ def _find_node(obj, name):
 
 
 def label(name: str) -> str:
-    """Title of an attribute for people: "Mode 3" for lb_eigenvector_003."""
+    """Return the title of an attribute, such as "Mode 3" for lb_eigenvector_003."""
     row = quantity(name)
     if not row.label:
         return " ".join(word.lstrip("0").title() for word in name.removeprefix("lb_").split("_"))

@@ -1,4 +1,4 @@
-"""The legend over the 3D view follows the mouse that drags it; where it lies is a setting of the object."""
+"""Dragging the legend over the 3D view, whose position is a setting of the object."""
 
 import bpy
 
@@ -49,7 +49,7 @@ class MESHFREE_GT_legend(bpy.types.Gizmo):
 
 
 class MESHFREE_GGT_legend(bpy.types.GizmoGroup):
-    """What lets the mouse drag the legend"""
+    """Dragging the legend"""
 
     bl_idname = "MESHFREE_GGT_legend"
     bl_label = "Legend"

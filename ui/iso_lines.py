@@ -1,4 +1,4 @@
-"""Makes a curve object of the iso lines that are shown."""
+"""Makes a curve object of the displayed iso lines."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ from ..operators.tools.mesh import surface_mesh
 from .display import component, label, shown_attribute, shown_range, sloping, step_colors
 
 _COUNT = 10  # of lines, where none are shown
-_UNKNOWN = 1e-6  # share of points without a value, from which on a place has none
+_UNKNOWN = 1e-6  # fraction of points without a value above which a vertex has none
 
 
 class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
@@ -43,7 +43,7 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
     )
 
     def becomes_single(self, obj):
-        return False  # its mesh stays as it is
+        return False  # its mesh is not changed
 
     def plan(self, context, obj):
         count = self.count or obj.meshfree.iso_lines or _COUNT
@@ -78,7 +78,7 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
 
 
 def _shown(obj):
-    """Read what an object shows: its attribute's name, the numbers, NaN for unknown ones, and their range."""
+    """Read the displayed attribute of an object: name, numbers, NaN for unknown ones, and range."""
     name, bounds = shown_attribute(obj), shown_range(obj)
     if bounds is None or step_colors(obj):
         raise core.PointCloudError(
@@ -103,7 +103,7 @@ def _on_faces(obj, values):
 
 
 def _on_points(context, obj, values):
-    """Return a function that gives vertices, faces and values on them, of a mesh that is made of the points."""
+    """Return a function that gives vertices, faces and values of a mesh reconstructed from the points."""
     reading, operator = operator_reader(context, obj)
 
     def compute(progress):
@@ -118,7 +118,7 @@ def _on_points(context, obj, values):
 
 
 def _curve(name, lines, thickness):
-    """Return a curve of straight pieces."""
+    """Return a curve of polygons."""
     curve = bpy.data.curves.new(name, "CURVE")
     curve.dimensions = "3D"
     curve.bevel_depth = thickness

@@ -1,4 +1,4 @@
-"""Keys, as the user's preferences list them: what Blender does with a key comes before, where it does something."""
+"""Keymap items, which the user's preferences list; Blender's own items come first."""
 
 import bpy
 
@@ -6,11 +6,11 @@ _added = []  # keymaps of Blender, and our items in them
 
 
 def attach():
-    """Add the keys, unless there is no window that could hear them."""
+    """Add the keymap items, unless there is no window."""
     config = bpy.context.window_manager.keyconfigs.addon
     if config is None:
         return
-    # No handler of a tool would do: it would hear Esc before what began earlier, such as the drag of a handle.
+    # Not in a modal handler: it would catch Esc before operators that started earlier, such as the drag of a handle.
     _add(config.keymaps.new("Window"), "meshfree.stop", "ESC", "PRESS")
     for mode in ("Mesh", "Point Cloud"):  # the Edit Mode of each
         keymap = config.keymaps.new(mode)
@@ -25,7 +25,7 @@ def _add(keymap, *how, **modifiers):
 
 
 def detach():
-    """Take the keys away again."""
+    """Remove the keymap items."""
     while _added:
         keymap, item = _added.pop()
         keymap.keymap_items.remove(item)

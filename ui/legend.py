@@ -15,19 +15,19 @@ from .materials import new_tree
 from .plots import HEIGHT, legend_picture
 from .scale import shown_scale
 
-NAME = "Mesh-Free Legend"  # of what is made; found by the marks below, whatever it is called since
+NAME = "Mesh-Free Legend"  # of new data; found by the properties below, whatever its name
 _OF = "meshfree_legend_of"  # custom property of the collection: the object whose colours it explains
-_TITLE = "meshfree_legend_title"  # another one: the name of the attribute, which is the title unless somebody wrote one
-_PART = "meshfree_legend_part"  # custom property of an object in it: what part of the legend it is
+_TITLE = "meshfree_legend_title"  # custom property of the collection: the default title, the name of the attribute
+_PART = "meshfree_legend_part"  # custom property of an object in it: its part of the legend
 _FONT = "meshfree_legend_font"  # custom property of the font of its texts
-_BUILT_IN = "<builtin>"  # place of the font that new texts have, whose 1 is an I
+_BUILT_IN = "<builtin>"  # file path of the default font, whose 1 looks like I
 _COLOR = "legend_color"  # attribute of the parts
 _HEIGHT, _GAP = 0.7, 0.03  # of the plate, and to the right edge, as shares of the picture's shorter side
-_WIDTH, _EDGE, _FONT_SIZE = 100.0, 6.0, 13.8  # of the plate, beside its texts, and of these, in its own units
+_WIDTH, _EDGE, _FONT_SIZE = 100.0, 6.0, 13.8  # of the plate, its margin, and the texts, in its own units
 
 
 def make_legend(scene, obj, camera, title: str = ""):
-    """Put a legend of what an object shows at the right edge of the picture, in place of the scene's earlier one.
+    """Add a legend of an object's display at the right edge of the picture, in place of the scene's earlier one.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def make_legend(scene, obj, camera, title: str = ""):
     """
     collection = next(_legends(scene), None)
     if collection is not None and _is_shared(collection, scene):
-        scene.collection.children.unlink(collection)  # the other scene keeps it
+        scene.collection.children.unlink(collection)  # kept by the other scene
         collection = None
     if collection is None:
         collection = bpy.data.collections.new(NAME)
@@ -58,12 +58,12 @@ def make_legend(scene, obj, camera, title: str = ""):
 
 
 def find_legend(scene, obj):
-    """Return the collection with the legend of an object in a scene, or None; one whose objects are gone is none."""
+    """Return the collection with the legend of an object in a scene, or None without objects in it."""
     return next((item for item in _legends(scene) if item[_OF] == obj and item.objects), None)
 
 
 def renew(obj):
-    """Let the legends of an object, where there are any, say what the object shows now."""
+    """Update the legends of an object."""
     for scene in bpy.data.scenes:
         legend = find_legend(scene, obj)
         if legend is None:
@@ -75,20 +75,20 @@ def renew(obj):
 
 
 def written_title(legend) -> str:
-    """Return the title that somebody wrote, here or into the text object; empty if it is the attribute's name."""
+    """Return a custom title, from the operator or the text object; empty if it is the attribute's name."""
     title = next((part.data.body for part in legend.objects if part.get(_PART) == "title" and part.type == "FONT"), "")
     return title if title != legend.get(_TITLE) else ""
 
 
 def remove_legend(scene, legend):
-    """Remove a legend from a scene, with all that belongs to it if no other scene has it."""
+    """Remove a legend from a scene, with its data unless another scene has it."""
     if _is_shared(legend, scene):
         scene.collection.children.unlink(legend)
         return
     _remove(list(legend.objects))
     bpy.data.collections.remove(legend)
     fonts = [font for font in bpy.data.fonts if _FONT in font]
-    used = bpy.data.user_map(subset=fonts)  # loaded ones count one user too many
+    used = bpy.data.user_map(subset=fonts)  # users of loaded fonts are one too many
     bpy.data.batch_remove([font for font in fonts if not used[font]])
 
 
@@ -125,14 +125,14 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
 
 
 def _legends(scene):
-    """All legends in a scene that can be changed: one, unless somebody has copied it."""
+    """Return the editable legends in a scene: one, unless it was copied."""
     return (item for item in scene.collection.children_recursive if _OF in item and item.is_editable)
 
 
 def _is_shared(legend, scene):
-    """Whether another scene, such as a linked copy, has the same legend, and this one can do without it alone.
+    """Whether another scene, such as a linked copy, has the same legend, and this one can unlink it.
 
-    In a collection that both scenes show it belongs to both.
+    It cannot if the legend is in a collection that both scenes share.
     """
     if legend.name not in scene.collection.children:
         return False
@@ -140,9 +140,9 @@ def _is_shared(legend, scene):
 
 
 def _fill(collection, scene, obj, camera, title):
-    """Write a legend anew, as it is drawn over the view, on the objects that it has.
+    """Update a legend, laid out as over the view, on its objects.
 
-    Those that are missing are made, and those left over removed.
+    Missing objects are added, and superfluous ones removed.
     """
     scale = shown_scale(obj, scene)
     collection[_TITLE] = scale.title
@@ -175,9 +175,9 @@ def _fill(collection, scene, obj, camera, title):
 
 
 def _frame(scene, camera, picture):
-    """Find room at the right edge of what a camera sees; return a picture's unit there, and how its places get there.
+    """Lay a picture out at the right edge of a camera's view; return its unit, and a function that places its points.
 
-    These are close in front of the camera, where the depth is 1.
+    They lie close in front of the camera, where the depth is 1.
     """
     near = 1.5 * camera.data.clip_start
     corners = camera.data.view_frame(scene=scene)
@@ -197,7 +197,7 @@ def _frame(scene, camera, picture):
 def _part(collection, known, camera, name):
     """Return the object that is a part of a legend, as a child of the camera."""
     part = known.get(name) or _new_part(collection, name)
-    if part.data.users > 1:  # of a copy of the legend
+    if part.data.users > 1:  # shared with a copy of the legend
         part.data = part.data.copy()
     if part.parent != camera:
         part.parent = camera
@@ -220,7 +220,7 @@ def _new_part(collection, part):
 
 
 def _font():
-    """Return the font of Blender's interface, kept in the file for other machines; None where Blender has it not."""
+    """Return the font of Blender's interface, packed for other machines; None if Blender does not have it."""
     known = next((font for font in bpy.data.fonts if _FONT in font), None)
     path = Path(bpy.utils.system_resource("DATAFILES", path="fonts")) / "Inter.woff2"
     if known is not None or not path.is_file():
@@ -232,12 +232,12 @@ def _font():
 
 
 def _remove(parts):
-    """Remove objects and what they are made of, unless others are made of it too."""
+    """Remove objects with their data, unless others use these."""
     bpy.data.batch_remove([*parts, *{part.data for part in parts if part.data is not None and part.data.users == 1}])
 
 
 def _material(name, attribute):
-    """Return a material that shines in the colours of an attribute, or in white."""
+    """Return a material that emits the colours of an attribute, or white."""
     material = bpy.data.materials.get(name)
     if material is not None:
         return material

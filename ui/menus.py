@@ -53,7 +53,7 @@ def _draw_points(menu, context):
 
 
 def _draw_object_quick(menu, context):
-    """Draw what is done most with a cloud, and the menu of all tools; of other meshes the menu alone."""
+    """Draw the frequent tools of clouds, and the menu of all tools; for other meshes the menu only."""
     obj, layout = context.object, menu.layout
     if obj is None or obj.type not in TYPES:
         return
@@ -109,7 +109,7 @@ _EDITING = {
 
 
 def entries():
-    """Menus and what is added to them; point clouds have an Edit Mode from Blender 4.5 on."""
+    """Yield menus with their additional draw functions; point clouds have an Edit Mode from Blender 4.5 on."""
     yield bpy.types.VIEW3D_MT_object, _draw_object
     yield bpy.types.VIEW3D_MT_object_context_menu, _draw_object_quick
     for menu, draw in _EDITING.items():
@@ -126,7 +126,7 @@ def attach():
 
 
 def detach():
-    """Take the entries away again."""
+    """Remove the entries from Blender's menus."""
     for menu, draw in entries():
         menu.remove(draw)
 

@@ -1,4 +1,4 @@
-"""What stands in the sidebar in place of all panels where there is no scipy that serves."""
+"""The panel in place of all others where no usable scipy is installed."""
 
 import importlib.util
 import sys
@@ -9,11 +9,11 @@ import bpy
 from .. import core
 from .wrapping import draw_text
 
-_OURS = "scipy-1.15.*.dist-info"  # what a wheel of the manifest leaves beside the package
+_OURS = "scipy-1.15.*.dist-info"  # of the wheel in the manifest
 
 
 def scipy_serves():
-    """Whether there is a scipy that serves; it is imported, which takes a second, only where it is not ours."""
+    """Whether a usable scipy is installed; only one that is not ours is imported, which takes a second."""
     found = importlib.util.find_spec("scipy")
     if found is None:
         return False  # no wheel is for this Python
@@ -26,7 +26,7 @@ def scipy_serves():
 
 
 def _lines():
-    """Say what is wrong, and what to do."""
+    """Return what is wrong, and what to do."""
     try:
         import scipy
     except ImportError:
@@ -60,5 +60,5 @@ CLASSES = (MESHFREE_PT_missing,)
 
 
 def attach():
-    """Say it in the console too."""
+    """Print it in the console too."""
     print(*_lines())

@@ -1,4 +1,4 @@
-"""Draws the legend, the histogram and the eigenvalues of the active object, or of its handle's, over the 3D view."""
+"""Draws legend, histogram and eigenvalues over the 3D view, of the active object or that of the active handle."""
 
 import zlib
 from typing import NamedTuple
@@ -18,26 +18,26 @@ from .value_range import histogram
 
 _GAP = 10.0  # between pictures, and to the border
 _GIZMOS = 80.0  # width of the view's own controls, at the right edge above the lowest row
-_CORNER = (1.0, 0.0)  # where a legend lies that nobody has moved, beside the other pictures
+_CORNER = (1.0, 0.0)  # default position of a legend, arranged with the other pictures
 _handlers = []
-_counted = {}  # the last histogram, by what it is of
+_counted = {}  # the last histogram, by key
 
 
 def attach():
-    """Begin to draw over 3D views; there are none in background mode."""
+    """Add the draw handler; there are no views in background mode."""
     if not bpy.app.background:
         _handlers.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
 
 
 def detach():
-    """Stop drawing, and forget what was counted."""
+    """Remove the draw handler, and clear the histogram."""
     while _handlers:
         bpy.types.SpaceView3D.draw_handler_remove(_handlers.pop(), "WINDOW")
     _counted.clear()
 
 
 def pictures(obj, scene, colored=True) -> list:
-    """Return what is to be drawn for an object whose colors are seen or not, the rightmost first."""
+    """Return the pictures of an object, the rightmost first; the legend only if its colors are visible."""
     settings = obj.meshfree
     scale = shown_scale(obj, scene) if colored else None
     found = [plots.legend_picture(scale)] if scale is not None and settings.legend else []
@@ -54,10 +54,10 @@ def pictures(obj, scene, colored=True) -> list:
 
 
 def _histogram(obj, scale):
-    """Count the values on show, once for as long as they and the range stay; None if they cannot be read any more."""
+    """Return the histogram of the displayed values, kept while they and the range are unchanged; None if unreadable."""
     try:
         values = np.ascontiguousarray(without_unreached(shown_attribute(obj), shown_values(obj)))
-    except PointCloudError:  # the attribute is gone: what is drawn over the view is no place to say so
+    except PointCloudError:  # the attribute was removed
         return None
     key = zlib.crc32(values.view(np.uint8)), len(values), scale.bounds, bool(scale.boxes)
     if key not in _counted:
@@ -74,14 +74,14 @@ def arrange(sizes, left, bottom, right, top, indent=0.0) -> list:
     sizes : list of (float, float)
         Widths and heights.
     left, bottom, right, top : float
-        The room there is.
+        The available room.
     indent : float
-        What upper rows leave free at the right.
+        Free width at the right of upper rows.
 
     Returns
     -------
     list of (float, float), or None in their place
-        Lower left corners; None for what has no room.
+        Lower left corners; None without room.
     """
     places, x, y, row = [], right, bottom, 0.0
     for width, height in sizes:
@@ -96,7 +96,7 @@ def arrange(sizes, left, bottom, right, top, indent=0.0) -> list:
 
 
 def _free_room(area, region):
-    """Return left, bottom, right, top of what is seen of a region between those that lie over it, in its pixels."""
+    """Return left, bottom, right, top of a region's part that others do not cover, in its pixels."""
     left, bottom, right, top = 0, 0, region.width, region.height
     for other in area.regions:
         x, y = other.x - region.x, other.y - region.y
@@ -125,14 +125,14 @@ def shows_colors(obj, shading) -> bool:
 
 
 def drawn_object(context):
-    """Return the object that pictures are drawn of over the view of a context, or None."""
+    """Return the object whose pictures are drawn over the view of a context, or None."""
     obj = handled_object(context.object, context.scene)
     seen = obj is not None and context.space_data.overlay.show_overlays and obj.visible_get()
     return obj if seen else None
 
 
 class Placed(NamedTuple):
-    """A legend over a view, in pixels of its region: the room that it may be in, and its size, both with a gap."""
+    """A legend over a view, in pixels of its region: the available room, and its size, both with a gap."""
 
     room: tuple  # left, bottom, right, top
     size: tuple

@@ -29,11 +29,11 @@ from .scale import shown_scale
 from .wrapping import beside_or_below, draw_text, split_properties
 
 _LISTED = 20  # eigenvalues in the panel
-_NOTICES = 6  # there at a time
-_CROSS = 44.0  # width of the cross beside a notice, and of the box around it
+_NOTICES = 6  # shown at a time
+_CROSS = 44.0  # width of the dismiss button of a notice, and of the box around it
 _TRUE_COLORS = ("Standard", "Raw")  # view transforms that leave colors as they are, more or less
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
-_SETTINGS = {  # of each method, what belongs together
+_SETTINGS = {  # of each method, in groups
     "DEFAULT": (
         ("boundary", "boundary_group", "sheets", "projection"),
         ("bandwidth", "neighbors", "bandwidth_factor"),
@@ -62,7 +62,7 @@ class ReadyPanel(SidebarPanel):
 
 
 class PropertiesPanel:
-    """A panel in the tab of the object in the Properties editor, with what one in the sidebar has."""
+    """A panel in the Object tab of the Properties editor, with the contents of one in the sidebar."""
 
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -116,7 +116,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
 
 
 def draw_tools(layout, home):
-    """Draw the tools with a row in a panel, each group close together; dots say that a tool asks before it works."""
+    """Draw the tools of a panel by group; dots in a name mean that the tool opens a dialog."""
     for group in registration.groups("panel", home):
         column = layout.column(align=True)
         for tool in group:
@@ -126,7 +126,7 @@ def draw_tools(layout, home):
 
 
 def draw_tasks(layout):
-    """Draw what one click does with an object, each tool with its defaults."""
+    """Draw the quick tools, which run with defaults."""
     for group in registration.groups("quick", "Object"):
         for tool in group:
             layout.operator(tool.operator.bl_idname, text=tool.quick.text).at_once = True
@@ -208,7 +208,7 @@ def _draw_summary(layout, context, obj):
 
 
 def _draw_splats(layout, context, obj):
-    """Draw what is there for Gaussian splats alone."""
+    """Draw the tools for Gaussian splats."""
     if are_left_behind(obj.data, glance=True):
         draw_text(layout, context, LEFT_BEHIND[0].upper() + LEFT_BEHIND[1:], "ERROR")
     draw_tools(layout, "Splats")
@@ -216,7 +216,7 @@ def _draw_splats(layout, context, obj):
 
 
 class Settings:
-    """What the panels with the settings have in common."""
+    """The base of panels with the settings."""
 
     @classmethod
     def poll(cls, context):
@@ -253,9 +253,9 @@ class MESHFREE_PT_settings_properties(Settings, PropertiesPanel, bpy.types.Panel
 
 
 def _counts(settings, name):
-    """Whether a setting makes a difference as the others are."""
+    """Whether a setting has an effect with the present others."""
     if name == "boundary":
-        return not settings.boundary_group  # a named one is not looked for
+        return not settings.boundary_group  # a named one is not detected
     return name != "most_points" or settings.point_budget == "NUMBER"
 
 
@@ -295,7 +295,7 @@ class MESHFREE_PT_spectrum(ReadyPanel, bpy.types.Panel):
 
 
 class Display:
-    """What the panels about colors have in common."""
+    """The base of panels about colors."""
 
     @classmethod
     def poll(cls, context):
@@ -364,7 +364,7 @@ def _draw_legend(layout, context, obj):
 
 
 def _draw_own_looks(column, obj, shown):
-    """Draw buttons to what an object looks like without results: the colors of its points, and its material."""
+    """Draw the buttons for the colors of the points, and for the material of the object."""
     colors, material = own_colors(obj.data), own_material(obj)
     if colors:
         column.operator("meshfree.colormap", text="Color", depress=colors == shown).attribute = colors
@@ -398,7 +398,7 @@ def _draw_colors(layout, context, obj):
 
 
 def _draw_mode_steps(layout, attributes, shown):
-    """Draw buttons to the mode before and after the one on show; with none on show, to the first two."""
+    """Draw buttons for the modes before and after the displayed one, or for the first two."""
     mode = mode_number(shown) or 1
     row = layout.row(align=True)
     for step, text, icon in ((-1, "", "TRIA_LEFT"), (0, f"Mode {mode}", "NONE"), (1, "", "TRIA_RIGHT")):

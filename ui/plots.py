@@ -28,7 +28,7 @@ def legend_picture(scale, width: float = 150.0) -> Picture:
                 picture.rectangle(left, y + 0.1 * _BOX, right, y + 0.9 * _BOX, to_display(color))
             picture.text(name, right + 8.0, y + 0.5 * _BOX, part=f"box {index}")
         return picture
-    bottom, top = bottom + 0.4 * _LINE, top - 0.4 * _LINE  # half a number stands out at each end
+    bottom, top = bottom + 0.4 * _LINE, top - 0.4 * _LINE  # half the height of a number
     colors = [to_display(color) for color in scale.colors]
     rows = np.linspace(bottom, top, len(colors))
     for index in range(len(colors) - 1):
@@ -87,7 +87,7 @@ def histogram_picture(scale, edges, counts, beyond) -> Picture:
 
 
 def spectrum_picture(eigenvalues, shown_mode: int, unit: str, factor: float, area: float) -> Picture:
-    """Draw eigenvalues over their numbers, and for comparison those of a flat piece of the same area.
+    """Draw eigenvalues over their numbers, and for comparison those of Weyl's law.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def spectrum_picture(eigenvalues, shown_mode: int, unit: str, factor: float, are
     unit : str
         Of the numbers; empty for none.
     factor : float
-        What eigenvalues are to be multiplied by to be numbers of that unit.
+        Conversion of eigenvalues to that unit.
     area : float
         Total area of the surface, for Weyl's law: about 4 pi k / area; 0 leaves it out.
     """
@@ -152,7 +152,7 @@ def _title_height(unit):
 
 
 def _color_at(scale, index, share):
-    """Return the colour of a bin: of the whole number, or of its share of the way from low to high."""
+    """Return the colour of a bin: of the whole number, or of its relative position in the range."""
     if scale.boxes:
         colors = [color for color in scale.boxes.values() if color[3]]
         return to_display(colors[index]) if index < len(colors) else _BEYOND

@@ -1,4 +1,4 @@
-"""The panel about points: selecting them, and the groups that the tools take."""
+"""The panel for selecting points, and for the groups that the tools use."""
 
 import bpy.utils.previews
 
@@ -59,7 +59,7 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
 
 
 def _draw_group(row, obj, role, title):
-    """Draw what assigns the selected points to a group, tells and selects how many it holds, and removes them."""
+    """Draw the buttons that assign points to a group, show and select its points, and remove them."""
     icon = {"icon_value": _swatches[0][role].icon_id} if obj.meshfree.show_groups else {}
     assign = row.operator("meshfree.group_from_selection", text=f"Assign to {title}", **icon)
     assign.role, assign.action = role.upper(), "ADD"
@@ -73,7 +73,7 @@ def _draw_group(row, obj, role, title):
 
 
 def attach():
-    """Make the swatches of groups."""
+    """Make the color icons of groups."""
     pictures = bpy.utils.previews.new()
     for role in ROLES:
         picture = pictures.new(role)
@@ -90,7 +90,7 @@ def attach():
 
 
 def detach():
-    """Give the swatches back."""
+    """Free the color icons."""
     while _swatches:
         bpy.utils.previews.remove(_swatches.pop())
 

@@ -1,4 +1,4 @@
-"""What stands below the extension in Blender's preferences: the way to its manual."""
+"""The extension's preferences: a link to its manual."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a legend says: the title, the unit, the colours on show and the numbers beside them."""
+"""The contents of a legend: title, unit, colours, and the numbers beside them."""
 
 from typing import NamedTuple
 
@@ -29,7 +29,7 @@ _MOST_BOXES = 12
 
 
 class Scale(NamedTuple):
-    """The colours of an attribute and what they stand for.
+    """The colours of an attribute and their values.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Scale(NamedTuple):
     unit : str
         Empty for plain numbers.
     factor : float
-        What values are to be multiplied by to be numbers of that unit.
+        Conversion of values to that unit.
     bounds : tuple of float, or None
         Range of the values; None where directions are shown.
     colors : list
@@ -45,7 +45,7 @@ class Scale(NamedTuple):
     boxes : dict
         Colours by the names of whole numbers, truth values or directions.
     ticks : list of (float, str)
-        Round numbers: their share of the way from low to high, and as text.
+        Round numbers: relative position in the range, and text.
     """
 
     title: str
@@ -85,7 +85,7 @@ def shown_scale(obj, scene) -> Scale | None:
 
 
 def _shortened(boxes):
-    """Leave the first boxes, and say how many more there are."""
+    """Keep the first boxes, and add one with the number of the others."""
     if len(boxes) <= _MOST_BOXES:
         return boxes
     kept = dict(list(boxes.items())[: _MOST_BOXES - 1])

@@ -1,4 +1,4 @@
-"""Puts on show: the display modifier, the size of the points, and the colours by the settings of the object."""
+"""Updates the display: modifier, size of the points, and colours by the settings of the object."""
 
 import math
 
@@ -59,12 +59,12 @@ from .nodes import DISCS, FILLED, INK, LENGTH, MOST, SMOOTH, SOLID_NAME, SPLATS,
 from .value_range import STEPPED, all_zero, fit_range
 
 _MOST_HANDLES = 6  # that have colors
-_LATE = LOW, HIGH  # groups that came with a later version
-_MOST_GROUPS = 12  # attributes that a material reads for them: Blender's shaders take 15
+_LATE = LOW, HIGH  # groups of later versions
+_MOST_GROUPS = 12  # attributes of groups in a material: Blender's shaders have at most 15
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
 _LINE_WIDTH = 1.0 / 250.0  # of iso lines, in the root of the area
 _noted = {}  # Group Colors of objects in Edit Mode while something is undone, by session_uid
-_NO_SPACING = 0.01  # stands in where points are too few to have one
+_NO_SPACING = 0.01  # for points too few to have one
 
 
 def show_attribute(obj, name: str = "", radius: float = 0.0):
@@ -77,7 +77,7 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
     name : str
         The attribute; empty for the one on show, or the mean curvature.
     radius : float
-        Radius of the points in local lengths; 0 leaves it to the setting Point Size, or to whoever set it by hand.
+        Radius of the points in local lengths; 0 for the setting Point Size, or a radius set by hand.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
 
 
 def _read(data, name):
-    """Read the values of an attribute that is to be shown; None for colors, which the material takes as they are."""
+    """Read the values of an attribute to be shown; None for colors, which the material uses directly."""
     return None if is_color(data, name) else read_attribute(data, name)
 
 
@@ -128,24 +128,24 @@ def viewport_points() -> int:
 
 
 def _without_card() -> bool:
-    """Whether the processor draws: it compiles what Material Preview needs for half a minute, and Solid at once."""
+    """Whether there is no GPU: then Material Preview compiles its shaders for half a minute, and Solid none."""
     return not bpy.app.background and gpu.platform.device_type_get() == "SOFTWARE"
 
 
 def recolor(obj):
-    """Color the points by settings that have changed, if there is anything on show."""
+    """Color the points by changed settings, if an attribute is on display."""
     name = shown_attribute(obj)
     if not name or name not in obj.data.attributes:
         return
     in_solid = is_in_solid(obj)
     _color(obj, name, _read(obj.data, name))
     reshape(obj)
-    if in_solid and not is_in_solid(obj):  # iso lines, for instance, are no colors of points
+    if in_solid and not is_in_solid(obj):  # such as with iso lines
         use_material_preview(bpy.context)
 
 
 def show_groups(obj):
-    """Follow the setting Group Colors: over what is on show, or on plain points, which it makes and takes away."""
+    """Update the display by the setting Group Colors: on top of colors, or on plain points."""
     if obj.type not in TYPES:
         return
     modifier, material = find_display(obj), find_material(obj)
@@ -172,13 +172,13 @@ def show_groups(obj):
 
 @persistent
 def _note_groups(*_):
-    """Remember which objects in Edit Mode have their groups colored, before undo or redo."""
+    """Keep the setting Group Colors of objects in Edit Mode before undo or redo."""
     _noted.update({obj.session_uid: obj.meshfree.show_groups for obj in bpy.data.objects if obj.mode == "EDIT"})
 
 
 @persistent
 def _keep_groups(*_):
-    """Leave Group Colors as they were in Edit Mode: what is undone there are changes of the points."""
+    """Restore Group Colors in Edit Mode, where undo is for changes of points."""
     for obj in bpy.data.objects:
         shown = _noted.get(obj.session_uid, obj.meshfree.show_groups)
         if obj.meshfree.show_groups != shown:
@@ -187,7 +187,7 @@ def _keep_groups(*_):
 
 
 def show_result(obj, name):
-    """Show an attribute that was written just now; without a name what is on show, or the mean curvature."""
+    """Show a new result; without a name the displayed attribute, or the mean curvature."""
     show_attribute(obj, MEAN_CURVATURE if not name and is_colored(obj) else name)
     look_at([obj])
 
@@ -207,7 +207,7 @@ def show_sequence(objects, name):
 
 
 def show_surface(obj):
-    """Show the points of an object as discs: in what they show, in their own material, or in their own colors."""
+    """Show the points of an object as discs, in the displayed attribute, their own material or their own colors."""
     modifier, _ = _add_display(obj)
     resize(obj)
     name = own_colors(obj.data)
@@ -228,7 +228,7 @@ def show_colors(objects):
 
 
 def show_own_material(obj):
-    """Show an object in the material of its first slot, and go on so should that become another one."""
+    """Show an object in the material of its first slot, also after a change of that."""
     modifier, material, own = find_display(obj), find_material(obj), own_material(obj)
     set_input(modifier, "Material", own)
     obj.meshfree.own_material = own
@@ -239,10 +239,10 @@ def show_own_material(obj):
 
 
 def follow_own_material(obj):
-    """Let a display that shows the material of the object's first slot take the one that is there now."""
+    """Update a display that shows the material of the object's first slot."""
     modifier = find_display(obj)
     if modifier is None or not obj.is_editable or get_input(modifier, "Material") != obj.meshfree.own_material:
-        return  # it shows something else, or what somebody has chosen for it
+        return  # it shows another material
     own = own_material(obj)
     if own != obj.meshfree.own_material:
         obj.meshfree.own_material = own
@@ -251,7 +251,7 @@ def follow_own_material(obj):
 
 
 def _catch_up(obj):
-    """Color points as they were to be in Edit Mode, where neither colors for Solid nor slopes can be kept with them."""
+    """Repeat a coloring after Edit Mode, where colors for Solid and gradients could not be written."""
     if obj.meshfree.colors_behind and not in_edit_mesh(obj) and obj.is_editable:
         recolor(obj)
 
@@ -274,7 +274,7 @@ def show_splats(obj):
 
 
 def show_alike(obj, made):
-    """Show on a mesh made of an object what that shows, or its own colors."""
+    """Show a mesh made from an object in the displayed attribute of that, or in its own colors."""
     name, own = shown_attribute(obj), own_material(obj)
     if own is not None:
         made.data.materials.append(own)
@@ -285,7 +285,7 @@ def show_alike(obj, made):
 
 
 def show_in_solid(obj):
-    """Let viewports in Solid show the colors of an object's points: of dots they cannot, so that they change."""
+    """Let viewports in Solid show the colors of an object's discs; switch to Material Preview for dots."""
     for area in _views():
         shading = area.spaces.active.shading
         if shading.type == "SOLID":
@@ -296,7 +296,7 @@ def show_in_solid(obj):
 
 
 def look_at(objects):
-    """Let the viewport that somebody works in show what was put on show: without a card in Solid, where that can."""
+    """Let the active viewport show the display of objects: without a GPU in Solid, if possible."""
     if _without_card() and all(is_in_solid(obj) for obj in objects):
         for obj in objects:
             show_in_solid(obj)
@@ -305,9 +305,9 @@ def look_at(objects):
 
 
 def use_material_preview(context):
-    """Switch the viewport that somebody works in from Solid, where points are gray, to Material Preview.
+    """Switch the active viewport from Solid, where points are gray, to Material Preview.
 
-    In the Properties editor, which has some of our panels, that is each viewport beside it.
+    From the Properties editor, which has some of our panels, switch all viewports of the screen.
     """
     space = context.space_data
     if space is None or context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
@@ -319,7 +319,7 @@ def use_material_preview(context):
 
 
 def resize(obj):
-    """Make the points as large as the settings say, in units of their spacing, which is measured where they changed."""
+    """Set the size of the points by the settings, in units of their spacing."""
     modifier = find_display(obj)
     if modifier is None:
         return
@@ -342,8 +342,8 @@ def _measure(obj):
 def reshape(obj):
     """Draw discs and strokes where chosen and known; no strokes while handles move the points, as they do not rotate.
 
-    Dots would hide which points are selected in Edit Mode, and Blender 5.2 draws all of them as selected. So there they
-    are only seen with the colors of groups, and where they show what handles move.
+    In Edit Mode dots would hide the selection, and Blender 5.2 draws all of them as selected. So there they are only
+    drawn with the colors of groups, and for bound objects.
     """
     modifier, deform = find_display(obj), find_deform(obj)
     if deform is not None and not is_baked(obj):
@@ -368,13 +368,13 @@ def reshape(obj):
         if has_input(group, STROKES):
             stroked = known and deform is None and _has_strokes(obj)
             set_input(modifier, STROKES, shown_attribute(obj) if stroked else "")
-            if stroked and get_input(modifier, INK) is None:  # else one of the user's choice stays
+            if stroked and get_input(modifier, INK) is None:  # else keep the user's choice
                 set_input(modifier, INK, stroke_material())
     obj.update_tag()
 
 
 def _has_strokes(obj):
-    """Whether strokes are to show what is on show."""
+    """Whether the displayed attribute has strokes."""
     settings, name = obj.meshfree, shown_attribute(obj)
     return settings.strokes and quantity(name).along_surface and component(name, settings) == "DIRECTION"
 
@@ -384,7 +384,7 @@ def _radius(settings):
 
 
 def _sized_by_hand(obj):
-    """Whether the radius is another one than the settings gave."""
+    """Whether the radius differs from that of the settings."""
     return not math.isclose(get_input(find_display(obj), "Radius"), _radius(obj.meshfree), rel_tol=1e-5)
 
 
@@ -404,7 +404,7 @@ def _color(obj, name, values):
     else:
         locked = settings.range_low, settings.range_high
         chosen = [settings.color_map, settings.range_mode]
-        if quantity(name).color_range == "symmetric":  # zero is what it is all about, even where all of it has one sign
+        if quantity(name).color_range == "symmetric":  # centered on zero, even if all values have one sign
             chosen = [
                 choice if choice != "AUTO" else auto
                 for choice, auto in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
@@ -423,7 +423,7 @@ def _color(obj, name, values):
     columns = [] if values is None or stepped or not settings.smooth else sloping(name, values, part)
     smooth.follow(obj, name, part, columns, settings.spacing)
     _follow_in_solid(obj, values if shown is None else shown, None if groups else colors_of)
-    for other in sharing_objects(obj):  # which may show something else
+    for other in sharing_objects(obj):  # which may show another attribute
         if shown_attribute(other) != name and is_in_solid(other):
             set_input(find_display(other), SOLID_NAME, "")
         reshape(other)
@@ -433,9 +433,9 @@ def _color(obj, name, values):
 
 
 def _follow_in_solid(obj, values, colors_of):
-    """Let viewports in Solid show the colors of values, which a function gives; those of the mesh without one."""
+    """Let viewports in Solid show the colors of values by a function; without one, those of the mesh."""
     modifier = find_display(obj)
-    if not has_input(modifier.node_group, SOLID_NAME):  # of an earlier version, until it shows something else
+    if not has_input(modifier.node_group, SOLID_NAME):  # of an earlier version
         return
     name = solid.follow(obj, values, colors_of if draws_faces(obj) else None, get_input(modifier, "Radius"))
     set_input(modifier, SOLID_NAME, name)
@@ -457,10 +457,10 @@ def _display_material(obj):
 
 
 def _group_colors(obj) -> dict:
-    """Return the colours of groups by their names: none if they are not shown, and not all of very many.
+    """Return the colours of groups by name: none if they are not shown, and only the first ones of very many.
 
-    Groups that are still to come are among them, so that they are seen as soon as points are assigned, while there is
-    room; but for those that materials of earlier versions do not know.
+    Missing groups are included while there is room, so that assigned points are coloured at once, except those that
+    materials of earlier versions do not have.
     """
     settings = obj.meshfree
     if not settings.show_groups:
@@ -477,13 +477,13 @@ def _group_colors(obj) -> dict:
 
 
 def redraw_views():
-    """Draw all 3D views again, for what is drawn over them."""
+    """Redraw all 3D views, for their overlays."""
     for area in _views():
         area.tag_redraw()
 
 
 def redraw_panels():
-    """Draw the sidebars of all 3D views again."""
+    """Redraw the sidebars of all 3D views."""
     for area in _views():
         next(region for region in area.regions if region.type == "UI").tag_redraw()
 
@@ -515,10 +515,10 @@ _HANDLERS = {
 
 
 def attach():
-    """Begin to show what events ask for."""
+    """Add the handlers."""
     add_handlers(_HANDLERS)
 
 
 def detach():
-    """Show nothing more."""
+    """Remove the handlers."""
     remove_handlers(_HANDLERS)

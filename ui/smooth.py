@@ -1,4 +1,4 @@
-"""Slopes of what an object shows along its surface, so that colours run on from one disc to the next."""
+"""Surface gradients of displayed values, by which colours are interpolated within discs."""
 
 import zlib
 
@@ -19,24 +19,24 @@ from ..operators.objects.attributes import (
 from ..operators.objects.reading import sharing_objects
 from ..operators.running import cache
 
-_BOUNDS = -3e38, 3e38  # of single precision: steeper ones, of huge values on a tiny object, count as these
+_BOUNDS = -3e38, 3e38  # of single precision: larger gradients are clipped
 
 
 def follow(obj, name, part, columns, spacing):
-    """Keep with the points of an object the slopes of what it shows, if there are discs that can show them.
+    """Write the gradients of an object's displayed values, if there are discs that can show them.
 
     Parameters
     ----------
     obj : bpy.types.Object
     name, part : str
-        The attribute that is shown, and what of it.
+        The displayed attribute, and the part of it.
     columns : sequence of ndarray, (n,)
-        The numbers shown, one or two each point; none where what is shown has no slopes.
+        The displayed numbers, one or two for each point; empty where they have no gradient.
     spacing : float
         Of the points: the length in which discs are kept.
     """
     kept, data = obj.meshfree, obj.data
-    if not _is_writable(data):  # as in Edit Mode: those from before are of use for what was shown before
+    if not _is_writable(data):  # as in Edit Mode: earlier gradients are valid for the same attribute
         kept.slopes_of = kept.slopes_of if columns and kept.slopes_of.startswith(f"{part} {name} ") else ""
         return
     points = own_positions(data)
@@ -79,5 +79,5 @@ def _slopes(points, discs, spacing):
 
 
 def _as_number(values):
-    """Return values as Blender takes them for numbers: the means of vectors, in single precision."""
+    """Convert values to numbers as Blender does: vectors to their means, in single precision."""
     return values if values.ndim == 1 else sum(values.T) / np.float32(values.shape[1])

@@ -1,4 +1,4 @@
-"""Colours of what an object shows for viewports in Solid, which know no materials: as attributes of its points."""
+"""Colour attributes of displayed values for viewports in Solid, which do not use materials."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from .value_range import CLASSES, STEPPED
 def number_colors(color_map, low, high, settings):
     """Return a function that gives the linear colours of numbers, (n,) to (n, 4), as a material shows them.
 
-    Parameters as in `materials.color_by_number`; what is hidden beyond the range is not.
+    Parameters as in `materials.color_by_number`; values outside the range are not hidden.
     """
     colors = np.array(colormaps.colors(color_map, settings.reverse))
     margin = 0.5 if color_map in STEPPED else 0.0
@@ -49,7 +49,7 @@ def direction_colors(vectors):
 
 
 def follow(obj, values, colors_of, radius):
-    """Keep the colours of what an object shows with its points, and say which colour attribute is to get them.
+    """Write the colours of an object's displayed values, and return the colour attribute that shows them.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ def follow(obj, values, colors_of, radius):
     values : ndarray, (n,) or (n, 3)
         The numbers or directions.
     colors_of : callable, or None
-        Gives their colours, (n, 4); None where Solid cannot show what is shown.
+        Gives their colours, (n, 4); None if Solid cannot show them.
     radius : float
         Of discs, in local lengths.
 
     Returns
     -------
     str
-        The colour attribute that viewports in Solid look at; empty where none is to be changed.
+        The colour attribute that viewports in Solid show; empty if none is changed.
     """
     data = obj.data
     if obj.type != "MESH" or in_edit_mesh(obj) or not data.is_editable or data.override_library is not None:
@@ -83,9 +83,9 @@ def follow(obj, values, colors_of, radius):
 
 
 def _tilts(data, values, colors_of, radius):
-    """Return by how much colours change where values rise by one, (n, 3), as they do on average across each disc."""
-    steep = np.linalg.norm(read_attribute(data, SLOPE), axis=1)
-    rise = steep * radius * np.linalg.norm(read_attribute(data, DISC), axis=1)
+    """Return the derivative of colours by the value, (n, 3), averaged across each disc."""
+    slope = np.linalg.norm(read_attribute(data, SLOPE), axis=1)
+    rise = slope * radius * np.linalg.norm(read_attribute(data, DISC), axis=1)
     low, high = values - rise, values + rise
     some = (rise > 1e-6 * max(float(np.ptp(values)), 1e-30)) & (high > low)  # values may differ by rounding alone
     low, high = low[some], high[some]

@@ -23,7 +23,7 @@ def _round_step(least):
 
 
 def tick_texts(ticks) -> list:
-    """Write numbers at even steps with as many digits as tell them apart."""
+    """Write evenly spaced numbers with as many digits as distinguish them."""
     greatest = max(map(abs, ticks), default=0.0)
     step = ticks[1] - ticks[0] if len(ticks) > 1 else greatest
     if greatest == 0.0 or step == 0.0:

@@ -18,12 +18,12 @@ _ADAPTIVE = {
     "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
 }
-_LEFT_OPEN = ("ADAPTIVE", "METERS", "FEET")  # the latter two stand in new scenes, without anybody's choice
+_LEFT_OPEN = ("ADAPTIVE", "METERS", "FEET")  # the latter two are defaults of new scenes
 _RAISED = {1: "", 2: "²"}
 
 
 def attribute_power(name: str) -> int:
-    """Return of which power of a length an attribute has the unit: 2 for areas, -1 for curvature, 0 for none."""
+    """Return the power of length in the unit of an attribute: 2 for areas, -1 for curvature, 0 for none."""
     row = quantity(name)
     return 0 if row.numbered else row.power
 
@@ -36,8 +36,8 @@ def unit(power: int, greatest: float, settings):
     power : int
         As of `attribute_power`.
     greatest : float
-        The greatest number to be written, in lengths of the world: the first unit in which it reaches 1 is taken where
-        the scene leaves it open, of lengths and areas, as Blender writes them too.
+        The greatest number to be written, in world lengths: an adaptive unit of lengths and areas is the first one in
+        which it reaches 1, as in Blender.
     settings : bpy.types.UnitSettings
         Of the scene.
 
@@ -46,7 +46,7 @@ def unit(power: int, greatest: float, settings):
     str
         Such as "mm²" or "1/m"; empty for plain numbers and scenes without units.
     float
-        What lengths of the world are to be multiplied by to be numbers of that unit.
+        Conversion of world lengths to that unit.
     """
     if power == 0 or settings.system == "NONE":
         return "", 1.0

@@ -1,8 +1,8 @@
-"""Values as people look at them: the colour map and the range that suit them, and how often each occurs."""
+"""Colour map, range and histogram of values."""
 
 import numpy as np
 
-CLASSES = 7  # whole numbers from 0 with a colour of their own; they repeat from there
+CLASSES = 7  # whole numbers from 0 with a colour of their own, which then repeat
 STEPPED = ("TRUTH", "CATEGORICAL")  # maps with a colour for each whole number
 _BINS = 60
 
@@ -24,7 +24,7 @@ def fit_range(
         those reach, or as given. AUTO is SYMMETRIC for the diverging map of signed values, DATA for the cyclic map,
         whose ends would not meet otherwise, and PERCENTILE for all else.
     coverage : float
-        Percentage of the values between the percentiles, so that a few outliers do not wash the rest out; all of them
+        Percentage of the values between the percentiles, so that a few outliers do not dominate; all of them
         for whole numbers and truth values, and where it is not a number.
     locked : tuple of float
         Range to keep.
@@ -34,7 +34,7 @@ def fit_range(
     Returns
     -------
     name : str
-        As given, or what AUTO came to: also "TRUTH".
+        As given, or the choice of AUTO, including "TRUTH".
     low, high : float
         Of stepped maps the first and the last whole number.
     """
@@ -48,7 +48,7 @@ def fit_range(
     whole = kind != "f" or np.isnan(coverage)  # whole numbers have no outliers; Blender takes NaN for any number
     outside = 0.0 if whole else 0.5 * (100.0 - coverage)
     share = np.percentile(values, (outside, 100.0 - outside)) if len(values) else ends
-    if share[0] == share[1]:  # most values alike: the few others are what there is to see
+    if share[0] == share[1]:  # most values are equal: show the few others
         share = ends
     if name == "AUTO":
         signed = min(-share[0], share[1]) > 0.01 * max(-share[0], share[1])
@@ -73,12 +73,12 @@ def fit_range(
 
 
 def all_zero(values) -> bool:
-    """Whether numbers are nothing but zeros, of which there is no range."""
+    """Whether all numbers are zero, so that there is no range."""
     return values.dtype.kind == "f" and len(values) > 0 and not values.any()
 
 
 def histogram(values, bounds, stepped: bool):
-    """Count values along an axis that holds the range and, to half its width on each side, what lies beyond.
+    """Count values along an axis of the range, extended by at most half its width on each side.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Texts in panels of any width: Blender cuts the middle out of a line that does not fit."""
+"""Wrapping of texts in panels: Blender elides the middle of a line that does not fit."""
 
 import re
 
@@ -10,13 +10,13 @@ _TABS = 20.0  # of a sidebar
 _ICON = 20.0
 _WORD = re.compile(r"\S*\d (?:%|[a-zµ]{0,2}m[²³]?)(?!\w)\S*|\S+")  # a number stays with its unit
 _PADDING = 12.0  # of a button beside its text
-_SPLIT = 210.0  # room from which on names stand before settings
+_SPLIT = 210.0  # width above which names are drawn before settings
 
 
 def draw_text(layout, context, text: str, icon: str = "NONE", taken: float = 0.0):
-    """Draw a text as labels, one below the other, as many as the width of the region asks for.
+    """Draw a text as labels, one below the other, wrapped to the width of the region.
 
-    What stands beside it in its row, or around it, has `taken` so much of the width, in units of the user interface.
+    `taken` is the width of other items in its row, or around it, in units of the user interface.
     """
     column = layout.column(align=True)
     for line in wrapped(text, _room(context, taken + (_ICON if icon != "NONE" else 0.0)), _measure(context)):
@@ -25,14 +25,14 @@ def draw_text(layout, context, text: str, icon: str = "NONE", taken: float = 0.0
 
 
 def beside_or_below(layout, context, *texts: str):
-    """Return a row for so many things of the same width, with these texts; a column where one would be cut."""
+    """Return a row for items of equal width with these texts; a column if one would not fit."""
     measure = _measure(context)
     widest = max(map(measure, texts)) + _PADDING * context.preferences.system.ui_scale
     return (layout.row if len(texts) * widest <= _room(context, 0.0) else layout.column)(align=True)
 
 
 def split_properties(layout, context):
-    """Let names of settings stand before them, or within them where there is no room for that."""
+    """Draw names of settings before them, or within them if there is no room."""
     layout.use_property_split = _room(context, 0.0) >= _SPLIT * context.preferences.system.ui_scale
     layout.use_property_decorate = False
 
@@ -51,7 +51,7 @@ def wrapped(text: str, room: float, measure) -> list:
 def _room(context, taken):
     """Return the pixels that a line of text may take in a region."""
     region = context.region
-    if region is None:  # without a window there is no end
+    if region is None:  # unlimited without a window
         return float("inf")
     scale = context.preferences.system.ui_scale
     tabs = _TABS if region.type == "UI" else 0.0

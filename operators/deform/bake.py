@@ -1,4 +1,4 @@
-"""Bake an animated deformation into the file, so that it plays and renders where the extension is not installed."""
+"""Bake an animated deformation, so that it plays and renders without the extension."""
 
 import bpy
 import numpy as np
@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, IntProperty
 from ...core import NotEnoughMemoryError, PointCloudError
 from ...core.memory import available_memory
 from ..objects.all_or_nothing import all_or_nothing
+from ..objects.animation import TRANSFORM
 from ..objects.attributes import point_count, read_attribute, write_attribute
 from ..objects.carried import carried, carries, moved_names
 from ..objects.quantities import DISPLACEMENT
@@ -23,7 +24,6 @@ from .pose import POSE, State, write_displacement
 from .tools import BoundOperator, check_fresh, delete_bake
 
 _LAST = 1048574  # frame of Blender
-_PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
 class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
@@ -76,7 +76,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         return self.finish(context, [obj], frames)
 
     def _prepared_frames(self, progress):
-        """Make the factors in a thread first, if there are none; see `_frames`."""
+        """Factorize in a thread first, if necessary; see `_frames`."""
         obj = self._kept.find()[1]
         if not live.is_prepared(live.find(obj)):
             make = live.plan_follower(obj)
@@ -91,7 +91,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         return (yield from self._frames(progress))
 
     def _frames(self, progress):
-        """Read the attributes of all frames, one at each step; return them as a list of what `_read_frame` gives."""
+        """Read the attributes of all frames, one at each step; return a list of results of `_read_frame`."""
         frames = []
         for number in range(self.first, self.last + 1):
             progress("Frames", len(frames) / (self.last + 1 - self.first))
@@ -113,7 +113,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         return frames
 
     def leave(self, context):
-        """Go back to the frame and the handles that were shown."""
+        """Restore the frame and the handles."""
         self._kept.put_back()
 
     def finish(self, context, objects, results):
@@ -125,7 +125,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
             for number, frame in enumerate(results):
                 for suffix, (values, data_type) in frame.items():
                     write_attribute(mesh, f"{number}{suffix}", values, data_type)
-            cache = bpy.data.objects.new(mesh.name, mesh)  # of no collection: only the modifier uses it
+            cache = bpy.data.objects.new(mesh.name, mesh)  # in no collection: used by the modifier only
             show_baked(find_deform(obj), cache, self.first, len(results), self._kept.along)
         size = len(results) * sum(values.nbytes for values, _ in results[0].values()) / 2**20
         self.report({"INFO"}, f"{obj.name}: {len(results)} frames are baked, {size:.1f} MB in the file")
@@ -133,7 +133,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
 
 
 def _check_memory(frames, points, along):
-    """Refuse what would not fit the memory, which holds all frames before they are written and after that."""
+    """Refuse what does not fit into memory, which holds all frames twice."""
     numbers = 3 + sum(4 if item.data_type == "QUATERNION" else 3 for item in along)
     each, free = 2 * 4 * numbers * points, available_memory()
     if free is not None and frames * each > free:
@@ -147,7 +147,7 @@ def _check_memory(frames, points, along):
 
 
 def _read_frame(data, along):
-    """Return what is shown of a frame, `Carried` included, with types, by the ends of the names of its attributes."""
+    """Return the displayed attributes of a frame, `Carried` included, with types, by suffix of their names."""
     frame = {"": (read_attribute(data, DISPLACEMENT), "FLOAT_VECTOR")}
     for item in along:
         shown = item.moved if item.moved in data.attributes else item.name
@@ -156,7 +156,7 @@ def _read_frame(data, along):
 
 
 class _Kept:
-    """The frame, the handles and the displacements that are shown while others are looked at."""
+    """The frame, handles and displacements before baking."""
 
     def __init__(self, scene, obj, along=()):
         self.along = along  # `Carried` that is baked
@@ -168,29 +168,29 @@ class _Kept:
         self._shown = obj.data[POSE].to_list()
 
     def find(self):
-        """Return the scene and the object; None for what is gone."""
+        """Return the scene and the object; None for what was removed."""
         scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self._scene), None)
         return scene, find_object(self._uid)
 
     def _now(self):
-        """Read the frame, the binding, and where the object and the empties of its handles are, keyframes or not."""
+        """Read the frame, the binding, and the transforms of the object and of its empties."""
         scene, obj = self.find()
         if scene is None or obj is None:
             return None
         settings = obj.meshfree.deform
         things = {item.empty.session_uid: item.empty for item in settings.handle_items if item.empty}
         places = {
-            uid: {name: tuple(getattr(thing, name)) for name in _PLACE}
+            uid: {name: tuple(getattr(thing, name)) for name in TRANSFORM}
             for uid, thing in (things | {obj.session_uid: obj}).items()
         }
         return scene.frame_current, settings.binding_id, places
 
     def expect(self):
-        """Remember what is there now."""
+        """Keep the present state as the expected one."""
         self._expected = self._now()
 
     def holds(self) -> bool:
-        """Whether that is still there: nobody has moved anything since."""
+        """Whether the state is the expected one: nothing was moved since."""
         obj = self.find()[1]
         return (
             self._expected is not None
@@ -199,7 +199,7 @@ class _Kept:
         )
 
     def put_back(self):
-        """Show again what was shown; handles that somebody has moved meanwhile stay where they are."""
+        """Restore the state; handles moved meanwhile are left alone."""
         scene, obj = self.find()
         if scene is None:
             return
@@ -211,7 +211,7 @@ class _Kept:
         for uid, place in self._places[2].items():
             thing = find_object(uid)
             for name, value in place.items():
-                if tuple(getattr(thing, name)) != value:  # it had been moved since its keyframe
+                if tuple(getattr(thing, name)) != value:  # moved after its keyframe
                     setattr(thing, name, value)
         settled, *numbers = self._shown
         state = State.SETTLED if settled else State.QUICK

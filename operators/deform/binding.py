@@ -1,4 +1,4 @@
-"""What binds an object to its handles, all of it kept in the file, and whether it still holds.
+"""The binding of an object to its handles, kept in the file, and whether it is valid.
 
 The points at rest are the attribute `lb_rest`, in local space. Which empties move which groups is in
 `Object.meshfree.deform`.
@@ -35,12 +35,12 @@ from .nodes import find_deform, is_baked
 from .pose import POSE, Pose, is_there
 
 WRITES = DISPLACEMENT, REST
-_bound = b"", ()  # session_uids of all objects when the bound ones were looked for, and the places of these
+_bound = b"", ()  # session_uids of all objects at the last search, and the indices of the bound ones
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """Which points are moved and which stay.
+    """Constrained points: handles and anchors.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Constraints:
     strength : ndarray, (h + a,)
         Their weights in their groups.
     checksum : str
-        Text that differs where any of it does.
+        Of all of these.
     """
 
     names: list
@@ -66,25 +66,25 @@ class Constraints:
 
 @dataclass(frozen=True)
 class Binding:
-    """What an object is bound with, read from it once.
+    """The binding of an object, read from it once.
 
     Attributes
     ----------
     rest : ndarray, (n, 3) float32
         Points at rest in local space.
     matrix : ndarray, (3, 3)
-        From local space to the lengths of the world when it was bound.
+        From local space to world lengths, when it was bound.
     constraints : Constraints or None
-        None where they are to be found on the operator.
+        None where the operator is needed to choose them.
     splats : Splats or None
-        Those at rest in local space, where the points are splats.
+        At rest in local space, if the points are splats.
     rotation_aware : bool
     softness : float or None
-        What weights of constraints are multiplied by; None for hard ones.
+        Factor of the weights of constraints; None for hard ones.
     options : LaplacianOptions
     boundary : ndarray, (n,) bool, or None
     leave_out_floaters : bool
-        Whether splats that float are no part of the surface.
+        Whether floaters are excluded from the surface.
     """
 
     rest: np.ndarray
@@ -103,7 +103,7 @@ class Binding:
         return cache.build(points, self.options, self.boundary, progress, splats=judged).laplacian
 
     def handles(self, pose: Pose):
-        """Return where a pose has the moved points in local space, (h, 3)."""
+        """Return the positions of the handles in a pose, in local space, (h, 3)."""
         moved, owner = self.constraints.moved, self.constraints.owner
         placed = self.rest[moved].astype(np.float64)
         for index, name in enumerate(self.constraints.names):
@@ -116,13 +116,13 @@ class Binding:
 
 
 def read_binding(obj) -> Binding:
-    """Read what a bound object is bound with."""
+    """Read the binding of a bound object."""
     matrix = np.reshape(obj.meshfree.deform.matrix, (3, 3)).astype(np.float64)
     return plan_binding(obj, read_rest(obj), matrix, read_constraints(obj))
 
 
 def plan_binding(obj, rest, matrix, constraints=None) -> Binding:
-    """Read what else an object is to be bound with, at these points at rest; see `Binding`."""
+    """Make the binding of an object for these points at rest; see `Binding`."""
     settings, deform = obj.meshfree, obj.meshfree.deform
     return Binding(
         rest,
@@ -138,7 +138,7 @@ def plan_binding(obj, rest, matrix, constraints=None) -> Binding:
 
 
 def read_constraints(obj) -> Constraints:
-    """Read which points are moved and which stay.
+    """Read the handles and anchors of an object.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def read_constraints(obj) -> Constraints:
         There are no handles, or points that are in several groups.
     """
     settings = obj.meshfree.deform
-    names = handle_names(obj) or [settings.handles]  # which says what is missing
+    names = handle_names(obj) or [settings.handles]  # whose error names the missing group
     weights = np.array([chosen_weights(obj, name, "Handles") for name in names])
     several = int(np.count_nonzero(np.count_nonzero(weights > 0.0, axis=0) > 1))
     if several:
@@ -175,7 +175,7 @@ def _groups_checksum(names, weighted) -> str:
 
 
 def _groups_now(obj, glance, trusting):
-    """Return the checksum of the groups and which points are moved in Edit Mode; None, while these are not counted."""
+    """Return the checksum of the groups and the points moved in Edit Mode; None until these are counted."""
     names = handle_names(obj)
     found = [members(obj, name, glance, trusting) for name in (*names, obj.meshfree.deform.anchors)]
     if None in found:
@@ -187,7 +187,7 @@ def _groups_now(obj, glance, trusting):
 
 
 def forget_bound():
-    """Look for the bound objects again when they are needed."""
+    """Search for bound objects again at the next use."""
     global _bound
     _bound = b"", ()
 
@@ -195,8 +195,8 @@ def forget_bound():
 def bound_objects(scene=None) -> list:
     """Find all bound objects, or those of a scene.
 
-    No object is looked at while they are the same as at the last call, for this is called at each move of the mouse:
-    to look at 5,000 takes 9 ms.
+    Objects are searched only if they differ from those at the last call, since this is called at each mouse move: a
+    search of 5,000 objects takes 9 ms.
     """
     global _bound
     objects = bpy.data.objects
@@ -211,12 +211,12 @@ def bound_objects(scene=None) -> list:
 
 
 def is_bound(obj) -> bool:
-    """Whether an object was bound to handles, and follows them unless something has changed."""
+    """Whether an object is bound to handles, stale or not."""
     return obj is not None and obj.meshfree.deform.is_bound
 
 
 def handled_object(obj, scene):
-    """Return an object itself, or if it is an empty that moves handles, the one in the scene that it moves."""
+    """Return the object in a scene that an empty deforms as a handle, or else the object itself."""
     if obj is None or obj.type in TYPES:
         return obj
     for other in bound_objects(scene):
@@ -226,9 +226,9 @@ def handled_object(obj, scene):
 
 
 def copied_from(obj):
-    """Return the bound object whose empties a copy of it still names, since they were not copied too; None for others.
+    """Return the bound object from which another one was copied without the empties; None for others.
 
-    Empties go with the object that they are children of, so that a copy stays as it is when it is moved.
+    Empties belong to the object that is their parent; copies keep their shape when these are moved.
     """
     empties = [item.empty for item in obj.meshfree.deform.handle_items if item.has_empty and is_there(item.empty)]
     parents = [empty.parent for empty in empties]
@@ -242,28 +242,28 @@ def copied_from(obj):
 
 
 def edited_rows(obj, constraints):
-    """Return which of the moved points have no empty, and are moved in Edit Mode, (h,) bool."""
+    """Return which handles have no empty, and are moved in Edit Mode, (h,) bool."""
     by_empty = _moved_by_empties(obj)
     return ~np.isin(constraints.owner, [index for index, name in enumerate(constraints.names) if name in by_empty])
 
 
 def _moved_by_empties(obj) -> set:
-    """Names of the groups of handles that empties move."""
+    """Return the groups of handles that empties move."""
     return {item.name for item in obj.meshfree.deform.handle_items if item.has_empty}
 
 
 def settings_text(obj) -> str:
-    """Text of the settings of the operator that deformations depend on."""
+    """Return the settings of the operator that deformations depend on, as text."""
     settings = obj.meshfree
     floaters = () if settings.leave_out_floaters else ("floaters",)
     return repr((settings_values(settings), settings.boundary_group, settings.use_modifiers, *floaters))
 
 
 def stale_reason(obj, glance=False, trusting=False) -> str:
-    """Say why a bound object no longer follows its handles, and what to do; empty if it does.
+    """Return why a bound object no longer follows its handles, and what to do; empty if it does.
 
-    A glance is quick enough for a panel; see `fingerprint`. One that trusts is quick enough for a drag: it takes the
-    groups as they were seen last.
+    A glance is quick enough for a panel; see `fingerprint`. A trusting one is quick enough for a drag: it uses the last
+    count of groups.
     """
     settings = obj.meshfree.deform
     count = len(bmesh.from_edit_mesh(obj.data).verts) if in_edit_mesh(obj) else point_count(obj.data)
@@ -286,7 +286,7 @@ def stale_reason(obj, glance=False, trusting=False) -> str:
     others = [other.name for other in sharing_objects(obj) if is_bound(other) and copied_from(other) != obj]
     if others:
         return f'It shares its mesh with "{others[0]}", which is bound, too. Make it a single user'
-    if in_edit_mesh(obj):  # groups and positions are only known to be right when one leaves it
+    if in_edit_mesh(obj):  # groups and positions can only be checked outside
         return ""
     if any(obj.data.attributes.get(name) is None for name in WRITES):
         return f"The attributes {WRITES[0]} and {WRITES[1]} were removed. Bind again"
@@ -312,7 +312,7 @@ def read_rest(obj):
 
 
 def record(obj, rest, matrix, constraints, empties):
-    """Keep in the file what an object is bound with: of a `Binding` the first three.
+    """Write the binding of an object to the file: the first three fields of a `Binding`.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def record(obj, rest, matrix, constraints, empties):
     rest, matrix, constraints
         As of `Binding`.
     empties : list
-        For each group of handles the empty that moves it and its matrix at rest in local space, (4, 4), or None.
+        For each group of handles its empty and the matrix of that at rest in local space, (4, 4), or None.
     """
     settings = obj.meshfree.deform
     settings.handle_items.clear()
@@ -338,15 +338,15 @@ def record(obj, rest, matrix, constraints, empties):
 
 
 def renew(obj, constraints):
-    """Take the points of a bound object as they are now as the ones at rest, which `lb_rest` holds."""
+    """Take the present points of a bound object, which `lb_rest` holds, as those at rest."""
     settings = obj.meshfree.deform
-    # Points that are moved in Edit Mode count as if they stayed.
+    # Points that are moved in Edit Mode do not count.
     settings.fingerprint = fingerprint(obj, left_out=constraints.moved[edited_rows(obj, constraints)])
     settings.binding_id = uuid4().hex
 
 
 def forget(obj):
-    """Remove from the file what an object is bound with."""
+    """Remove the binding of an object from the file."""
     settings = obj.meshfree.deform
     settings.is_bound = False
     settings.handle_items.clear()

@@ -1,4 +1,4 @@
-"""From a binding and a pose of its handles to where all points are: arrays in, arrays out, in any thread."""
+"""The deformation of all points by a binding and a pose of its handles: arrays only, in any thread."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -13,20 +13,20 @@ from .pose import Pose, State
 
 
 class Moved(NamedTuple):
-    """Where handles have moved a bound object.
+    """A deformed object.
 
     Attributes
     ----------
     points : ndarray, (n, 3)
-        As `Binding.matrix` places them.
+        Transformed by `Binding.matrix`.
     displacement : ndarray, (n, 3)
         In local space.
     carried : dict of str to ndarray
-        What goes along, by the names of its attributes: nothing at rest, and no harmonics if the result is quick.
+        What deforms with the points, by attribute: empty at rest, without harmonics if the result is quick.
     state : State
         SETTLED or QUICK.
     converged : bool
-        Whether the rotations have ended to change.
+        Whether the rotations converged.
     """
 
     points: np.ndarray
@@ -37,7 +37,7 @@ class Moved(NamedTuple):
 
 
 class Follower:
-    """What a bound object follows its handles by.
+    """The solvers of a bound object.
 
     Attributes
     ----------
@@ -45,15 +45,15 @@ class Follower:
     quick : CoarseDeformer or Deformer
         For quick results.
     exact : Deformer or CoarseDeformer or None
-        For settled ones, once it was needed; of splats the same.
+        For settled results, made when first needed; of splats the same as `quick`.
     last : dict of int to ndarray
-        The last points by the object's session_uid: copies of an object have one binding.
+        The last points by session_uid, since copies of an object share the binding.
     """
 
     def __init__(self, binding: Binding, progress):
         self.binding, self.last = binding, {}
         self.quick = self._bind(core.coarse_deformer, progress)
-        # Splats scatter about their surface: motions of some points that carry the others even that out.
+        # Splats scatter about their surface, which the coarse solver averages.
         of_all = binding.splats is not None or isinstance(self.quick, core.Deformer)
         self.exact = self.quick if of_all else None
 
@@ -69,13 +69,13 @@ class Follower:
         )
 
     def prepare(self, progress):
-        """Make the factors for settled results, if there are none, and return this."""
+        """Factorize for settled results, if necessary, and return this."""
         if self.exact is None:
             self.exact = self._bind(core.Deformer, progress)
         return self
 
     def move(self, pose: Pose, state: State, start=None, progress=None) -> Moved:
-        """Find where a pose moves all points.
+        """Solve for all points in a pose.
 
         Parameters
         ----------
@@ -83,9 +83,9 @@ class Follower:
         state : State
             SETTLED, or QUICK for one step.
         start : ndarray, (n, 3), optional
-            The last points, from which that step is taken; otherwise from rest.
+            The last points, from which that step starts; otherwise from rest.
         progress : callable, optional
-            Needed where factors may have to be made.
+            Required where it may have to factorize.
         """
         bound, rest, handles = self.binding, self.quick.points, self.binding.handles(pose)
         if _is_at_rest(bound, handles):
@@ -109,9 +109,9 @@ def _is_at_rest(binding, handles):
 
 
 def _carried(splats, discs, positions, gradients, state):
-    """Return splats or discs after a deformation with these gradients, (n, 3, 3), by the names of their attributes."""
+    """Return splats or discs after a deformation with these gradients, (n, 3, 3), by attribute."""
     if splats is None:
         return {MOVED_DISC: moved_discs(discs, gradients)}
-    if state is State.QUICK:  # harmonics take longer than all else, and can wait
+    if state is State.QUICK:  # harmonics take longest, and can wait
         splats = replace(splats, harmonics=splats.harmonics[:, :0])
     return moved_splats(splats.deformed(positions, gradients))

@@ -1,10 +1,9 @@
-"""Bound objects follow their handles: what is kept in memory for that, and the handlers that call it.
+"""Bound objects follow their handles: their solvers in memory, and the handlers that update them.
 
-A quick update, for dragging and playing, takes one step from the last result, on some of the points, which carry the
-others. A settled one is exact: it starts from rest and takes all steps on all points, so that it depends on nothing but
-where the handles are; what it needs is made when it is first needed. Frames that are rendered or jumped to are settled,
-and so is what was dragged once it rests. In a window, what takes long runs in a thread; without one all is settled at
-once.
+A quick update, for dragging and playback, takes one step from the last result with the coarse solver. A settled one is
+exact: it takes all steps on all points from rest, so that it depends on the pose only; its factors are made when first
+needed. Rendered frames and single frame changes are settled, as are dragged handles once they rest. In a window, long
+work runs in a thread; without one, everything is settled at once.
 """
 
 import threading
@@ -28,7 +27,7 @@ from .nodes import is_baked
 from .pose import Pose, State, binding_key, read_pose, shown_state, write_displacement
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
-_TICK = 0.05  # seconds between two looks at a thread
+_TICK = 0.05  # seconds between two checks of a thread
 
 
 @dataclass
@@ -59,9 +58,9 @@ class _Followed:
     due : float
         When to settle what was updated quickly.
     trouble : str
-        What went wrong at the last update; empty if nothing did.
+        The error of the last update; empty without one.
     troubled : ndarray or None
-        The numbers of the pose at which it would go wrong again.
+        The numbers of the pose that caused it.
     """
 
     thread: _Thread | None = None
@@ -115,12 +114,12 @@ def find(obj):
 
 
 def is_prepared(follower) -> bool:
-    """Whether what a `Follower`, or None, needs for settled results is there."""
+    """Whether a `Follower`, or None, has the factors for settled results."""
     return follower is not None and follower.exact is not None
 
 
 def keep(obj, follower):
-    """Keep the factors of an object, and drop those that no object needs."""
+    """Keep the `Follower` of an object, and drop unused ones."""
     used = {binding_key(other) for other in bound_objects()}
     for key in _followers.keys() - used:
         del _followers[key]
@@ -128,15 +127,15 @@ def keep(obj, follower):
 
 
 def plan_follower(obj):
-    """Read a bound object; return what makes its `Follower` from a progress callback, or has it already."""
+    """Read a bound object; return a function of a progress callback that returns its `Follower`, kept or new."""
     known = find(obj)
     return partial(Follower, read_binding(obj)) if known is None else lambda progress: known
 
 
 def plan_settled(obj, pose, waits=True):
-    """Read a bound object; return what finds, from a progress callback, its `Follower` and where a pose moves it.
+    """Read a bound object; return a function of a progress callback that returns its `Follower` and the deformation.
 
-    Without the time to make all that is missing, if nothing is there yet, a quick result has to do.
+    Unless it `waits`, a new `Follower` gives a quick result first.
     """
     make, at_once = plan_follower(obj), waits or find(obj) is not None
 
@@ -149,7 +148,7 @@ def plan_settled(obj, pose, waits=True):
 
 
 def write(obj, follower, moved, pose):
-    """Write where an object is moved, and keep what the next result starts from."""
+    """Write the deformation of an object, and keep it as the start of the next one."""
     follower.last[obj.session_uid] = moved.points
     write_displacement(obj, moved.displacement, pose.numbers, moved.state, moved.carried)
     _followed[obj.session_uid].trouble = ""
@@ -164,15 +163,15 @@ def update(obj, depsgraph=None, wanted=State.SETTLED):
     depsgraph : bpy.types.Depsgraph, optional
         Where the handles are read; otherwise as the viewport shows them.
     wanted : State
-        SETTLED whatever that takes; PREPARING to leave factors that have to be made to the timer; QUICK to take one
-        step only, and leave the rest to it.
+        SETTLED at any cost; PREPARING to leave missing factors to the timer; QUICK for one step only, with the rest
+        left to the timer.
     """
     if stale_reason(obj, glance=wanted is not State.SETTLED, trusting=wanted is State.QUICK):
         return
     pose = read_pose(obj, depsgraph)
     shown, follower = shown_state(obj, pose), _followers.get(pose.key)
     if shown is State.SETTLED:
-        _followed[obj.session_uid].trouble = ""  # it was at another pose
+        _followed[obj.session_uid].trouble = ""  # of another pose
     elif wanted is State.SETTLED or (wanted is State.PREPARING and is_prepared(follower)):
         follower, moved = plan_settled(obj, pose)(lambda stage, fraction: None)
         keep(obj, follower)
@@ -184,7 +183,7 @@ def update(obj, depsgraph=None, wanted=State.SETTLED):
 
 
 def update_all(scene, depsgraph, wanted):
-    """Let all bound objects of a scene follow; what goes wrong is for the panel, since nobody called this."""
+    """Update all bound objects of a scene; errors are kept for the panel."""
     with _lock.held() as free:
         for obj in _editable(scene) if free else ():
             try:
@@ -194,7 +193,7 @@ def update_all(scene, depsgraph, wanted):
 
 
 def _note(obj, trouble, pose=None):
-    """Keep what went wrong with an object for the panel, and the pose at which it would again."""
+    """Keep an error of an object for the panel, and the pose that caused it."""
     followed = _followed[obj.session_uid]
     followed.trouble, followed.troubled = trouble, None if pose is None else pose.numbers
 
@@ -204,7 +203,7 @@ def _editable(scene):
 
 
 def _on_settings(obj):
-    """Let an object follow by its new settings of the deformation, in a window; scripts update when they are done."""
+    """Update an object after a change of its settings, in a window; scripts call Update themselves."""
     if is_bound(obj):
         settle_later(obj)
 
@@ -214,13 +213,13 @@ def settle_later(obj):
     followed = _followed[obj.session_uid]
     followed.due = perf_counter() + _IDLE
     if followed.thread is not None and not followed.thread.prepares:
-        followed.thread.work.stop()  # what it settles is past
+        followed.thread.work.stop()  # its pose is outdated
     if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=_TICK)
 
 
 def _tick():
-    """Take what threads have computed, and settle what has come to rest; a timer of the window."""
+    """Write results of threads, and settle resting poses; a timer of the window."""
     if bpy.app.is_job_running("RENDER"):
         return _IDLE
     shown = {}  # each window has a scene of its own
@@ -238,7 +237,7 @@ def _tick():
 
 
 def _attend(obj, depsgraph) -> bool:
-    """Take the result of an object's thread, or start one; say whether there is more to come."""
+    """Write the result of an object's thread, or start one; return whether work is left."""
     followed = _followed[obj.session_uid]
     thread = followed.thread
     try:
@@ -258,12 +257,12 @@ def _attend(obj, depsgraph) -> bool:
             thread.work.show(bpy.context)
     except TROUBLES as error:
         _note(obj, error_text(error), thread and thread.pose)
-        return thread is not None  # else wait for another pose, not to go wrong again at once
+        return thread is not None  # else wait for another pose
     return True
 
 
 def _drop(followed):
-    """End the thread of an object, if there is one."""
+    """Stop the thread of an object, if there is one."""
     thread, followed.thread = followed.thread, None
     if thread is not None:
         thread.work.stop()
@@ -271,29 +270,29 @@ def _drop(followed):
 
 
 def _start(obj, pose):
-    """Start a thread that settles an object, if it is time for that; say whether there is more to come."""
+    """Start a thread that settles an object, if it is due; return whether work is left."""
     followed = _followed[obj.session_uid]
     if shown_state(obj, pose) is State.SETTLED or (followed.trouble and pose.is_same(followed.troubled)):
-        return False  # or it would go wrong again
-    # A setting that is dragged must not start a thread for each value. Before the first factors waiting is of no use.
+        return False  # the error would recur
+    # A dragged setting must not start a thread for each value; the first factors need not wait.
     prepares = not is_prepared(find(obj))
     if prepares and running() is not None:
         return True
     if perf_counter() >= followed.due or all(known[0] != pose.key[0] for known in _followers):
         work = Job("Bind", [], plan_settled(obj, pose, waits=False))
         followed.thread = _Thread(work, pose, prepares)
-        if prepares:  # takes long: it is shown as other work is, and Esc ends it
+        if prepares:  # takes long: shown like other jobs, with Esc to stop
             with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
                 work.open(bpy.context)
     return True
 
 
 def _take(obj, thread, pose):
-    """Write what a thread has computed, unless it is past."""
+    """Write the result of a thread, unless it is outdated."""
     try:
         follower, moved = thread.work.result()
     except Cancelled:
-        if thread.prepares and thread.work.reason == STOPPED:  # by somebody, who does not want it to begin again
+        if thread.prepares and thread.work.reason == STOPPED:  # by the user: do not start again
             work = "Binding" if find(obj) is None else "The exact result"
             _note(obj, f"{work} was stopped. Press Update, or move a handle", pose)
         return
@@ -307,13 +306,13 @@ def _take(obj, thread, pose):
 
 
 def _is_playing():
-    """Whether frames run by in a window, so that there is no time to settle each."""
+    """Whether an animation plays in a window, so that there is no time to settle each frame."""
     windows = bpy.context.window_manager.windows
     return any(window.screen.is_animation_playing or window.screen.is_scrubbing for window in windows)
 
 
 def _soon():
-    """What to want of an update while somebody may be dragging: without a window nobody is."""
+    """Return the state to update to while handles may be dragged, which needs a window."""
     return State.SETTLED if bpy.app.background else State.QUICK
 
 
@@ -346,7 +345,7 @@ def _on_render(scene, *_):
 
 @persistent
 def _forget(*_):
-    """Forget everything about a file when another one is opened."""
+    """Clear everything about a file when another one is opened."""
     for followed in [*_followed.values()]:
         _drop(followed)
     for known in (_followers, _followed):
@@ -368,12 +367,12 @@ _HANDLERS = {
 
 
 def attach():
-    """Begin to follow the handles."""
+    """Add the handlers."""
     add_handlers(_HANDLERS)
 
 
 def detach():
-    """Follow no more: leave no handler, no timer and no thread behind, and give the memory back."""
+    """Remove handlers, timer and threads, and free the memory."""
     remove_handlers(_HANDLERS)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)

@@ -1,6 +1,6 @@
-"""Where the handles of a bound object are, and what its displacements were computed for.
+"""Poses of the handles of bound objects, and the displacements for them.
 
-These are the attribute `lb_displacement`, in local space.
+Displacements are the attribute `lb_displacement`, in local space.
 """
 
 import zlib
@@ -16,7 +16,7 @@ from ..objects.attributes import in_edit_mesh, point_count, positions_now, tag_c
 from ..objects.carried import carries, discs_at_rest, write_moved
 from ..objects.quantities import DISPLACEMENT
 
-POSE = "lb_pose"  # custom property of the mesh: what the displacements were computed for
+POSE = "lb_pose"  # custom property of the mesh: the pose of the displacements
 
 
 class State(Enum):
@@ -24,30 +24,29 @@ class State(Enum):
 
     BAKED = "baked"  # it shows a baked animation, which no handle changes
     STALE = "stale"  # something has changed since it was bound
-    PREPARING = "preparing"  # its handles were moved, and factors have to be made first
-    QUICK = "quick"  # by one step from the last result, on some of the points
-    SETTLED = "settled"  # exactly: by all steps from rest, on all points
+    PREPARING = "preparing"  # handles were moved, and factors are missing
+    QUICK = "quick"  # one step of the coarse solver from the last result
+    SETTLED = "settled"  # all steps on all points, from rest
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the handles of a bound object are, and all else that displacements depend on while the binding holds.
+    """A pose of the handles, with everything else that displacements depend on while the binding is valid.
 
     Attributes
     ----------
     key : tuple
         The `binding_key` of the object.
     changes : dict of str to ndarray, (4, 4)
-        How empties have moved their groups since they were bound, in local space.
+        Transforms of groups by their empties since they were bound, in local space.
     edited : ndarray, (n, 3), or None
         Positions in local space, where some handles are moved in Edit Mode.
     discs : ndarray, (n, 3), or None
-        Those that the display draws at rest, normals times radii: they go along.
+        Of the display at rest, normals times radii, to be deformed with the points.
     steps : int
-        How many a settled result takes.
+        Maximum number of a settled result.
     numbers : ndarray
-        What tells it from others, and is kept in the file: checksums of the settings and of the edited positions, and
-        the numbers of all changes.
+        Its identity, kept in the file: checksums of the settings and of the edited positions, and all transforms.
     """
 
     key: tuple
@@ -58,7 +57,7 @@ class Pose:
     numbers: np.ndarray
 
     def is_same(self, numbers) -> bool:
-        """Whether the displacements of another pose, given by its numbers or None, are the same up to rounding."""
+        """Whether another pose, given by its numbers or None, is the same up to rounding."""
         return (
             numbers is not None
             and numbers.shape == self.numbers.shape
@@ -68,7 +67,7 @@ class Pose:
 
 
 def read_pose(obj, depsgraph=None) -> Pose:
-    """Read where the handles of an object are, as a depsgraph has evaluated them; otherwise as the viewport does."""
+    """Read the pose of an object, evaluated by a depsgraph or else as in the viewport."""
     settings = obj.meshfree.deform
     moved_by = [item for item in settings.handle_items if item.has_empty and is_there(item.empty)]
     changes = {item.name: _empty_change(obj, item, depsgraph) for item in moved_by}
@@ -81,19 +80,19 @@ def read_pose(obj, depsgraph=None) -> Pose:
 
 
 def binding_key(obj) -> tuple:
-    """What the factors of an object that is not stale depend on: its binding, which copies share, and settings."""
+    """Return what the factors of an object depend on: its binding, which copies share, and settings."""
     settings = obj.meshfree.deform
     return settings.binding_id, (settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0)
 
 
 def _empty_change(obj, item, depsgraph):
-    """Return how an empty has moved its handles since they were bound, in local space, (4, 4)."""
+    """Return the transform of handles by their empty since they were bound, in local space, (4, 4)."""
     rest = np.reshape(item.rest, (4, 4)).astype(np.float64)
     return relative_matrix(obj, item.empty, depsgraph) @ np.linalg.inv(rest)
 
 
 def relative_matrix(obj, empty, depsgraph=None):
-    """Return the matrix of an empty in the space of an object, (4, 4) float64, as a depsgraph has evaluated them."""
+    """Return the matrix of an empty in the space of an object, (4, 4) float64, evaluated by a depsgraph."""
     if depsgraph is not None:
         obj, empty = obj.evaluated_get(depsgraph), empty.evaluated_get(depsgraph)
     matrix = np.array(obj.matrix_world, dtype=np.float64)
@@ -105,7 +104,7 @@ def relative_matrix(obj, empty, depsgraph=None):
 
 
 def is_there(obj, scene=None) -> bool:
-    """Whether an object, such as the empty of a handle, is still in a scene, or in some scene."""
+    """Whether an object, such as the empty of a handle, is still in a scene, or in any."""
     if obj is None:
         return False
     scenes = bpy.data.scenes if scene is None else [scene]
@@ -116,7 +115,7 @@ def is_there(obj, scene=None) -> bool:
 
 
 def shown_state(obj, pose) -> State:
-    """Return how an object that is not stale follows its handles to a pose: settled, quick, or not yet."""
+    """Return the state of an object that is not stale at a pose: settled, quick or preparing."""
     known = obj.data.get(POSE)
     if known is None or not pose.is_same(np.array(known[1:])):
         return State.PREPARING
@@ -124,11 +123,9 @@ def shown_state(obj, pose) -> State:
 
 
 def write_displacement(obj, displacement, numbers, state, moved):
-    """Write displacements in local space, (n, 3), what was carried along, by name, and the pose that both are for.
+    """Write displacements in local space, (n, 3), what deforms with the points, by attribute, and their pose.
 
-    The state is SETTLED, or else they are to be found again.
-
-    In Edit Mode displacements alone are in reach.
+    In Edit Mode only displacements can be written. Unless the state is SETTLED, they are computed again.
     """
     data = obj.data
     if in_edit_mesh(obj):
@@ -145,5 +142,5 @@ def write_displacement(obj, displacement, numbers, state, moved):
 
 
 def write_rest(obj):
-    """Write that all points are at rest, where the handles are now."""
+    """Write zero displacements for the present pose."""
     write_displacement(obj, np.zeros((point_count(obj.data), 3)), read_pose(obj).numbers, State.SETTLED, {})

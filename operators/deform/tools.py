@@ -101,7 +101,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
 
     @classmethod
     def description(cls, context, properties):
-        """Say what the button in the panel does; an empty text leaves it to the docstring."""
+        """Return the tooltip of the button in the panel; empty for that of the class."""
         if not properties.at_once:
             return ""
         return (
@@ -125,7 +125,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
                 " used modifiers. Turn on Add Empties."
             )
         if is_bound(obj) and settings.point_count == len(rest) and obj.data.attributes.get(REST) is not None:
-            rest[edited] = read_attribute(obj.data, REST)[edited]  # where they are now they were moved to
+            rest[edited] = read_attribute(obj.data, REST)[edited]  # they have been moved since
         binding = plan_binding(obj, rest, reading.matrix, constraints)
         return lambda progress: (Follower(binding, progress), by_empty, False)
 
@@ -150,7 +150,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         record(obj, rest, binding.matrix, constraints, empties)
         add_deform(obj)
         notify("shape_changed", obj)
-        # Blender crashes when it draws what a render's handlers change, and handles are there to be animated.
+        # Blender crashes when it draws what handlers change during a render.
         context.scene.render.use_lock_interface = True
         live.keep(obj, follower)
         obj.data.pop(POSE, None)
@@ -168,10 +168,10 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
 
 
 def _plan_ends(context, obj):
-    """Read an object without handles; return what finds them and binds it, see `MESHFREE_OT_deform_bind.plan`.
+    """Read an object without handles; return a plan that chooses them and binds it.
 
-    The upper end of the surface is the handle and the other one stays, as what stands on the ground does. Anchors that
-    are there already stay instead, and the handle is the end that is farther from them.
+    The upper end of the surface becomes the handle, the other one the anchor. If there are anchors already, the end
+    farther from them becomes the handle.
     """
     settings, reading = obj.meshfree.deform, read_points(context, obj)
     name, anchors = settings.handles, settings.anchors or ANCHOR
@@ -185,8 +185,8 @@ def _plan_ends(context, obj):
         points, kept = laplacian.points, held > 0.0
         ends = core.opposite_ends(laplacian)
         if kept.any():
-            middle = points[kept].mean(axis=0)
-            ends = sorted(ends, key=lambda rows: np.linalg.norm(points[rows].mean(axis=0) - middle))
+            center = points[kept].mean(axis=0)
+            ends = sorted(ends, key=lambda rows: np.linalg.norm(points[rows].mean(axis=0) - center))
         else:
             ends = sorted(ends, key=lambda rows: points[rows, 2].mean())
         weights = np.zeros(len(points))
@@ -204,7 +204,7 @@ def _plan_ends(context, obj):
 
 
 def _assign_ends(obj, constraints):
-    """Make the groups of handles and anchors that `_plan_ends` has chosen, where they are not there."""
+    """Add the groups of handles and anchors that `_plan_ends` has chosen, where they are missing."""
     if handle_names(obj):  # while it was computed
         raise PointCloudError(f'"{obj.name}" has handles by now. Press Bend again to take these.')
     settings, every = obj.meshfree.deform, np.arange(point_count(obj.data))
@@ -216,7 +216,7 @@ def _assign_ends(obj, constraints):
 
 
 def _add_empty(context, obj, name, rest, rows):
-    """Add an empty in the middle of a group of handles, which goes with the object."""
+    """Add an empty at the center of a group of handles, as a child of the object."""
     points = rest[rows].astype(np.float64)
     empty = bpy.data.objects.new(f"{obj.name} {name}", None)
     empty.empty_display_type = "SPHERE"
@@ -232,7 +232,7 @@ def _add_empty(context, obj, name, rest, rows):
 
 
 def _copy_empty(obj, empty):
-    """Give a copied object an empty of its own, as its original has it, animation included."""
+    """Copy an empty, with its animation, for a copied object."""
     copy = empty.copy()
     copy.parent = obj
     for collection in obj.users_collection:
@@ -243,7 +243,7 @@ def _copy_empty(obj, empty):
 class BoundOperator(HandledOperator):
     """An operator on a bound object."""
 
-    works_stale = False  # whether the handles may have lost their hold
+    works_stale = False  # whether the binding may be stale
 
     @classmethod
     def obstacle(cls, context):
@@ -255,7 +255,7 @@ class BoundOperator(HandledOperator):
         if not self.works_stale:
             check_fresh(obj)
             context.view_layer.update()
-            live.update(obj)  # all steps, should only the first one have been taken
+            live.update(obj)  # settles a quick result
         empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
         with all_or_nothing([obj, *empties]):
             line = self.change(context, obj)
@@ -264,7 +264,7 @@ class BoundOperator(HandledOperator):
 
 
 def not_bound(obj) -> str:
-    """Say that an object is not bound, and what to do; empty if it is."""
+    """Return that an object is not bound, and what to do; empty if it is."""
     return "" if is_bound(obj) else f'"{obj.name}" is not bound. Bind it to its handles first'
 
 
@@ -344,7 +344,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
 
 
 def keyed_empties(obj) -> list:
-    """Return the empties that keyframes move and that move this object alone, so that these go when it is applied."""
+    """Return the empties with keyframed transforms that move this object alone: applying removes these keyframes."""
     items = [item for item in obj.meshfree.deform.handle_items if item.has_empty and is_there(item.empty)]
     others = [other for other in bound_objects() if other != obj]
     shared = {item.empty for other in others for item in other.meshfree.deform.handle_items}
@@ -366,7 +366,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
     bl_label = "To Shape Key"
 
     def change(self, context, obj):
-        if obj.type != "MESH" or has_splats(obj.data):  # keys hold places alone
+        if obj.type != "MESH" or has_splats(obj.data):  # shape keys hold positions only
             return self._store(context, obj)
         check_movable(obj, "SHAPE_KEY")
         constraints = read_constraints(obj)
@@ -384,7 +384,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
         return f'{obj.name}: the deformation is the shape key "{key.name}"'
 
     def _store(self, context, obj):
-        """Keep the deformation as attributes that a modifier shows."""
+        """Store the deformation as attributes, shown by a modifier."""
         data, name = obj.data, _free_name(obj, "Deform")
         moved = shown_moved(obj, get_input(find_deform(obj), "Strength"))
         kept = [item for item in carried(data) if item.moved in moved]
@@ -397,7 +397,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
 
 def _free_name(obj, name):
-    """Return a name, with a number if need be, that no attribute, vertex group or modifier of an object has."""
+    """Return a name, numbered if necessary, that no attribute, vertex group or modifier of an object has."""
     taken = {item.name for items in (obj.data.attributes, obj.vertex_groups, obj.modifiers) for item in items}
     names = [name, *(f"{name}.{number:03d}" for number in range(1, len(taken) + 2))]
     return next(each for each in names if each not in taken)
@@ -427,7 +427,7 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
     )
 
     def change(self, context, obj):
-        others = [other for other in bpy.data.objects if other != obj]  # copies, too, which may be bound to them again
+        others = [other for other in bpy.data.objects if other != obj]  # including copies, which may be bound again
         used = {item.empty for other in others for item in other.meshfree.deform.handle_items}
         empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
         put_back(context, obj)
@@ -447,9 +447,9 @@ def shown_displacement(obj):
 
 
 def put_back(context, obj):
-    """Put handles and points of a bound object to where they were bound, as far as its points are still the same.
+    """Reset handles and points of a bound object to rest, points only if their number is unchanged.
 
-    Handles of the object that it is a copy of stay where they are.
+    Handles of the original of a copy are not moved.
     """
     settings = obj.meshfree.deform
     own = copied_from(obj) is None
@@ -470,7 +470,7 @@ def put_back(context, obj):
 
 
 def delete_bake(obj):
-    """Let a baked object follow its handles again, and remove what was baked."""
+    """Remove the bake of an object, so that it follows its handles again."""
     modifier = find_deform(obj)
     cache = get_input(modifier, "Cache")
     show_live(modifier)

@@ -1,4 +1,4 @@
-"""Options of the command line: those of settings of the panels, and places."""
+"""Options of the command line for settings, and positions."""
 
 import argparse
 import math

@@ -1,4 +1,4 @@
-"""Verbs of the command line that need no object: what a file of splats holds, and bending of points and splats."""
+"""Verbs of the command line that need no object: summaries of splat files, and deformation of points and splats."""
 
 import json
 from dataclasses import replace
@@ -11,16 +11,16 @@ from ...core import PointCloudError
 from ...core.files import WRITABLE, PointTable, write_points
 from .verbs import ONE_LINE, Verb
 
-_SHARES = (0.01, 0.5, 0.99)  # quantiles that are told
-_FLAT = 0.3  # of the middle axis, below which the shortest one makes a splat flat
+_SHARES = (0.01, 0.5, 0.99)  # quantiles that are printed
+_FLAT = 0.3  # ratio of the shortest to the middle axis below which a splat is flat
 
 
 class SplatInfo(Verb):
-    """The verb `splat-info`: what a file of splats holds."""
+    """The verb `splat-info`: a summary of a file of splats."""
 
     name = "splat-info"
-    help = "what files of Gaussian splats hold"
-    description = f"What files of Gaussian splats hold. {ONE_LINE}"
+    help = "summarize files of Gaussian splats"
+    description = f"Summarize files of Gaussian splats. {ONE_LINE}"
     inputs = "files of splats"
 
     def run(self, path, arguments, output):
@@ -43,7 +43,7 @@ class SplatInfo(Verb):
 
 
 class Deform(Verb):
-    """The verb `deform`: the points, or the splats, of a file are moved by handles that a JSON file names."""
+    """The verb `deform`: deform the points or splats of a file by handles in a JSON file."""
 
     name = "deform"
     help = "move points or Gaussian splats by handles that a JSON file names"
@@ -88,7 +88,7 @@ class Deform(Verb):
 
 
 def _read_handles(path):
-    """Read what a JSON file says of handles and anchors."""
+    """Read handles and anchors from a JSON file."""
     try:
         wanted = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -105,7 +105,7 @@ def _read_handles(path):
 
 
 def _moves(wanted, points):
-    """Return the indices of the points that are moved, and where to."""
+    """Return the indices of the handles, and their target positions."""
     members = [_members(one, points, "handles") for one in wanted["handles"]]
     goals = [_goal(one, points[rows]) for one, rows in zip(wanted["handles"], members, strict=True)]
     rows = np.concatenate(members)
@@ -115,7 +115,7 @@ def _moves(wanted, points):
 
 
 def _members(one, points, name):
-    """Return the indices of the points that a handle takes: named ones, or those in a ball."""
+    """Return the indices of the points of a handle: listed ones, or those in a ball."""
     if "indices" in one:
         rows = _numbers(one["indices"], (-1,), "indices")
         if not np.isin(rows, np.arange(len(points))).all():
@@ -131,7 +131,7 @@ def _members(one, points, name):
 
 
 def _goal(one, points):
-    """Return where the points of a handle go."""
+    """Return the target positions of the points of a handle."""
     if "positions" in one:
         return _numbers(one["positions"], points.shape, "positions")
     if "matrix" in one:

@@ -1,4 +1,4 @@
-"""Columns of files whose digits single precision would lose: what an object remembers of them."""
+"""Columns of files whose digits single precision would lose, and how an object stores them."""
 
 import json
 from typing import NamedTuple
@@ -10,32 +10,32 @@ from ...core.files import Digits, join_digits
 from ..objects.attributes import point_count, read_attribute
 from ..objects.place import COLUMNS
 
-RENAMED = "file_"  # before names of columns that Blender keeps for itself
+RENAMED = "file_"  # prefix of columns whose names Blender reserves
 _LARGEST = float(np.finfo(np.float32).max)
 
 
 class Column(NamedTuple):
-    """How a column is kept in attributes of an object: by what it is put together, and where a second part is."""
+    """How a column is stored in attributes: how its parts are joined, and the attribute of the second one."""
 
     digits: Digits
     second: str = ""
 
 
 def remember_columns(obj, columns):
-    """Keep on an object how columns are kept, `Column` by the names of attributes, and for how many points."""
+    """Keep on an object how columns are stored, `Column` by attribute, and the number of points."""
     if columns:
         kept = {name: {**column.digits._asdict(), "second": column.second} for name, column in columns.items()}
         obj[COLUMNS] = json.dumps({"points": point_count(obj.data), "columns": kept})
 
 
 def kept_columns(obj) -> dict:
-    """Return how columns of an object are kept, `Column` by the names of attributes."""
+    """Return how columns of an object are stored, `Column` by attribute."""
     kept = json.loads(obj.get(COLUMNS, "{}")).get("columns", {})
     return {name: Column(second=found.pop("second"), digits=Digits(**found)) for name, found in kept.items()}
 
 
 def doubted_columns(obj) -> list:
-    """Return a notice if an object has points of others, by Blender's Join, whose columns may be kept otherwise."""
+    """Return a notice if an object has points of others, by Blender's Join, with possibly other offsets."""
     names = [name for name in kept_columns(obj) if name in obj.data.attributes]
     if not names or point_count(obj.data) <= json.loads(obj[COLUMNS])["points"]:
         return []
@@ -43,7 +43,7 @@ def doubted_columns(obj) -> list:
 
 
 def known_digits(name):
-    """Return how a column of some name is kept by another object, or None: objects that share that can be joined."""
+    """Return how another object stores a column of this name, to keep both joinable, or None."""
     columns = (kept_columns(obj).get(name) for obj in bpy.data.objects)
     return next((column.digits for column in columns if column is not None), None)
 
@@ -63,7 +63,7 @@ def read_columns(obj, names) -> dict:
 
 
 def column_notices(obj, attributes) -> list:
-    """Return notices of the columns of a file, by name, whose names or numbers an object keeps otherwise."""
+    """Return notices of columns of a file, by name, that are renamed or stored in another form."""
     there = obj.data.attributes
     kept = kept_columns(obj).items()
     notices = [f"{obj.name}: {_description(name, *column)}; exports write it as it was" for name, column in kept]
@@ -79,14 +79,14 @@ def column_notices(obj, attributes) -> list:
 
 
 def _too_large(values):
-    """Return how many numbers single precision cannot hold."""
+    """Count the numbers beyond single precision."""
     if values.dtype != np.float64:
         return 0
     return np.count_nonzero(np.isfinite(values) & (np.abs(values) > _LARGEST))
 
 
 def _description(name, digits, second):
-    """Say how a column is kept."""
+    """Describe how a column is stored."""
     offset = digits.offset if isinstance(digits.offset, list) else [digits.offset]
     parts = f" in two parts, {name} and {second}" if second else ""
     less = f" less {', '.join(f'{value:,.15g}' for value in offset)}" if any(offset) else ""

@@ -24,19 +24,19 @@ def attach():
 
 
 def detach():
-    """Take the command away again."""
+    """Remove the command from Blender."""
     while _handles:
         bpy.utils.unregister_cli_command(_handles.pop())
 
 
 def make_verbs():
-    """Return all verbs: the analysis, those of tools in the order of the menu, and those that need no object."""
+    """Return all verbs: the analysis, tools in the order of the menu, and those without an object."""
     tools = [tool for group in registration.groups("menu", "Object") for tool in group if tool.verb]
     return [Analyze(), *map(_verb, tools), SplatInfo(), Deform()]
 
 
 def _verb(tool):
-    """Return the verb of a tool: its own, where it takes more than settings, or one for all tools."""
+    """Return the verb of a tool: one of its own if it needs more than settings, or the common one."""
     if tool.name in _OWN:
         return _OWN[tool.name]()
     group = getattr(bpy.ops.meshfree, tool.name).get_rna_type().properties.get("group")
@@ -59,7 +59,7 @@ def run(argv) -> int:
     """
     try:
         verb, arguments = _parse(argv)
-    except SystemExit as stop:  # how argparse ends after --help and wrong usage; Blender itself shall end in order
+    except SystemExit as stop:  # from argparse after --help and wrong usage
         return stop.code or 0
     failed = False
     for path in arguments.inputs:
@@ -67,13 +67,13 @@ def run(argv) -> int:
             result = _process(verb, path, arguments)
         except (PointCloudError, OSError, RuntimeError) as error:  # Blender's importers raise RuntimeError
             failed = True
-            result = {"error": str(error).strip().removeprefix("Error: ")}  # as operators raise what they report
+            result = {"error": str(error).strip().removeprefix("Error: ")}  # the prefix of reported errors
         print(json.dumps({"file": str(path), **result}), flush=True)
     return 1 if failed else 0
 
 
 def _parse(argv):
-    """Return the verb that is asked for, and its arguments."""
+    """Return the requested verb and its arguments."""
     parser = argparse.ArgumentParser(prog="blender --command meshfree")
     commands = parser.add_subparsers(dest="command", required=True)
     verbs, parsers = {}, {}
@@ -114,7 +114,7 @@ def _add_files(parser, verb):
 
 
 def _frames(path):
-    """Return the numbered files of a folder, or what is no folder itself."""
+    """Return the numbered files of a folder, or the file itself."""
     return numbered_files(path) if path.is_dir() else [path]
 
 
@@ -125,7 +125,7 @@ def _output_path(path, arguments):
 
 
 def _process(verb, path, arguments) -> dict:
-    """Work on one file, write its output, and return what to print."""
+    """Process one file, write its output, and return what to print."""
     output = _output_path(path, arguments)
     for read in (path, *(Path(getattr(arguments, name)) for name in verb.reads)):
         if output is not None and output.resolve() == read.resolve():

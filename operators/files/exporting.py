@@ -20,18 +20,19 @@ from ..running import cache
 from ..running.application import build_operator
 from ..running.job import JobOperator
 from ..running.ready import reporting
+from ..tools.splats import SplatOperator
 from .objects import analysis_arrays, file_filter, point_table, save_arrays
 from .splats import splats_in_world, splats_to_write
 
 
 class ExportOperator(JobOperator, ExportHelper):
-    """An operator that writes one file about the active object; an older file stays if that fails.
+    """An operator that writes a file about the active object; an older file is kept if that fails.
 
-    A subclass has a method `plan`, which reads all that is needed and returns a function of a path and a progress
-    callback that writes the file, without touching Blender, and returns a line for the status bar, or notices and it.
+    A subclass has a method `plan`, which reads everything needed and returns a function of a path and a progress
+    callback that writes the file, without access to Blender, and returns a line for the status bar, or notices and it.
     """
 
-    bl_options = {"REGISTER", "PRESET"}  # nothing of the scene is changed
+    bl_options = {"REGISTER", "PRESET"}  # the scene is not changed
 
     def invoke(self, context, event):
         self._attended = True
@@ -53,7 +54,7 @@ class ExportOperator(JobOperator, ExportHelper):
         return self.work(context, [], lambda progress: write(path, progress))
 
     def finish(self, context, objects, results):
-        """Tell what was written."""
+        """Report what was written."""
         *notices, line = [results] if isinstance(results, str) else results
         for notice in notices:
             self.warn(notice, context.object)
@@ -108,7 +109,7 @@ class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
         return write
 
 
-class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
+class MESHFREE_OT_export_splats(ExportOperator, SplatOperator, bpy.types.Operator):
     """Export Gaussian splats to a PLY file, as deformations show them: of the active object, or of all selected ones"""
 
     bl_idname = "meshfree.export_splats"
@@ -123,13 +124,6 @@ class MESHFREE_OT_export_splats(ExportOperator, bpy.types.Operator):
         description="Write all selected objects of splats to one file, in world space",
         default=True,
     )
-
-    @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or has_splats(context.object.data):
-            return reason
-        return f'"{context.object.name}" holds no Gaussian splats. Import a file of splats'
 
     def plan(self, context, obj):
         objects = [each for each in context.selected_objects if each.type in TYPES and has_splats(each.data)]

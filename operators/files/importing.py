@@ -1,4 +1,4 @@
-"""File > Import: points of files as objects, coordinates of any size with all their digits."""
+"""File > Import: points of files as objects, with all digits of large coordinates."""
 
 import os
 from dataclasses import replace
@@ -40,11 +40,11 @@ from .splats import add_splats, is_drawn, mark
 
 OWN = tuple(
     suffix for suffix in (*READABLE, *SPLATS) if suffix not in (".ply", ".obj")
-)  # Blender reads those by itself, too
+)  # which Blender reads itself, too
 
-_QUICK = 80_000  # points whose discs are found in less than two seconds
-_DEPTH = 10.0  # how far a view looks beyond what it has in its middle
-_DRAWN = 200_000  # splats whose ellipsoids are drawn by themselves
+_QUICK = 80_000  # points whose discs take less than two seconds
+_DEPTH = 10.0  # clipping distance of views relative to that of their center
+_DRAWN = 200_000  # splats whose ellipsoids are drawn at once
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
 if bpy.app.version >= (4, 5, 0):
     _KINDS.append(("POINTCLOUD", "Point Cloud", "A point cloud object, which shows its points by itself"))
@@ -138,7 +138,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
 
     @property
     def asks(self):
-        """Names of the settings: some are those of sequences, and of a kind of file; of text until one is chosen."""
+        """Names of the settings; some only for sequences or for a kind of file; those of text until one is chosen."""
         sequence = ("sequence", "numbers") if self.sequence else ("sequence",)
         suffixes = {path.suffix.lower() for path in self._chosen()}
         scans = ("classes", "withheld") if suffixes & {*SCANS} else ()
@@ -166,7 +166,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         return self.work(context, [], lambda progress: _read_all(paths, columns, choices, surface, progress))
 
     def _chosen(self):
-        """Return the files that are named."""
+        """Return the chosen files."""
         names = [item.name for item in self.files if item.name]
         folder = Path(bpy.path.abspath(self.directory))
         return [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
@@ -218,12 +218,12 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         _convert(context, every if self.kind == "POINTCLOUD" else clouds)
         for obj in every:
             obj.select_set(True)
-            deselect(obj.data)  # else the first group would hold all points
+            deselect(obj.data)  # else the first assignment to a group would include all points
         for obj in clouds:
             mark(obj.data)
             if self.surface and not self.sequence and point_count(obj.data) <= _DRAWN and not is_drawn(obj.data):
                 notify("splats_found", obj)
-        for obj in surfaces:  # Convert would have taken discs for points
+        for obj in surfaces:  # after conversion, which would apply them
             notify("surface_found", obj)
         colored = [obj for obj in every if obj not in surfaces and own_colors(obj.data)]
         for objects in [colored] if self.sequence and colored else [[obj] for obj in colored]:
@@ -241,14 +241,14 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         return obj
 
     def _join(self, context):
-        """Let one object show those just imported: one at each frame from the scene's first one on, or by numbers."""
+        """Add an object that shows the imported ones: one per frame from the first of the scene, or by numbers."""
         frames, first = context.selected_objects, context.scene.frame_start
         name = self._paths[0].stem.rstrip("0123456789_-. ") or "Sequence"
         numbers = [frame_number(path) for path in self._paths] if self.numbers else range(first, first + len(frames))
         sequence = add_sequence(context, name, frames, numbers)
         sequence.select_set(True)
         context.view_layer.objects.active = sequence
-        for frame in frames:  # which nobody selects
+        for frame in frames:  # which are seldom selected
             for notice in frame.meshfree.notices:
                 text = notice.text if frame.name in notice.text else f"{frame.name}: {notice.text}"
                 keep(sequence, notice.tool, text, notice.level)
@@ -284,28 +284,28 @@ def _convert(context, objects):
 
 
 def _frame_selected(context):
-    """Let all 3D views of the window look at what is selected."""
+    """Frame the selected objects in all 3D views of the window."""
     for area in context.window.screen.areas:
         if area.type == "VIEW_3D":
             region = next(region for region in area.regions if region.type == "WINDOW")
             with context.temp_override(area=area, region=region):
                 bpy.ops.view3d.view_selected()
                 space, view = area.spaces.active, area.spaces.active.region_3d
-                space.clip_end = max(space.clip_end, _DEPTH * view.view_distance)  # or a large scan would not be seen
+                space.clip_end = max(space.clip_end, _DEPTH * view.view_distance)  # else large scans are clipped
 
 
 def _read_all(paths, columns, choices, surface, progress):
-    """Read some files, those that were just read from memory: Adjust Last Operation imports them again.
+    """Read files, kept ones from memory, since Adjust Last Operation imports again.
 
     Returns
     -------
     list of (PointTable, ndarray or str or None)
-        With each table how the display is to draw its points as a surface, if that is wanted, or why it cannot.
+        Each table with the discs of its points, if requested, or why there are none.
     """
     tables = []
     for number, path in enumerate(paths):
         progress("Read", number / len(paths))
-        state = path.stat() if os.path.isfile(path) else None  # which asks no folder that may not be read
+        state = path.stat() if os.path.isfile(path) else None  # which reads no folder without permission
         key = ("file", str(path), state and (state.st_mtime_ns, state.st_size), columns, choices)
         tables.append(cache.fetch(key, lambda path=path: read_file(path, columns, choices)))
     if not surface:
@@ -319,8 +319,8 @@ def _read_all(paths, columns, choices, surface, progress):
 
 
 def _find_discs(points, progress):
-    """Find how the display is to draw points as a surface, (n, 3); a text where they are none."""
-    points = points - points.mean(axis=0)  # far from the origin their squares would have no digits left
+    """Return the discs of points for the display, (n, 3); a text if they form no surface."""
+    points = points - points.mean(axis=0)  # squares of large coordinates would lose all digits
     try:
         found = cache.fetch(cache.content("discs", points), lambda: core.surface_discs(points, progress=progress))
         shown = discs(found.normals, found.radii, points)

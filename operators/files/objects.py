@@ -1,4 +1,4 @@
-"""Objects of point files and point files of objects, for the menus and the command line."""
+"""Conversion between objects and point files, for the menus and the command line."""
 
 import bpy
 import numpy as np
@@ -36,7 +36,7 @@ _PART = 5  # of them for the suffix of the second part of a column
 
 
 def file_filter(*suffixes):
-    """Return the property that lets file browsers list only names with these endings, to annotate an operator with."""
+    """Return the operator property that filters file browsers by these endings."""
     return StringProperty(
         name="File Filter",
         description="Names of files that are listed",
@@ -46,7 +46,7 @@ def file_filter(*suffixes):
 
 
 def read_file(path, columns="", las=_ALL):
-    """Read a file, as splats where it holds such.
+    """Read a file, as splats if it holds splats.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def read_file(path, columns="", las=_ALL):
 def add_object(name, table, collection, known=None, with_attributes=True):
     """Add an object of loose vertices.
 
-    Its coordinates are those of the table less an offset, which the object keeps in double precision.
+    Its coordinates are those of the table, less an offset that the object keeps in double precision.
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ def add_object(name, table, collection, known=None, with_attributes=True):
     table : PointTable
     collection : bpy.types.Collection
     known : ndarray, (3,), optional
-        The offset of other objects, taken if the points are near enough.
+        The offset of other objects, shared if the points are near enough.
     with_attributes : bool
-        Whether the other columns come along, too.
+        Whether to add the other columns.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def add_object(name, table, collection, known=None, with_attributes=True):
 
 
 def _add_parts(mesh, name, values):
-    """Add a column of a file as an attribute, or two if one has too few digits; return `Column` by name if it has."""
+    """Add a column of a file as an attribute, or two if one has too few digits; then return `Column` by name."""
     if name.startswith(PREFIX) or (name in (SCANNER, FILE_NORMAL) and values.ndim == 2):
         add_column(mesh, name, values)
         return {}
@@ -123,7 +123,7 @@ def _add_parts(mesh, name, values):
 
 
 def add_column(mesh, name, values):
-    """Add a column of a file as an attribute, our own by the types that they have; return its name in Blender."""
+    """Add a column of a file as an attribute, our own in their types; return its name in Blender."""
     if values.ndim == 2:
         kind = "FLOAT_VECTOR"
     elif name.startswith(PREFIX) and type_of(name) != "FLOAT_VECTOR":
@@ -133,7 +133,7 @@ def add_column(mesh, name, values):
     name = name.encode()[:_LONGEST_NAME].decode(errors="ignore")
     free = name not in mesh.attributes and not name.startswith(".")  # which hides an attribute
     layer = mesh.attributes.new(name, kind, "POINT") if free else None
-    if layer is None:  # Blender keeps a few names for itself, each for one type
+    if layer is None:  # Blender reserves some names, each for one type
         layer = mesh.attributes.new(f"{RENAMED}{name}", kind, "POINT")
     name = layer.name
     write_attribute(mesh, name, values, kind)
@@ -147,7 +147,7 @@ def _fit(values):
 
 
 def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
-    """Return an object's points as they are seen, in the world and before the shift by an import, with attributes.
+    """Return an object's displayed points, in world space without the import offset, with attributes.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     attributes : {"ALL", "RESULTS", "NONE"}
         RESULTS are those of this extension alone.
     with_colors : bool
-        Whether the color attribute comes along.
+        Whether to include the color attribute.
 
     Returns
     -------
@@ -209,9 +209,9 @@ def _read_colors(data):
 
 
 def group_of(obj, name):
-    """Return the name of an object's group; of a mesh that has a column of that name instead, of a group made of it.
+    """Return the name of an object's group, added from the column of that name if a mesh has no such group.
 
-    Weights are its numbers, from 0 to 1; of whole numbers all but 0 count.
+    Numbers from 0 to 1 become weights; of whole numbers all but 0 count.
     """
     column = None if obj.type != "MESH" or has_group(obj, name) else obj.data.attributes.get(name)
     if column is None or not _is_column(column):
@@ -250,13 +250,13 @@ def faces_of(obj):
 
 
 def save_arrays(path, arrays):
-    """Write arrays by name; an older file stays if that fails."""
-    with replacing(path) as part, part.open("wb") as file:  # by name, numpy would write to another with its own ending
+    """Write arrays by name; an older file is kept if that fails."""
+    with replacing(path) as part, part.open("wb") as file:  # to a path, numpy would add its own ending
         np.savez(file, **arrays)
 
 
 def analysis_arrays(place, built, spectrum) -> dict:
-    """Return all arrays of an analysis, numbers in double precision, lengths and axes of the world.
+    """Return all arrays of an analysis, in double precision, in lengths and axes of the world.
 
     Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it.
 
@@ -283,13 +283,13 @@ def analysis_arrays(place, built, spectrum) -> dict:
 
 
 def file_points(obj):
-    """Return the points of an object in the world and before the shift by an import, (n, 3) float64."""
+    """Return the points of an object in world space without the import offset, (n, 3) float64."""
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     return own_positions(obj.data).astype(np.float64) @ matrix.T + place_of(obj)
 
 
 def attribute_arrays(obj):
-    """Return the points in the world, and what this extension wrote by its names without the lb_."""
+    """Return the points in world space, and the attributes of this extension by name without lb_."""
     arrays = {"points": file_points(obj)}
     for attribute in obj.data.attributes:
         if attribute.name.startswith(PREFIX) and attribute.name not in ONLY_DRAWN:

@@ -1,4 +1,4 @@
-"""Files that the command line opens in place of all that is loaded, and files that it writes."""
+"""Opening and writing files on the command line."""
 
 import bpy
 
@@ -16,7 +16,7 @@ from .splats import add_splats, splats_to_write, with_results
 
 
 def load(path, name: str = "", option: str = "--object", read=read_file):
-    """Open a file in place of everything that is loaded.
+    """Open a file in place of the loaded one.
 
     Parameters
     ----------
@@ -25,21 +25,21 @@ def load(path, name: str = "", option: str = "--object", read=read_file):
     name : str
         The object's name; empty for the active one, or else the only mesh.
     option : str
-        Of the command line, by which one names it.
+        Of the command line for the name.
     read : callable
-        What reads a file that is no .blend, of a path.
+        Function of a path that reads files other than .blend.
 
     Returns
     -------
     bpy.types.Object
         The object to work on.
     list of str
-        What of the file was left out.
+        What was left out of the file.
 
     Raises
     ------
     PointCloudError
-        There is no such file, or no such object in it, or no points.
+        The file or the object is missing, or has no points.
     """
     notices = []
     if path.suffix.lower() != ".blend":
@@ -76,10 +76,10 @@ def _choose_object(path, name, option):
 
 
 def save(path, obj, arrays, shown="") -> list:
-    """Write the result to a file of one of the kinds in `OUTPUTS`: the scene, points or splats, or the arrays by name.
+    """Write the result to a file of a kind in `OUTPUTS`: the scene, points or splats, or the arrays by name.
 
-    The scene shows the attribute `shown`, or else another result that the points have, or their own colors. Returns
-    what is written otherwise than it is.
+    The scene shows the attribute `shown`, or else another result of the points, or their own colors. Returns notices of
+    what is written in another form.
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
@@ -102,6 +102,6 @@ def save(path, obj, arrays, shown="") -> list:
 
 
 def save_scene(path):
-    """Write all that is open to a .blend file."""
+    """Write the loaded file to a .blend file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()))

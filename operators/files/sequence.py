@@ -1,4 +1,4 @@
-"""A sequence: one object that shows, at each frame of the scene, one object of a collection, by nodes alone."""
+"""Sequences: an object whose nodes show one object of a collection at each frame of the scene."""
 
 import bpy
 
@@ -9,8 +9,8 @@ from ..objects.node_trees import TreeBuilder
 
 NAME = "Mesh-Free Sequence"
 FIRST, STEP = "First Frame", "Frame Step"  # inputs of the nodes, beside the collection
-FRAME = "frame"  # attribute of its points, one for each object: from which frame on that is shown, less the first
-_NUMBERS = "Frame Numbers"  # name of the node that reads them; nodes of earlier versions have none
+FRAME = "frame"  # attribute of its points, one for each object: first frame of that object, less that of the sequence
+_NUMBERS = "Frame Numbers"  # name of the node that reads them; missing in nodes of earlier versions
 _LAST = 1_048_574  # frame of Blender
 _INPUTS = (  # of the nodes
     (COLLECTION, "Collection", "Collection whose objects are shown one after the other, by name"),
@@ -27,9 +27,8 @@ _INPUTS = (  # of the nodes
 def add_sequence(context, name: str, frames, numbers):
     """Add an object that shows other objects one after the other, which move to a collection of their own.
 
-    Nodes choose by the frame of the scene, so that renders, undo and saved files need nothing else. They take the
-    objects of the collection in the order of their names, numbers by their size, and from which frame on each is shown
-    from the points of the object, one for each of them.
+    Nodes choose by the frame of the scene, so that renders, undo and saved files need no handler. They use the objects
+    of the collection in natural order of their names; the points of the object, one for each, have their first frames.
 
     Parameters
     ----------
@@ -72,7 +71,7 @@ def add_sequence(context, name: str, frames, numbers):
     for view_layer in context.scene.view_layers:
         for layer in _layers(view_layer.layer_collection):
             if layer.collection == collection:
-                layer.exclude = True  # or all of its objects would be seen at once; nodes take them all the same
+                layer.exclude = True  # hides its objects; nodes use them all the same
     return sequence
 
 
@@ -88,7 +87,7 @@ def _known_group():
 
 
 def _new_group():
-    """Make the nodes: the last object, by its place among the others, whose number of steps since the first is over."""
+    """Make nodes that show the last object whose first frame, in steps, is not after that of the scene."""
     group = new_group(NAME, SEQUENCE_TAG, _INPUTS)
     tree = TreeBuilder(group)
     given = tree.node("NodeGroupInput").outputs

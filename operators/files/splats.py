@@ -1,4 +1,4 @@
-"""Objects of files of Gaussian splats, and files of such objects."""
+"""Conversion between objects and files of Gaussian splats."""
 
 from dataclasses import replace
 
@@ -42,7 +42,7 @@ def add_splats(name, splats, collection, known=None, up="Z"):
     splats : Splats
     collection : bpy.types.Collection
     known : ndarray, (3,), optional
-        The offset of other objects, taken if the splats are near enough.
+        The offset of other objects, shared if the splats are near enough.
     up : {"Z", "Y", "-Y"}
         Axis of the file that points upwards.
 
@@ -99,7 +99,7 @@ def _keep_file(obj, splats):
 
 
 def _known_columns(splats):
-    """Return the names of the columns that splats are made of."""
+    """Return the names of the columns that splats contain."""
     rest = splats.harmonics.shape[1]
     per_channel = sum(name.startswith("f_rest_") for name in splats.file.columns) // 3
     numbers = (per_channel * channel + number for channel in range(3) for number in range(rest))
@@ -119,13 +119,13 @@ def is_drawn(data) -> bool:
 
 
 def splats_to_write(obj):
-    """Return the splats of an object as a deformation shows them, where they were in their file, with what it held."""
+    """Return the deformed splats of an object in the coordinates of their file, with its other data."""
     splats = _with_file(obj)
     return replace(splats, positions=splats.positions + own_offset(obj))
 
 
 def splats_in_world(objects):
-    """Return the splats of objects as they are seen, in the world and before any shift, with what their files held."""
+    """Return the displayed splats of objects, in world space without offsets, with the other data of their files."""
     return core.splats.joined([_placed(obj) for obj in objects])
 
 
@@ -137,7 +137,7 @@ def _placed(obj):
 
 
 def _with_file(obj):
-    """Return the splats of an object as a deformation shows them, in local space, with what their file held."""
+    """Return the deformed splats of an object in local space, with the other data of their file."""
     splats, data, known = shown_splats(obj), obj.data, read_format(obj)
     positions = with_digits(data, splats.positions.astype(np.float32))
     if known is None:
@@ -159,7 +159,7 @@ def _with_file(obj):
 
 
 def with_results(splats, data):
-    """Return splats to be written with the results that their points hold, as columns of the file beside its own."""
+    """Return splats to be written with the results of their points as further columns of the file."""
     columns = {} if splats.file is None else dict(splats.file.columns)
     for layer in data.attributes:
         if layer.name.startswith(PREFIX) and layer.name not in ONLY_DRAWN and layer.data_type in STORABLE:

@@ -1,4 +1,4 @@
-"""Verbs of tools that take more than settings: places, other files, or another kind of output."""
+"""Verbs of tools that need more than settings: positions, other files, or other outputs."""
 
 from pathlib import Path
 
@@ -20,11 +20,11 @@ from . import opening
 from .arguments import as_place, place
 from .verbs import LEFT_OUT, Apply
 
-_PLACES = "--at"  # group of the points nearest to places
+_PLACES = "--at"  # group of the points nearest to given positions
 
 
 class FromSources(Apply):
-    """A tool that starts at some points: those of a group, or those nearest to places."""
+    """A tool with source points: those of a group, or those nearest to given positions."""
 
     def add_options(self, parser):
         parser.add_argument(
@@ -32,8 +32,8 @@ class FromSources(Apply):
             type=place,
             action="append",
             metavar="X,Y,Z",
-            help="place in the coordinates of the file: the nearest point is a source. Give it once for each source, as"
-            " --at=X,Y,Z where X is below zero",
+            help="position in the coordinates of the file: the nearest point is a source. Give it once for each source,"
+            " as --at=X,Y,Z where X is below zero",
         )
         super().add_options(parser)
 
@@ -41,7 +41,7 @@ class FromSources(Apply):
         if arguments.at and arguments.group:
             parser.error("--at and --group both say which points are the sources: give one of them")
         known = arguments.at or arguments.group or all(path.suffix.lower() == ".blend" for path in arguments.inputs)
-        if not known:  # other files have no default group, and nothing selected
+        if not known:  # other files have no default group and no selection
             parser.error("nothing says which points are the sources: give --at X,Y,Z, or --group with a column's name")
 
     def prepare(self, tool, obj, path, arguments):
@@ -121,7 +121,7 @@ class CompareWith(Apply):
 
     def __init__(self):
         super().__init__("compare", _CompareWithFile)
-        self.help = "how far points are from the surface of those of another file"
+        self.help = "signed distance of points from the surface of those of another file"
         self._reference = None
 
     def add_options(self, parser):
@@ -130,7 +130,7 @@ class CompareWith(Apply):
             type=Path,
             required=True,
             metavar="FILE",
-            help="point cloud whose surface distances are measured from, of the kinds of inputs",
+            help="point cloud from whose surface distances are measured, of the kinds of inputs",
         )
         parser.add_argument(
             "--reference-object",
@@ -141,7 +141,7 @@ class CompareWith(Apply):
         super().add_options(parser)
 
     def run(self, path, arguments, output):
-        if self._reference is None:  # before the input, which takes its place in Blender
+        if self._reference is None:  # before the input, which replaces it in Blender
             self._reference = self._read(arguments)
         result = super().run(path, arguments, output)
         return {**result, "notices": self._reference.notices + result["notices"]}
@@ -167,7 +167,7 @@ class CompareWith(Apply):
 
 
 class _Reference:
-    """A cloud that others are compared with: its operator is built once, when the first of them asks for it."""
+    """A cloud that others are compared with: its operator is built once, for the first of them."""
 
     def __init__(self, name, place, build, notices):
         self.name, self.place, self.notices = name, place, notices
@@ -180,7 +180,7 @@ class _Reference:
 
 
 class _CompareWithFile(Compare):
-    """The same tool, with a cloud that is no object of the scene, both in the coordinates of their files."""
+    """The same tool, with a cloud that is not in the scene, both in the coordinates of their files."""
 
     reference = None
 
@@ -201,8 +201,8 @@ class Orient(Apply):
         parser.add_argument(
             "--viewpoint",
             metavar="X,Y,Z",
-            help="place in the coordinates of the file that the points were seen from, as --viewpoint=X,Y,Z where X is"
-            " below zero; or the name of an object of a .blend file. Sets the method VIEWPOINT",
+            help="position in the coordinates of the file from which the points were seen, as --viewpoint=X,Y,Z where X"
+            " is below zero; or the name of an object of a .blend file. Sets the method VIEWPOINT",
         )
         super().add_options(parser)
 
@@ -222,10 +222,10 @@ class Orient(Apply):
 
 
 class _OrientInFile(OrientNormals):
-    """The same tool, with places in the coordinates of the file, before the shift of large ones."""
+    """The same tool, with positions in the coordinates of the file, without the import offset."""
 
-    place = None  # that the points were seen from, (3,), if it is no object
-    shift = 0.0  # of places that are columns of the file
+    place = None  # viewpoint, (3,), unless it is an object
+    shift = 0.0  # of positions in columns of the file
 
     def viewpoints(self, context, obj, reading):
         if self.method == "VIEWPOINT" and self.place is not None:

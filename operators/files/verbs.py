@@ -1,4 +1,4 @@
-"""Verbs of the command line: what one is, the analysis, and those of tools that need nothing but their settings."""
+"""Verbs of the command line: base classes, the analysis, and tools that need only settings."""
 
 from functools import partial
 
@@ -34,29 +34,29 @@ LEFT_OUT = {
 
 
 class Verb:
-    """What is done with each file. There is a new one for each command, which may keep what its files share.
+    """A command for files. A new one is made for each command line, and may keep what its files share.
 
-    A subclass says what by `run`, and which options that takes by `add_options`.
+    A subclass has methods `run`, and `add_options` for its options.
     """
 
-    name = help = description = ""  # as the user writes it, what it is in a line, and in more
+    name = help = description = ""  # on the command line, help in one line, and in full
     inputs = "files"
-    outputs = ()  # endings of the files that it can write, for folders the first one unless told; none to write nothing
-    reads = ()  # names of the options that give other files, which are never overwritten
+    outputs = ()  # endings of its output files, the first one by default in folders; empty for no output
+    reads = ()  # options with other input files, which are never overwritten
 
     def add_options(self, parser):
-        """Add what it takes beside inputs and outputs."""
+        """Add options beside inputs and outputs."""
 
     def check(self, parser, arguments):
-        """Refuse options that do not go together, by `parser.error`."""
+        """Refuse incompatible options, by `parser.error`."""
 
     def run(self, path, arguments, output) -> dict:
-        """Work on one file, write the output unless it is None, and return what to print."""
+        """Process one file, write the output unless it is None, and return what to print."""
         raise NotImplementedError
 
 
 class ObjectVerb(Verb):
-    """A verb that opens a file as an object with the settings of the panel. A subclass works on it, by `work`."""
+    """A verb that opens a file as an object with the settings of the panel, processed by `work` of a subclass."""
 
     inputs = f"point clouds: {', '.join(files.INPUTS)}. Text has columns x y z and may have a header"
     outputs = files.OUTPUTS
@@ -92,7 +92,7 @@ class ObjectVerb(Verb):
         return {**result, "notices": notices + result["notices"]}
 
     def open(self, path, option, arguments):
-        """Open a file in place of all that is loaded; return the object that an option names, set up, and notices."""
+        """Open a file in place of the loaded one; return the object named by an option, with settings, and notices."""
         columns = arguments.columns if option == "object" else ""
         las = LasChoices(parse_classes(arguments.classes), arguments.withheld)
         read = partial(files.read_file, columns=columns, las=las)
@@ -109,7 +109,7 @@ class ObjectVerb(Verb):
         return obj, notices
 
     def work(self, obj, path, arguments, output) -> dict:
-        """Work on the object, write the output, and return what to print, with notices."""
+        """Process the object, write the output, and return what to print, with notices."""
         raise NotImplementedError
 
 
@@ -129,7 +129,7 @@ class Analyze(ObjectVerb):
             " boundary, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1 if"
             " any input failed."
         )
-        self._earlier = None  # points and modes of the frame before
+        self._earlier = None  # modes and points of the frame before
 
     def add_options(self, parser):
         parser.add_argument("--modes", type=int, default=0, metavar="N", help="how many vibration modes to compute")
@@ -158,7 +158,7 @@ class Analyze(ObjectVerb):
         if arguments.sequence:
             analysis, overlaps, self._earlier = continue_modes(analysis, files.file_points(obj), self._earlier)
             matched["overlaps"] = overlaps.tolist()
-        if sharing_objects(obj):  # by choice, or it would not be writable
+        if sharing_objects(obj):  # make_single_user is on, as checked
             obj.data = obj.data.copy()
         write_result(obj, analysis, arguments.write_limit)
         renew(obj, self.operator.name, analysis.notices)
@@ -175,7 +175,7 @@ class Analyze(ObjectVerb):
 
 
 def _arrays(obj, analysis):
-    """Arrays of an analysis by name; of one of a subset those that were carried to all points, without an operator."""
+    """Return the arrays of an analysis by name; of a subset those transferred to all points, without an operator."""
     if analysis.subset_count:
         return files.attribute_arrays(obj)
     return files.analysis_arrays(place_of(obj), analysis.built, analysis.spectrum)
@@ -186,7 +186,7 @@ def _rounded(seconds):
 
 
 class Apply(ObjectVerb):
-    """The verb of a tool, by the name of its operator, whose settings are its options."""
+    """The verb of a tool, whose options are the settings of its operator."""
 
     left_out = LEFT_OUT
 
@@ -225,14 +225,14 @@ class Apply(ObjectVerb):
         }
 
     def prepare(self, tool, obj, path, arguments):
-        """Give the tool what its settings do not hold."""
+        """Set what the settings of the tool do not include."""
 
     def save(self, tool, obj, output) -> list:
-        """Write the output, and return what is written otherwise than it is."""
+        """Write the output, and return notices of what is written in another form."""
         return opening.save(output, obj, files.attribute_arrays(obj), tool.shown)
 
     def figures(self, tool, result) -> dict:
-        """Return numbers to print, beside the line about what was done."""
+        """Return numbers to print beside the summary."""
         return {}
 
 

@@ -3,8 +3,8 @@
 import bpy
 from bpy_extras import anim_utils
 
-_PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
-PLACE = (*_PLACE, *(f"delta_{name}" for name in _PLACE if name != "rotation_axis_angle"))  # what moves an object
+TRANSFORM = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
+_PATHS = (*TRANSFORM, *(f"delta_{name}" for name in TRANSFORM if name != "rotation_axis_angle"))  # that move an object
 
 
 def curves(block):
@@ -20,7 +20,7 @@ def curves(block):
 
 def moves_by_keys(obj) -> bool:
     """Whether keyframes move an object."""
-    return any(curve.data_path in PLACE for curve in curves(obj))
+    return any(curve.data_path in _PATHS for curve in curves(obj))
 
 
 def stop_moving(obj):
@@ -29,7 +29,7 @@ def stop_moving(obj):
     if animation.action.users > 1:  # other users, or a fake one
         animation.action = animation.action.copy()
     found = curves(obj)
-    for curve in [curve for curve in found if curve.data_path in PLACE]:
+    for curve in [curve for curve in found if curve.data_path in _PATHS]:
         found.remove(curve)
     if not (len(found) or animation.drivers or animation.nla_tracks):
         action = animation.action

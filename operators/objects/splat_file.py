@@ -7,7 +7,7 @@ import numpy as np
 from .attributes import own_positions, read_attribute, remove_attributes, write_attribute, write_own_positions
 from .place import OFFSET, offset_of
 
-FORMAT = "lb_splat_format"  # custom property of an object: the layout of its file
+FORMAT = "lb_splat_format"  # custom property of an object: the format of its file
 OWN_OFFSET = "lb_splat_offset"  # custom property: `OFFSET` in the axes of the file
 DIGITS = "ply_digits"  # attribute: positions in double precision less those in single precision
 # What decoding a file loses: attributes and their columns.
@@ -20,7 +20,7 @@ _ORDER, _COMMENTS, _COLUMNS = "order", "comments", "columns"
 
 
 def keep_format(obj, file):
-    """Keep the layout of a file on an object."""
+    """Keep the format of a file on an object."""
     types = [[name, values.dtype.str[1:]] for name, values in file.columns.items()]
     obj[FORMAT] = json.dumps({_ORDER: file.order, _COMMENTS: file.comments, _COLUMNS: types})
 
@@ -35,7 +35,7 @@ def read_format(obj):
 
 
 def add_columns(obj, others):
-    """Add the columns of the files of other objects to the layout of an object."""
+    """Add the columns of the files of other objects to the format kept on an object."""
     formats = [known for known in map(read_format, (obj, *others)) if known]
     if formats:
         order, comments, _ = formats[0]

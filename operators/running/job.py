@@ -1,4 +1,4 @@
-"""Long work beside the window: a thread or steps, the objects it is for, and all that ends it."""
+"""Background jobs: a thread or steps on the main thread, the objects that they are for, and how they end."""
 
 from concurrent.futures import Future
 from threading import Event, Thread
@@ -15,10 +15,10 @@ from ..registration import Registration, Row
 from .ready import ReadyOperator, reporting
 from .stages import Stages, StageTimes
 
-STOPPED = "Stopped: nothing was changed"  # by somebody
-_FIRST = 0.01  # seconds to the first look, which comes after the first drawing
-_TICK = 0.1  # seconds between two looks at the work
-_PATIENCE = 1.0  # seconds that Blender waits at its end for the thread to stop by itself
+STOPPED = "Stopped: nothing was changed"  # by the user
+_FIRST = 0.01  # seconds to the first timer event, after the first redraw
+_TICK = 0.1  # seconds between timer events
+_PATIENCE = 1.0  # seconds that Blender waits for the thread when it quits
 _jobs = []  # the one that runs
 
 
@@ -28,7 +28,7 @@ def running():
 
 
 def busy() -> str:
-    """Say that a job runs, and what to do; empty if none does."""
+    """Return a text that a job runs, and what to do; empty if none does."""
     job = running()
     if job is None:
         return ""
@@ -36,14 +36,14 @@ def busy() -> str:
 
 
 class Snapshot:
-    """What an object was like when its points were read, without a reference to it, which undo would make invalid."""
+    """The state of an object when its points were read, without a reference to it, which undo would invalidate."""
 
     def __init__(self, context, obj):
         self.uid, self.name = obj.session_uid, obj.name
         self._state, self._metric = _state(context, obj), metric(obj)
 
     def find(self):
-        """Return the object, or None if it is gone, be it with its scene."""
+        """Return the object, or None if it or its scene was removed."""
         obj = find_object(self.uid)
         return obj if obj is not None and obj.users_scene else None
 
@@ -53,7 +53,7 @@ class Snapshot:
         Raises
         ------
         PointCloudError
-            It is gone, was changed since, or cannot be written to in its mode now.
+            It was removed or changed, or cannot be written to in its present mode.
         """
         obj = self.find()
         if obj is None:
@@ -67,29 +67,29 @@ class Snapshot:
 
 
 def _state(context, obj):
-    """What of an object decides about results, beside its scale."""
+    """Return what results depend on, beside the object's scale."""
     seen = hash(read_points(context, obj).points.tobytes()) if obj.meshfree.use_modifiers else None
     return fingerprint(obj), repr(settings_values(obj.meshfree)), point_budget(obj.meshfree), seen
 
 
 class Job(StageTimes):
-    """A computation in a thread of its own, so that the window stays alive and everything may end it.
+    """A computation in a thread of its own, which keeps the window responsive and can be cancelled.
 
     Parameters
     ----------
     label : str
-        What is computed, for people.
+        What is computed, for display.
     snapshots : list of Snapshot
-        The objects that it is for.
+        Its objects.
     compute : callable
-        Called with this as its progress callback; must not touch Blender.
+        Called with the job as progress callback; must not access Blender.
     at_once : bool
-        Whether it begins now, and not with `go_on`.
+        Whether it starts now, not in `go_on`.
 
     Attributes
     ----------
     reason : str or ""
-        Why it was stopped; empty while nobody did.
+        Why it was stopped; empty if it was not.
     """
 
     def __init__(self, label, snapshots, compute, at_once=True):
@@ -101,7 +101,7 @@ class Job(StageTimes):
         self._prepare(compute, at_once)
 
     def _prepare(self, compute, at_once):
-        # Not of a pool: Blender must not wait for it at its end.
+        # Not of a pool: Blender must not wait for it when it quits.
         self._thread = Thread(target=self._run, args=(compute,), name=self.label, daemon=True)
         if at_once:
             self._thread.start()
@@ -126,19 +126,19 @@ class Job(StageTimes):
         return bool(self.reason) or self._future.done()
 
     def go_on(self, context):
-        """Let the work begin, if it has not yet: once Blender has drawn that it does, from which it would take time."""
+        """Start the thread, if it has not started: after the first redraw, which it would slow down."""
         if self._thread.ident is None:
             self._thread.start()
             context.window_manager.event_timer_remove(self._timer)
             self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
 
     def stop(self, reason=STOPPED):
-        """End it for everybody; the thread itself ends at its next report of progress, and its result is dropped."""
+        """Stop the job; the thread ends at its next report of progress, and its result is dropped."""
         self.reason = self.reason or reason
         self._stop.set()
 
     def result(self):
-        """Return what was computed, or raise what went wrong; `Cancelled`, with the reason, if it was stopped."""
+        """Return the result, or raise its error; `Cancelled`, with the reason, if it was stopped."""
         if self.reason:
             raise Cancelled(self.reason)
         return self._future.result()
@@ -149,7 +149,7 @@ class Job(StageTimes):
             self._thread.join(seconds)
 
     def show(self, context):
-        """Tell in all windows how far it is."""
+        """Show the progress in the status bars of all windows."""
         windows = context.window_manager.windows
         text = f"{self.label}: {self.stage}, {self.fraction:.0%}    Esc to stop"
         if text != self._shown:
@@ -158,29 +158,29 @@ class Job(StageTimes):
             notify("panels_changed")
 
     def open(self, context):
-        """Begin to show it; one that has not begun is looked at again and again in the window that it belongs to."""
+        """Show the job; one that has not started gets a timer in the window of the context."""
         _jobs.append(self)
         if not self._begun:
             self._timer = context.window_manager.event_timer_add(_FIRST, window=context.window)
         self.show(context)
 
     def close(self, context):
-        """Leave nothing of it in any window; may be called again."""
+        """Remove the job from all windows; may be called again."""
         if self not in _jobs:
             return
         _jobs.remove(self)
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
         if not bpy.app.background:
-            # Later: a window that is being closed must not find another context than it had.
+            # Later: the context of a window that is being closed must not change.
             bpy.app.timers.register(_clear_status, persistent=True)
         notify("panels_changed")
 
 
 class SteppedJob(Job):
-    """A computation that needs Blender itself, so that it is done in steps on its main thread, one at each look.
+    """A computation that accesses Blender, done in steps on the main thread, one at each timer event.
 
-    `compute` is a generator function, whose result is what it returns; see `all_steps`.
+    `compute` is a generator function that returns the result; see `all_steps`.
     """
 
     def _prepare(self, compute, at_once):
@@ -196,7 +196,7 @@ class SteppedJob(Job):
             self._future.set_exception(error)
 
     def wait(self, seconds):
-        """Wait for nothing: no step is taken any more."""
+        """Do nothing: no further step is taken."""
 
     def close(self, context):
         super().close(context)
@@ -220,19 +220,19 @@ def _clear_status():
 def _set_status(workspaces, text):
     """Set the text in the status bar of workspaces, or clear it by None."""
     for workspace in workspaces:
-        with bpy.context.temp_override(workspace=workspace):  # which is the one that Blender writes to
+        with bpy.context.temp_override(workspace=workspace):  # status_text_set needs it in the context
             workspace.status_text_set(text)
 
 
 class JobOperator(ReadyOperator):
-    """An operator whose work runs beside the window when somebody there has started it.
+    """An operator whose work runs in the background if it was started in a window.
 
-    The work ends early by *Stop*, which is Esc, by undo and redo, when an object of it is deleted, and when another
-    file is opened. It takes no keys itself, which what runs beside it, such as a drag, may need.
+    *Stop* (Esc), undo, redo, deleting one of its objects and opening another file cancel it. It handles no keys itself,
+    since other modal operators, such as a drag, may need them.
     """
 
     _job = None
-    _attended = False  # somebody at the window waits for it
+    _attended = False  # started in a window
 
     @classmethod
     def poll(cls, context):
@@ -242,12 +242,12 @@ class JobOperator(ReadyOperator):
         return super().poll(context)
 
     def takes_window(self):
-        """Tell whether to work beside the window, once for each time that somebody started it there."""
-        attended, self._attended = self._attended, False  # Adjust Last Operation comes again, and waits
+        """Whether to run in the background: once for each start in a window."""
+        attended, self._attended = self._attended, False  # Adjust Last Operation executes again, and blocks
         return attended and not bpy.app.background
 
     def work(self, context, objects, compute):
-        """Compute for some objects beside the window, or at once for scripts, and let `finish` use the results."""
+        """Compute for objects in the background, or at once for scripts; `finish` gets the results."""
         if self.takes_window():
             return self.start(context, objects, compute)
         with Stages(context.window_manager, self.bl_label) as stages:
@@ -255,7 +255,7 @@ class JobOperator(ReadyOperator):
         return self.finish(context, objects, results)
 
     def start(self, context, objects, compute, kind=Job):
-        """Begin to work for some objects."""
+        """Start a job for objects."""
         if busy():  # since a file browser opened
             raise PointCloudError(f"{busy()}.")
         self._job = kind(self.bl_label, [Snapshot(context, obj) for obj in objects], compute, at_once=False)
@@ -279,7 +279,7 @@ class JobOperator(ReadyOperator):
         return {"PASS_THROUGH"}
 
     def cancel(self, context):
-        """End the work, if it has begun, with its dialog or the window that shows it."""
+        """Stop the job, if there is one, when its dialog or window is closed."""
         job = self._job
         if job is not None and job is running():
             job.stop()
@@ -287,11 +287,11 @@ class JobOperator(ReadyOperator):
             self.leave(context)
 
     def leave(self, context):
-        """Put back what the work itself has changed in Blender: nothing."""
+        """Restore what the work itself has changed in Blender."""
 
     @reporting
     def complete(self, context, job):
-        """Find the objects again, and let `finish` use what was computed for them, if they are as they were."""
+        """Find the objects again, and call `finish` with the results if they are unchanged."""
         try:
             results = job.result()
         except Cancelled:
@@ -324,12 +324,12 @@ class MESHFREE_OT_stop(bpy.types.Operator):
 
 
 def attach():
-    """End the work when its objects become others, by undo or another file."""
+    """Stop jobs when undo or another file invalidates their objects."""
     add_handlers(_HANDLERS)
 
 
 def detach():
-    """End the work, and leave no handler behind."""
+    """Stop the job, and remove the handlers."""
     remove_handlers(_HANDLERS)
     job = running()
     if job is not None:

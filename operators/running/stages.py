@@ -1,4 +1,4 @@
-"""How long each stage of a computation takes, and how far it is."""
+"""Times of the stages of a computation, and its progress."""
 
 import sys
 from time import perf_counter
@@ -12,16 +12,16 @@ class StageTimes:
     Parameters
     ----------
     progress : callable, optional
-        Another one that is told everything too.
+        Another one, which is called too.
 
     Attributes
     ----------
     seconds : dict of str to float
         Seconds by stage, complete after the ``with`` block.
     stage : str
-        The last one that began.
+        The last one that was started.
     fraction : float
-        How much of it, or of all, is done.
+        Its progress, or that of the whole.
     """
 
     def __init__(self, progress=None):
@@ -50,9 +50,9 @@ class StageTimes:
 
 
 class Stages(StageTimes):
-    """The same while Blender waits: the mouse cursor shows how far it is; without a window there is a line per stage.
+    """The same while Blender blocks: progress at the mouse cursor; without a window, a line per stage.
 
-    The lines go to the standard error, so that the standard output holds results alone.
+    Lines go to standard error, so that standard output holds results only.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""One module a tool: it reads objects, calls core and writes the results."""
+"""The tools: they read objects, call core and write the results."""

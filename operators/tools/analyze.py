@@ -1,4 +1,4 @@
-"""Areas, normals, curvature, boundary and components of the active object's points."""
+"""Analysis: areas, normals, curvature, boundary and components of points."""
 
 from dataclasses import dataclass, replace
 
@@ -19,12 +19,12 @@ from ..running.application import ShownOperator
 from ..running.measures import measure
 from ..running.stages import StageTimes
 
-WRITE_LIMIT = 50  # modes written as attributes unless more are asked for: each takes 4 bytes per point in the file
+WRITE_LIMIT = 50  # default number of modes written as attributes: each takes 4 bytes per point in the file
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """All that is computed for an object, in lengths of the world; normals in local space too."""
+    """The results for an object, in world lengths; normals in local space too."""
 
     built: cache.Built  # on the subset, where there is one
     measures: dict  # by the names of attributes
@@ -41,7 +41,7 @@ class Analysis:
 
     @property
     def counts(self) -> dict:
-        """Components, points at a boundary and points left out, by the names of the settings that keep them."""
+        """Numbers of components, boundary points and points left out, by the names of the settings that keep them."""
         component = self.measures[COMPONENT]
         return {
             "component_count": int(component.max()) + 1,
@@ -53,8 +53,8 @@ class Analysis:
 def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, orient=None):
     """Read an object; return a function of a progress callback that analyzes it, with the lowest modes if any.
 
-    Of a subset no more modes than `write_limit` are carried to all points. The normals take the side that the object's
-    attribute tells, or what `orient`, called with what was measured and a callback, returns, (n, 3).
+    Of a subset at most `write_limit` modes are transferred to all points. The normals are oriented by the object's
+    attribute, or by the vectors, (n, 3), that `orient` returns, called with the measures and a progress callback.
     """
     reading = read_points(context, obj)
     options, budget = laplacian_options(obj.meshfree), point_budget(obj.meshfree)
@@ -83,7 +83,7 @@ def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, 
 
 
 def resolved_modes(laplacian, modes, progress):
-    """Compute the modes asked for, or as many of them as the points resolve and a notice of that."""
+    """Compute modes, or as many of them as the points resolve, with a notice."""
     try:
         return cache.lowest_modes(laplacian, modes, progress), []
     except UnresolvedModesError as error:
@@ -94,7 +94,7 @@ def resolved_modes(laplacian, modes, progress):
 
 
 class AnalysisOperator(ShownOperator):
-    """What the operators that analyze objects have in common; `wanted` is how many modes one computes."""
+    """The base of operators that analyze objects; `wanted` is the number of modes."""
 
     write_limit: IntProperty(
         name="Modes to Write",
@@ -112,7 +112,7 @@ class AnalysisOperator(ShownOperator):
 
     @property
     def adjustable(self):
-        """Names of the settings: how many modes to write is no question where all are."""
+        """Names of the settings; the number of modes to write only where not all are written."""
         return ("write_limit", "show") if self.wanted > WRITE_LIMIT else ("show",)
 
     @property
@@ -139,7 +139,7 @@ class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.analyze"
     bl_label = "Analyze Points"
-    shown = ""  # what is on show already
+    shown = ""  # the attribute on display
 
     modes: IntProperty(
         name="Modes", description="Compute this many vibration modes in the same run", default=0, min=0, soft_max=100

@@ -1,4 +1,4 @@
-"""Compare two clouds: how far the points of one are from the surface of the other."""
+"""Compare two clouds: signed distances of the points of one from the surface of the other."""
 
 import bpy
 import numpy as np
@@ -61,16 +61,16 @@ class Compare(Tool):
         return compute
 
     def other(self, context, obj):
-        """Return the name of the other cloud, what gives its operator, and how points lie about it, less as read."""
+        """Return name and operator function of the other cloud, and the offset between points as read."""
         other = self.reference_of(context)
         with naming(other.name):
             _, operator = operator_reader(context, other)
-        # Points are read without the place of their objects.
+        # Points are read without the location of their objects.
         return other.name, operator, np.array(obj.matrix_world.translation) - np.array(other.matrix_world.translation)
 
     @classmethod
     def reference_of(cls, context):
-        """Return the other cloud: the one that is selected, else that of the comparison before; None without one."""
+        """Return the other cloud: the selected one, else that of the last comparison; None without one."""
         selected = _others(context)
         if len(selected) == 1:
             return selected[0]
@@ -96,13 +96,13 @@ class Compare(Tool):
 
 
 def distances(found):
-    """Return of a `Deviation` the mean distance, what 95 % of the points are within, and the greatest one."""
+    """Return the mean, the 95th percentile and the maximum of the distances of a `Deviation`."""
     sizes = np.abs(found.distance[found.known])
     return float(sizes.mean()), float(np.percentile(sizes, 95.0)), float(sizes.max())
 
 
 class CompareOperator(Compare, ShownOperator):
-    """What the operators that compare have in common."""
+    """The base of operators that compare."""
 
     adjustable = ("show", "hide_reference")
     only_active = keeps_line = True
@@ -120,7 +120,7 @@ class CompareOperator(Compare, ShownOperator):
         return obstacle(other)
 
     def finish(self, context, objects, results):
-        """Hide the cloud that covers the colors: when nothing can fail anymore, for nothing would show it again."""
+        """Hide the reference, which covers the colors: last, since failures do not restore visibility."""
         finished = super().finish(context, objects, results)
         if self.hide_reference:
             hide(objects[0].meshfree.compared_with)
@@ -164,7 +164,7 @@ class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
 
 
 def _compared(context):
-    """Return what the active object was compared with, if it is still there, or None."""
+    """Return the object that the active one was compared with, if it still exists, or None."""
     other = context.object and context.object.meshfree.compared_with
     return other if other is not None and other.name in context.view_layer.objects else None
 

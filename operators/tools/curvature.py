@@ -1,4 +1,4 @@
-"""How the surface bends and along which directions, what shape it has there, and how rough it is."""
+"""Principal curvatures and directions, shape index, curvedness and roughness."""
 
 from dataclasses import replace
 

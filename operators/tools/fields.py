@@ -1,4 +1,4 @@
-"""Fields between given values, and distances along the surface."""
+"""Harmonic fields and solutions of Poisson's equation, and geodesic distances."""
 
 import bpy
 import numpy as np
@@ -56,7 +56,7 @@ class HarmonicField(Tool):
 
     @property
     def adjustable(self):
-        """Names of the settings that need no new solution: with a source, the given values do."""
+        """Names of the settings that need no new solution; with a source, values need one."""
         return ("show",) if self.source else ("low", "high", "show")
 
     def plan(self, context, obj):
@@ -97,7 +97,7 @@ class HarmonicField(Tool):
         return compute
 
     def _shares(self, obj):
-        """Return the share of the way from the low to the high value, (n,); not a number where none is given."""
+        """Return the given values relative to the low (0) and the high value (1), (n,); NaN where none is given."""
         shares, known = np.full(point_count(obj.data), np.nan), {}
         for setting, share in self._given(obj).items():
             name, title = getattr(self, setting), setting.replace("_", " ").title()
@@ -114,7 +114,7 @@ class HarmonicField(Tool):
         return shares
 
     def _given(self, obj):
-        """Return the settings whose groups give values, with the shares of their points, None for their weights."""
+        """Return the settings whose groups give values, with the relative values, None for the weights."""
         ends, weights = {"low_group": 0.0, "high_group": 1.0}, {"group": None}
         if self.values == "GROUPS":
             return ends
@@ -125,7 +125,7 @@ class HarmonicField(Tool):
         return {name: every[name] for name in every if is_chosen(obj, getattr(self, name), defaults[name])}
 
     def _check_given(self, obj, names):
-        """Refuse to solve without values, or with those of one end alone, by the names of groups that hold points."""
+        """Refuse missing values, or those of one end alone, by the names of the groups that hold points."""
         if not names and has_group(obj, self.group):
             raise PointCloudError(
                 f'The {group_kind(obj)} "{self.group}" of "{obj.name}" holds no points. Assign some to it in Edit Mode.'

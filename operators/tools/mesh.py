@@ -1,4 +1,4 @@
-"""Make a mesh of the surface that the points lie on, with all that they hold on its vertices."""
+"""Reconstruct a mesh from the points, with their attributes on its vertices."""
 
 import bmesh
 import bpy
@@ -19,8 +19,8 @@ from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.measures import carry
 
-_LEFT = DISC, "position"  # attributes that mean nothing on a mesh, or something else
-_GAP = 12  # edges around a hole that is no opening, but a gap between points
+_LEFT = DISC, "position"  # attributes that are not valid on a mesh
+_GAP = 12  # edges around a hole that counts as a gap between points
 _STEPS = 255  # of weights
 
 
@@ -29,7 +29,7 @@ class MeshSurface(Tool):
 
     asks = ("detail", "keep_open")
     adjustable = ("detail", "keep_open")
-    made = ()  # names of objects, of those that hold their meshes, and how many edges of these are open
+    made = ()  # names of objects and of their meshes, and numbers of open edges
 
     detail: FloatProperty(
         name="Detail",
@@ -74,7 +74,7 @@ class MeshSurface(Tool):
         return [f"{made.name}: {len(made.data.polygons):,} faces, {state}. The points are hidden"]
 
     def conclude(self, context, objects):
-        """Show the meshes as their points were shown, and hide these."""
+        """Show the meshes like their points, and hide these."""
         made = {name: bpy.data.objects[other] for name, other, _ in self.made}
         self.made = ()
         for obj in objects:
@@ -102,7 +102,7 @@ def surface_mesh(laplacian, detail, progress):
 
 
 class _Kept:
-    """What the points of an object hold: attributes, colors, and weights in vertex groups."""
+    """The data of an object's points: attributes, colors, and weights in vertex groups."""
 
     def __init__(self, obj):
         self._types, self._values, self._active = {}, {}, own_colors(obj.data)
@@ -124,7 +124,7 @@ class _Kept:
         self._groups = _weights(obj)
 
     def carried(self, carrying, count):
-        """Return the same on the vertices of a mesh, the last ones of so many, by a `Prolongation`."""
+        """Return the data on the vertices of a mesh, the last `count` points of a `Prolongation`."""
         result = object.__new__(_Kept)
         result._types, result._active = self._types, self._active
         result._values = {name: self._carry(carrying, name, values)[-count:] for name, values in self._values.items()}
@@ -141,7 +141,7 @@ class _Kept:
         return np.clip(result, 0.0, None) if self._types[name] in COLORS else result
 
     def write(self, obj):
-        """Put all of it on the vertices of a mesh."""
+        """Write the data to the vertices of a mesh."""
         for name, values in self._values.items():
             if self._types[name] in COLORS:
                 layer = obj.data.attributes.new(name, self._types[name], "POINT")
@@ -155,7 +155,7 @@ class _Kept:
 
 
 def _weights(obj):
-    """Read the weights in all vertex groups of an object, by name, (n,) each; points outside weigh nothing."""
+    """Read the weights in all vertex groups of an object, by name, (n,) each; 0 for points outside."""
     if obj.type != "MESH" or not obj.vertex_groups:
         return {}
     weights = np.zeros((len(obj.vertex_groups), point_count(obj.data)), np.float32)
@@ -179,7 +179,7 @@ def _mesh(name, vertices, faces):
 
 
 def _close(mesh, most):
-    """Close the holes of a mesh of so many edges at most, 0 for all; return how many edges are left open."""
+    """Close the holes of a mesh with at most so many edges, 0 for all; return the number of open edges left."""
     shape = bmesh.new()
     shape.from_mesh(mesh)
     edges = [edge for edge in shape.edges if edge.is_boundary]

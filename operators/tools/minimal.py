@@ -1,4 +1,4 @@
-"""Minimal surfaces: what a soap film on the boundary of an object would be."""
+"""Minimal surfaces with the boundary of an object."""
 
 import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
@@ -33,13 +33,13 @@ class MinimalSurface(Tool):
     )
     tolerance: FloatProperty(
         name="Tolerance",
-        description="It ends when a step changes the area by a smaller share than this",
+        description="Stops when a step changes the area by a smaller fraction than this",
         default=1e-4,
         min=0.0,
         soft_max=0.01,
         precision=6,
     )
-    steps: IntProperty(name="Steps", description="Most steps to take", default=100, min=1, soft_max=500)
+    steps: IntProperty(name="Steps", description="Maximum number of steps", default=100, min=1, soft_max=500)
     target: target_property()
 
     def plan(self, context, obj):
@@ -89,7 +89,7 @@ class MESHFREE_OT_minimal_surface(MinimalSurface, ApplicationOperator, bpy.types
 
 
 def _shrink(points, boundary, tolerance, steps, options, progress):
-    """Compute the film that a boundary spans, with the share of the steps as progress."""
+    """Compute the minimal surface of a boundary, with the fraction of the steps as progress."""
     count = 0
 
     def stepped(step, points, area):
@@ -108,7 +108,7 @@ def _shrink(points, boundary, tolerance, steps, options, progress):
         callback=stepped,
         progress=report,
     )
-    if film.reason == "cancelled":  # nobody waits for it, and it must not be kept
+    if film.reason == "cancelled":  # it must not be cached
         raise Cancelled
     return film
 

@@ -1,4 +1,4 @@
-"""Divide objects into parts, and make objects of the parts; signatures that tell points apart."""
+"""Segmentation into parts, objects of the parts, and heat and wave kernel signatures."""
 
 import bmesh
 import bpy
@@ -86,7 +86,7 @@ def _by_mode(laplacian, mode, progress):
 
 
 def _by_shape(laplacian, parts, progress):
-    """Divide the points into parts, by modes from before if there are enough."""
+    """Divide the points into parts, by kept modes if there are enough."""
     count, spectrum = core.modes_needed(laplacian, parts), None
     if cache.known_modes(laplacian) >= count:
         spectrum = resolved_modes(laplacian, count, progress)[0]
@@ -99,7 +99,7 @@ def _is_numbered(name):
 
 
 def _write_groups(obj, members):
-    """Make a group of each part, given by its points, (n,) bool, in place of those from before."""
+    """Write a group for each part, given by its points, (n,) bool, in place of earlier ones."""
     kept = obj.vertex_groups if obj.type == "MESH" else obj.data.attributes
     for name in [group.name for group in kept if _is_numbered(group.name)]:
         kept.remove(kept[name])
@@ -111,7 +111,7 @@ def _write_groups(obj, members):
 
 
 def _check_groups(obj):
-    """Refuse an object where groups of parts cannot take the place of those from before."""
+    """Refuse an object where groups of parts cannot be written."""
     locked = [group.name for group in obj.vertex_groups if _is_numbered(group.name) and group.lock_weight]
     if locked:
         raise PointCloudError(
@@ -166,7 +166,7 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
 
 
 def _keep(context, obj, kept):
-    """Delete all points of an object but some, (n,) bool, with all that belongs to them."""
+    """Delete the points of an object but those to keep, (n,) bool, with their data."""
     if obj.type != "MESH":
         _keep_points(context, obj, kept)
         return
@@ -179,7 +179,7 @@ def _keep(context, obj, kept):
 
 
 def _keep_points(context, obj, kept):
-    """Delete points of a point cloud by Blender's own operator, which takes the selected ones in Edit Mode."""
+    """Delete points of a point cloud by Blender's operator, which deletes selected ones in Edit Mode."""
     active, chosen = context.view_layer.objects.active, context.selected_objects
     for other in chosen:
         other.select_set(False)

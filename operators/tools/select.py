@@ -1,4 +1,4 @@
-"""Select points and put them into the vertex groups that the tools take, where Blender's own ways need faces."""
+"""Selecting points and assigning them to groups, where Blender's tools need faces."""
 
 from contextlib import contextmanager
 
@@ -43,15 +43,15 @@ from ..running.stages import Stages
 
 
 class SelectionOperator(JobOperator):
-    """An operator on the selected points of the active object, and of all others in Edit Mode along with it.
+    """An operator on the selected points of the active object, and of all others in Edit Mode with it.
 
-    What takes long, the operator on the points, is computed beside the window, where somebody waits there; the rest is
-    done when it is kept. A subclass says what to do by `prepare`, which computes for an object and returns a function
-    that changes it and returns a line for the status bar.
+    The Laplacian, which takes long, is computed in the background if started in a window; the rest follows when that is
+    kept. A subclass has a method `prepare`, which computes for an object and returns a function that changes the object
+    and returns a line for the status bar.
     """
 
     works_in = ("OBJECT", "EDIT")
-    surface = True  # whether it needs the operator on the points
+    surface = True  # whether it needs the Laplacian
     needs_selection = True
 
     def invoke(self, context, event):
@@ -59,7 +59,7 @@ class SelectionOperator(JobOperator):
 
     @reporting
     def begin(self, context):
-        """Compute the operators beside the window."""
+        """Compute the Laplacians in the background."""
         objects = edited_objects(context)
         with object_mode(context, context.object):
             objects = self.with_points(objects)
@@ -74,7 +74,7 @@ class SelectionOperator(JobOperator):
             return super().complete(context, job)
 
     def finish(self, context, objects, results):
-        """Do it with the selection of now: the operators are kept."""
+        """Change the objects by their present selection: the Laplacians are kept."""
         return self.change(context, objects)
 
     def execute(self, context):
@@ -95,7 +95,7 @@ class SelectionOperator(JobOperator):
         return {"FINISHED"}
 
     def with_points(self, objects):
-        """Leave out objects without selected points, if it needs them, where there are others."""
+        """Leave out objects without selected points, if these are needed and others have some."""
         if not self.needs_selection:
             return objects
         return [obj for obj in objects if selection(obj).any()] or objects[:1]
@@ -114,7 +114,7 @@ def edited_objects(context):
 
 @contextmanager
 def object_mode(context, obj):
-    """Leave Edit Mode, where vertices cannot be read as arrays, and come back to it with the same objects."""
+    """Leave Edit Mode, where vertices cannot be read as arrays, and return to it with the same objects."""
     if obj.mode != "EDIT":
         yield
         return
@@ -125,7 +125,7 @@ def object_mode(context, obj):
     try:
         yield
     finally:
-        for other in others:  # selected ones come along into Edit Mode
+        for other in others:  # selected ones enter Edit Mode too
             other.select_set(other in edited)
         bpy.ops.object.mode_set(mode="EDIT")
         for other in others:
@@ -137,7 +137,7 @@ def selection(obj):
     chosen = np.ones(point_count(obj.data), dtype=bool)
     if obj.type == "MESH":
         obj.data.vertices.foreach_get("select", chosen)
-    elif SELECTION in obj.data.attributes:  # without it Blender takes all points of a point cloud as selected
+    elif SELECTION in obj.data.attributes:  # without it all points of a point cloud count as selected
         chosen = read_attribute(obj.data, SELECTION).astype(bool)
     return chosen
 
@@ -157,20 +157,20 @@ def unreached(obj, reached, consequence: str) -> list:
 
 
 def read_sources(obj, group):
-    """Read the points of a group or, where there is none of the default's name, the selected ones, (n,) bool."""
+    """Read the points of a group or, if the default one is missing, the selected ones, (n,) bool."""
     return chosen_members(obj, group, "Sources") if is_chosen(obj, group, SOURCE) else selected(obj)
 
 
 def select(context, obj, chosen) -> str:
-    """Select these points, (n,) bool, and no others, in the mode that selects vertices; hidden ones never."""
+    """Select these points, (n,) bool, and no others, without hidden ones, in vertex mode."""
     shown = chosen
     if obj.type == "MESH":
         hidden = np.empty(len(chosen), dtype=bool)
         obj.data.vertices.foreach_get("hide", hidden)
         shown = chosen & ~hidden
-        context.tool_settings.mesh_select_mode = (True, False, False)  # in others Edit Mode deselects loose vertices
+        context.tool_settings.mesh_select_mode = (True, False, False)  # other modes deselect loose vertices
         obj.data.vertices.foreach_set("select", shown)
-        for parts in (obj.data.edges, obj.data.polygons):  # Edit Mode takes the vertices of selected ones, too
+        for parts in (obj.data.edges, obj.data.polygons):  # Edit Mode selects their vertices, too
             parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
     else:
         write_attribute(obj.data, SELECTION, shown, "BOOLEAN")
@@ -179,13 +179,13 @@ def select(context, obj, chosen) -> str:
 
 
 def groups_changed(obj):
-    """Let the panel count the groups of an object again, and the display color them, if it does."""
+    """Update the counts of groups in the panel, and their colors in the display."""
     renew_counts(obj)
     notify("groups_changed", obj)
 
 
 def analyzed(context, obj):
-    """Read the points and return them with their operator, which is kept from the last analysis if nothing changed."""
+    """Read the points and return them with their Laplacian, kept from the last analysis if nothing changed."""
     reading, operator = operator_reader(context, obj)
     with Stages(context.window_manager, "Points") as stages:
         return reading, operator(stages)
@@ -224,12 +224,12 @@ class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
     def prepare(self, context, obj):
         chosen = selected(obj)
         component = analyzed(context, obj)[1].component
-        found = np.unique(component[chosen & (component >= 0)])  # points left out belong to none
+        found = np.unique(component[chosen & (component >= 0)])  # -1 for points left out
         return lambda: select(context, obj, chosen | np.isin(component, found))
 
 
 class FrontOnly:
-    """The property of selecting operators that leaves out points on the far side."""
+    """The property of operators that leave out points facing away from the view."""
 
     direction: FloatVectorProperty(
         name="Viewing Direction",
@@ -239,7 +239,7 @@ class FrontOnly:
     )
 
     def facing(self, context, obj):
-        """Tell which points face the viewer by their normals, (n,) bool."""
+        """Return which points face the view by their normals, (n,) bool."""
         reading, laplacian = analyzed(context, obj)
         view = np.array(self.direction, dtype=np.float64)
         space = context.space_data.region_3d if context.area is not None and context.area.type == "VIEW_3D" else None
@@ -305,7 +305,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
 
     @classmethod
     def description(cls, context, properties):
-        """Say what a button does; an empty text leaves it to the docstring."""
+        """Return the tooltip of a button; empty for that of the class."""
         return {
             "ADD": "Add the selected points to the group, which keeps those that it holds",
             "REMOVE": "Remove the selected points from the group",
@@ -313,7 +313,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
 
     @property
     def surface(self):
-        """Whether it needs the operator on the points, for their normals."""
+        """Whether it needs the Laplacian, for the normals."""
         return self.front_only
 
     def prepare(self, context, obj):
@@ -348,7 +348,7 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
 
 
 def _replaced(obj, name, chosen):
-    """Count the points that a group holds beside the chosen ones, (n,) bool."""
+    """Count the points of a group that are not chosen, (n,) bool."""
     return np.count_nonzero(np.isfinite(group_weights(obj, name, np.nan)) & ~chosen) if has_group(obj, name) else 0
 
 
@@ -371,7 +371,7 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
     )
 
     def invoke(self, context, event):
-        """Take the ray under the mouse; leave to Blender what it does better, or what shows no point."""
+        """Use the ray under the mouse; pass through where Blender's own selection is better, or without a point."""
         if not _is_opaque_cloud(context):
             return {"PASS_THROUGH"}
         place = event.mouse_region_x, event.mouse_region_y
@@ -388,9 +388,9 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
         return self.take(context, *found)
 
     def take(self, context, obj, index):
-        """Select a point of an object, or deselect it where it is one more of the selected ones."""
+        """Select a point of an object, or deselect it if it extends the selection and is selected."""
         for other in edited_objects(context):
-            known = selection(other)  # that of now, since `find` has read the points
+            known = selection(other)  # up to date, since `find` has read the points
             wanted = known & self.extend
             if other == obj:
                 wanted[index] = not wanted[index]
@@ -413,7 +413,7 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
 
 
 def _is_opaque_cloud(context):
-    """Whether somebody sees the points of clouds, and does not look through them."""
+    """Whether the view shows points of clouds, without X-ray."""
     space = context.space_data
     if space is None or space.type != "VIEW_3D" or context.region_data is None:
         return False
@@ -426,7 +426,7 @@ def _is_opaque_cloud(context):
 
 
 def _put_selection(obj, known, wanted):
-    """Select points of an object in Edit Mode, and deselect others, (n,) bool, where that changes."""
+    """Set the selection of an object in Edit Mode, (n,) bool, where it changes."""
     if obj.type != "MESH":
         write_attribute(obj.data, SELECTION, wanted, "BOOLEAN")
         tag_changed(obj.data)

@@ -1,4 +1,4 @@
-"""Analysis of a sequence: all of its frames in one run, with modes that continue each other and one range of colors."""
+"""Analysis of all frames of a sequence, with modes matched from frame to frame and one color range."""
 
 import re
 from dataclasses import replace
@@ -24,7 +24,7 @@ from .analyze import WRITE_LIMIT, plan_analysis
 
 
 def frames_of(obj) -> list:
-    """Return the objects that a sequence shows, in their order: by name, numbers by their size."""
+    """Return the objects that a sequence shows, in natural order of their names."""
     modifier = next((item for item in obj.modifiers if is_sequence(item)), None) if obj is not None else None
     collection = modifier and get_input(modifier, COLLECTION)
     if collection is None:
@@ -38,7 +38,7 @@ def _natural(name):
 
 
 def continue_modes(analysis, points, earlier):
-    """Let the modes of an analysis continue those of the frame before.
+    """Match the modes of an analysis to those of the frame before.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def continue_modes(analysis, points, earlier):
     points : ndarray, (n, 3)
         All points of the object, in the world.
     earlier : tuple of Spectrum and ndarray, or None
-        What this returned of the frame before; None for the first frame, which stays as it is.
+        The third result for the frame before; None for the first frame, which is not changed.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def continue_modes(analysis, points, earlier):
         For the next frame.
     """
     spectrum = analysis.spectrum
-    count = spectrum.eigenvectors.shape[1]  # of a subset fewer may be carried to all points
+    count = spectrum.eigenvectors.shape[1]  # of a subset, fewer may be transferred
     spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
     if earlier is not None:
         matched = core.match_modes(spectrum, analysis.measures[AREA], points, *earlier)
@@ -116,7 +116,7 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
         name = eigenvector_name(self.shown_mode) if self.shown_mode else MEAN_CURVATURE
         with all_or_nothing(objects):
             for obj, (analysis, _) in zip(objects, results, strict=True):
-                if sharing_objects(obj):  # by choice, or it would not be writable
+                if sharing_objects(obj):  # make_single_user is on, as checked
                     obj.data = obj.data.copy()
                 write_result(obj, analysis, max(self.modes, WRITE_LIMIT))
             if self.show:
@@ -138,7 +138,7 @@ class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):
 
 
 def _lost(overlaps):
-    """Say which modes have nothing to continue."""
+    """Return a notice of modes without a match."""
     lost = np.flatnonzero(overlaps < 0.5) + 1
     if not len(lost):
         return []

@@ -1,4 +1,4 @@
-"""Smooth or sharpen the shape of objects by frequency, and move them by a vibration mode."""
+"""Spectral smoothing and enhancement of shapes, and deformation by a vibration mode."""
 
 import bpy
 import numpy as np
@@ -17,9 +17,9 @@ from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.discs import disc_finder
 
-_HEAT, _DETAIL = 6.0, 12.0  # smoothing lengths of a wavelength that suits a scan: finer ones the kernel does not see
-_READY = 20  # modes computed together at least, so that Adjust Last Operation can go through them
-_FINEST = 8.0  # details finer than this share of the wavelength count as noise, which is not boosted
+_HEAT, _DETAIL = 6.0, 12.0  # default wavelengths in smoothing lengths: the kernel does not resolve finer ones
+_READY = 20  # modes computed at least, so that Adjust Last Operation can step through them
+_FINEST = 8.0  # details finer than the wavelength by this factor count as noise, which is not amplified
 
 
 class Smooth(Tool):
@@ -82,7 +82,7 @@ class Smooth(Tool):
 
     @property
     def adjustable(self):
-        """Names of the settings that need no new solution: to keep a size, one looks for a scale."""
+        """Names of the settings that need no new solution; keeping a size needs a scale factor."""
         return ("strength", "target") if self.keep == "NONE" else ("target",)
 
     def plan(self, context, obj):
@@ -101,7 +101,7 @@ class Smooth(Tool):
             return reading, points, gradients, find_discs(full, points)
 
         def smoothed(laplacian, progress):
-            """Return where the points go, and where they would at full strength."""
+            """Return the points, and those at full strength."""
             dirichlet = keep_boundary and bool(laplacian.boundary.any())
             if dirichlet and shared["keep"]:
                 raise PointCloudError(
@@ -152,7 +152,7 @@ class MESHFREE_OT_smooth(Smooth, ApplicationOperator, bpy.types.Operator):
 
 
 def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
-    """Return the places of the points, (n, 3), that a method gives at full strength."""
+    """Return the points, (n, 3), by a method at full strength."""
     base = cache.result(
         laplacian,
         "base",
@@ -212,7 +212,7 @@ class ModeShape(Tool):
 
     @property
     def asks(self):
-        """Names of the settings: an animation takes a shape key."""
+        """Names of the settings; an animation needs a shape key."""
         return "mode", "amplitude", "phase", "animate", "period" if self.animate else "target"
 
     def plan(self, context, obj):
@@ -251,7 +251,7 @@ class ModeShape(Tool):
             for index in range(int((scene.frame_end - scene.frame_start) / quarter) + 2):
                 key.value = (1.0, 0.0, -1.0, 0.0)[index % 4]
                 key.keyframe_insert("value", frame=scene.frame_start + index * quarter)
-            key.value = _animated_value(key, scene.frame_current_final)  # which Blender sets at the next frame only
+            key.value = _animated_value(key, scene.frame_current_final)  # else unchanged until the next frame
         largest = np.linalg.norm(points - reading.points, axis=1).max()
         again = f"Only {mode} modes are computed: this is the last. Start Deform by Mode again for more."
         line = f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"

@@ -1,4 +1,4 @@
-"""Gaussian splats: show them in their own colors, and give them the place of their object."""
+"""Tools for Gaussian splats: display, applying transforms, joining."""
 
 import bpy
 import numpy as np
@@ -79,7 +79,7 @@ class MESHFREE_OT_apply_to_splats(SplatOperator, bpy.types.Operator):
         with all_or_nothing([obj]):
             write_splats(obj.data, splats)
             write_places(obj.data, splats.positions)
-            if OWN_OFFSET in obj:  # from now on along the axes of the world
+            if OWN_OFFSET in obj:  # now in the axes of the world
                 del obj[OWN_OFFSET]
             children = [(child, child.matrix_world.copy()) for child in obj.children]
             obj.matrix_basis = Matrix()
@@ -130,7 +130,7 @@ def _others(context):
 
 
 def _check_single(obj):
-    """Refuse an object whose points others show, too."""
+    """Refuse an object that shares its points with others."""
     others = sharing_objects(obj)
     if others:
         raise PointCloudError(f'"{obj.name}" shares its points with "{others[0].name}". Make it a single user first.')
@@ -160,7 +160,7 @@ def _check_together(obj, others):
 
 
 def _apart(other, obj):
-    """Return how far apart two objects are beside what the scene shows, as a matrix: both were shifted at import."""
+    """Return the difference of the import offsets of two objects as a matrix."""
     matrix = np.eye(4)
     if OFFSET in other and OFFSET in obj:
         matrix[:3, 3] = offset_of(other) - offset_of(obj)
@@ -178,15 +178,15 @@ def _check_near(obj, others, parts):
 
 
 def _placed(obj, matrix):
-    """Return the splats of an object where a matrix, (4, 4), takes them from local space."""
+    """Return the splats of an object transformed by a matrix, (4, 4), from local space."""
     splats, places = read_splats(obj.data), own_places(obj.data)
-    matrix = np.where(np.abs(matrix - np.eye(4)) < _ROUNDING, np.eye(4), matrix)  # so that what is not turned stays
+    matrix = np.where(np.abs(matrix - np.eye(4)) < _ROUNDING, np.eye(4), matrix)  # keeps splats exact without rotation
     maps = np.broadcast_to(matrix[:3, :3], (len(splats), 3, 3))
     return splats.deformed(places @ matrix[:3, :3].T + matrix[:3, 3], maps)
 
 
 def _join(context, obj, others, parts):
-    """Let an object take up splats, already in its local space, with all other attributes of their objects."""
+    """Join splats, already in an object's local space, into it, with all other attributes of their objects."""
     copies = [_copied(obj, other, part) for other, part in zip(others, parts, strict=True)]
     everyone = [obj, *copies]
     _keep_places(obj.data, own_places(obj.data))
@@ -201,13 +201,13 @@ def _join(context, obj, others, parts):
     context.view_layer.update()
     with context.temp_override(active_object=obj, selected_objects=everyone, selected_editable_objects=everyone):
         bpy.ops.object.join()
-    bpy.data.batch_remove(taken)  # which Blender leaves without an object
-    # It has moved splats by a matrix of single precision, from where they were already right.
+    bpy.data.batch_remove(taken)  # left without users by Blender
+    # Join has transformed positions, which were right already, in single precision.
     write_places(obj.data, read_attribute(obj.data, PLACE).astype(np.float64) + read_attribute(obj.data, DIGITS))
 
 
 def _copied(obj, other, part):
-    """Return a copy of an object at the place of another one, in whose local space its splats are."""
+    """Return a copy of an object with the transform of another one, in whose local space its splats are."""
     copy = other.copy()
     copy.data = other.data.copy()
     copy.parent = None
@@ -220,7 +220,7 @@ def _copied(obj, other, part):
 
 
 def _keep_places(data, places):
-    """Keep places in double precision, (n, 3), as attributes that nothing moves."""
+    """Write positions in double precision, (n, 3), as attributes that transforms leave alone."""
     single = places.astype(np.float32)
     write_attribute(data, PLACE, single, "FLOAT_VECTOR")
     write_attribute(data, DIGITS, places - single, "FLOAT_VECTOR")

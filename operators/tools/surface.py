@@ -1,4 +1,4 @@
-"""Show points as the surface that they lie on: as discs, before anything is analyzed."""
+"""Show points as discs tangent to the surface, without an analysis."""
 
 import bpy
 
