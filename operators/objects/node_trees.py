@@ -83,7 +83,7 @@ class TreeBuilder:
             if isinstance(source, bpy.types.Node):
                 source = next(_in_use(source.outputs))
             if isinstance(source, bpy.types.NodeSocket):
-                self.tree.links.new(source, socket)
+                self.tree.links.new(source, socket, verify_limits=False)  # there is none that it replaces
                 self._columns[node.name] = max(self._columns[node.name], self._columns[source.node.name] + 1)
             elif source is not None:
                 _change(socket, "default_value", source)

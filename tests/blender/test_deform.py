@@ -863,16 +863,13 @@ class TestHolding:
         assert binding.stale_reason(strip) == ""
 
     def test_inputs_of_nodes_that_are_used(self, strip, binding, modifiers):
-        group = modifiers.new_group("Try", "own")
+        group = modifiers.new_group("Try", "own", [("Amount", "Float", "Of something")])
         del group["own"]
-        modifiers.add_input(group, "Amount", "Float", "Of something")
         used = strip.modifiers.new("Try", "NODES")
         used.node_group = group
         strip.meshfree.use_modifiers = True
-        group.links.new(
-            modifiers.add_node(group, "NodeGroupInput", 0, 0).outputs["Geometry"],
-            modifiers.add_node(group, "NodeGroupOutput", 1, 0).inputs["Geometry"],
-        )
+        given, result = (group.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput"))
+        group.links.new(given.outputs["Geometry"], result.inputs["Geometry"])
         bind()
         modifiers.set_input(used, "Amount", 2.0)
         assert "points at rest were moved" in binding.stale_reason(strip)
