@@ -201,8 +201,8 @@ VARIANTS = [
     (handled, "mode_shape", {"animate": True}),
     (handled, "harmonic_field", {}),
     (handled, "geodesic_distance", {}),
-    (handled, "deform_bind", {"step": 37}),
-    (unhandled, "deform_bind", {"step": 37, "at_once": True}),
+    (handled, "deform_bind", {}),
+    (unhandled, "deform_bind", {"at_once": True}),
     (film, "minimal_surface", {"target": "IN_PLACE"}),
     (film, "minimal_surface", {}),
 ]
