@@ -13,11 +13,12 @@ def all_or_nothing(objects):
 
     Their data are copied before: cheap, for Blender copies the values of points only when one of both is written. So
     are the actions of shape keys, and the materials that our own modifiers show. After a failure the copies take their
-    places. What was added since, such as objects, materials and modifiers, is removed, and the active object stays so;
-    modifiers that were removed stay so.
+    places. What was added since, such as objects, materials and modifiers, is removed, and objects are selected and
+    active as before; modifiers that were removed stay so.
     """
     render, layer = bpy.context.scene.render, bpy.context.view_layer
     locked, active = render.use_lock_interface, getattr(layer.objects.active, "name", "")
+    selected = [obj.name for obj in layer.objects.selected]
     kept = {}  # of objects that share their data one copy
     try:
         for block in dict.fromkeys(block for obj in objects for block in _written(obj)):
@@ -32,8 +33,9 @@ def all_or_nothing(objects):
             for block in list(kept):
                 _replace(block, kept.pop(block))
             _remove(set(bpy.data.user_map()) - there)
-            if layer.objects.active is None:  # for what was added had been it
-                layer.objects.active = layer.objects.get(active)
+            layer.objects.active = layer.objects.get(active)
+            for obj in layer.objects:
+                obj.select_set(obj.name in selected)
             raise
     finally:
         _remove(kept.values())

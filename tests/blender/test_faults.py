@@ -145,6 +145,7 @@ def scene():
     return {obj.name: everything(obj) for obj in bpy.data.objects}
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + COUNT))
 def test_fault_while_computing_changes_nothing(fresh, reports, core, seed):
     rng = np.random.default_rng(seed)
