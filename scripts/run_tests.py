@@ -49,10 +49,10 @@ class Suites:
         """Run some tests in an environment as soon as a processor is free; see `isolated`."""
         self._runs.append(self._pool.submit(self._run, name, python, tests, variables))
 
-    def start_half(self, number, name, python, folder, **variables):
-        """Run the first or the second half of the tests of a folder, by their files."""
+    def start_half(self, number, name, python, folder, *options, **variables):
+        """Run the first or the second half of the tests of a folder, by their files, with these options of pytest."""
         files = sorted(path.relative_to(ROOT) for path in (ROOT / folder).glob("test_*.py"))
-        self.start(f"{name}-{number}", python, *files[number - 1 :: 2], **variables)
+        self.start(f"{name}-{number}", python, *options, *files[number - 1 :: 2], **variables)
 
     def results(self):
         """Wait for all; return their outcomes by name."""
@@ -170,11 +170,13 @@ def main():
         package.build([package.this_platform()])
         if options.gui or options.all:  # the longest: not the last
             start_gui(suites, required=options.gui)
+        narrowed = ()  # all tests run in the first Blender
         for version, python in found:
             for blender in pythons.BLENDERS[version][: None if options.all else 1]:
                 environment = ensure_blender(blender, python)
                 for number in (1, 2):
-                    suites.start_half(number, f"blender-{blender}", environment, "tests/blender")
+                    suites.start_half(number, f"blender-{blender}", environment, "tests/blender", *narrowed)
+                narrowed = "-m", "not any_blender"
         for name, python in cores.items():
             suites.start_half(2, name, python, "tests/core")
         results = suites.results()

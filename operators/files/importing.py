@@ -176,15 +176,8 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         reason = self.obstacle(context)
         if reason:  # while the files were read
             raise PointCloudError(reason)
-        chosen, active = context.selected_objects, context.view_layer.objects.active
-        try:
-            with all_or_nothing([]):
-                self._add(context, results)
-        except BaseException:
-            for other in chosen:
-                other.select_set(True)
-            context.view_layer.objects.active = active
-            raise
+        with all_or_nothing([]):
+            self._add(context, results)
         if self._framed:
             _frame_selected(context)
         return {"FINISHED"}

@@ -13,11 +13,12 @@ def all_or_nothing(objects):
 
     Their data are copied before, which is cheap: Blender copies the values of points only on write. So are the actions
     of shape keys, and the materials of our own modifiers. After a failure the copies replace them. Objects, materials,
-    modifiers and so on that were added since are removed, and the active object is kept; removed modifiers are not
-    restored.
+    modifiers and so on that were added since are removed, and objects are selected and active as before; removed
+    modifiers are not restored.
     """
     render, layer = bpy.context.scene.render, bpy.context.view_layer
     locked, active = render.use_lock_interface, getattr(layer.objects.active, "name", "")
+    selected = [obj.name for obj in layer.objects.selected]
     kept = {}  # one copy for objects that share their data
     try:
         for block in dict.fromkeys(block for obj in objects for block in _written(obj)):
@@ -32,8 +33,9 @@ def all_or_nothing(objects):
             for block in list(kept):
                 _replace(block, kept.pop(block))
             _remove(set(bpy.data.user_map()) - there)
-            if layer.objects.active is None:  # it was among what was added
-                layer.objects.active = layer.objects.get(active)
+            layer.objects.active = layer.objects.get(active)
+            for obj in layer.objects:
+                obj.select_set(obj.name in selected)
             raise
     finally:
         _remove(kept.values())

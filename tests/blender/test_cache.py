@@ -78,6 +78,7 @@ def calls(extension, monkeypatch):
     return called
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("case", AGAIN)
 def test_a_second_run_computes_nothing(cache, calls, case):
     name, first, second = AGAIN[case] if len(AGAIN[case]) == 3 else (case, *AGAIN[case])

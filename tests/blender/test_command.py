@@ -63,6 +63,7 @@ FORMATS = {
 }
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
     FORMATS[name](tmp_path / name)
@@ -119,6 +120,7 @@ def test_ply_output_holds_the_points_and_attributes(run, tmp_path):
     assert " lb_component\n" in header
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("suffix", ["ply", "xyz", "csv"])
 def test_points_far_from_the_origin_are_written_where_they_were(extension, run, tmp_path, suffix):
     read_points = importlib.import_module(f"{extension.__name__}.core.files").read_points
@@ -196,6 +198,7 @@ def test_without_output_it_only_prints(run, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["in.obj"]
 
 
+@pytest.mark.any_blender
 def test_settings(core, run, tmp_path):
     write_text(" ")(tmp_path / "in.xyz")
     given = ("--neighbors", 60, "--bandwidth", "global")
@@ -210,6 +213,7 @@ def test_settings(core, run, tmp_path):
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
 
 
+@pytest.mark.any_blender
 def test_boundaries_parts_and_points_left_out_are_told(run, tmp_path):
     points, outermost = grid_points()
     np.savetxt(tmp_path / "in.xyz", np.vstack([points, POINTS + (20.0, 0.0, 0.0), [[0.0, 0.0, 50.0]]]))
@@ -314,6 +318,7 @@ def test_input_is_never_overwritten(run, tmp_path):
     assert (tmp_path / "in.blend").read_bytes() == before
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -444,6 +449,7 @@ class TestVerbs:
         assert run("segment", tmp_path / "a.blend", "--object", "Cloud", "--make-single-user")[0] == 0
 
 
+@pytest.mark.any_blender
 class TestNothingBreaks:
     @pytest.mark.parametrize(
         ("name", "data"),

@@ -18,7 +18,7 @@ from numpy.linalg import LinAlgError
 from tests.blender.clouds import add_group, add_object, differences, everything, sphere_points
 from tests.blender.conftest import MODULE
 from tests.blender.splats import add_splats, bar_splats
-from tests.blender.test_all_or_nothing import bound, by_default, colored, film, handled, keyed, shared, unhandled
+from tests.blender.test_all_or_nothing import bound, by_default, colored, film, handled, keyed, shared, undo, unhandled
 
 COUNT = int(os.environ.get("MESHFREE_FAULTS", "25"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))
@@ -104,16 +104,20 @@ def runs():
 
 
 @pytest.fixture
-def fresh(extension):
+def forget(module):
+    """Function that forgets all that was computed."""
+    cache, live = module("operators.running.cache"), module("operators.deform.live")
+    return lambda: (cache.clear(), live._followers.clear())
+
+
+@pytest.fixture
+def fresh(forget):
     """Function that starts from an empty file, with nothing computed."""
-    cache = importlib.import_module(f"{extension.__name__}.operators.running.cache")
-    live = importlib.import_module(f"{extension.__name__}.operators.deform.live")
 
     def start(make):
         bpy.ops.wm.read_homefile(use_empty=True)
         made = make()
-        cache.clear()
-        live._followers.clear()
+        forget()
         return made
 
     return start
@@ -145,19 +149,22 @@ def scene():
     return {obj.name: everything(obj) for obj in bpy.data.objects}
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + COUNT))
-def test_fault_while_computing_changes_nothing(fresh, reports, core, seed):
+def test_fault_while_computing_changes_nothing(fresh, forget, reports, core, seed):
     rng = np.random.default_rng(seed)
     tried = runs()
     make, name, settings = tried[seed % len(tried)]
     kind = list(FAULTS)[rng.integers(len(FAULTS))]
     fresh(make)
+    bpy.ops.ed.undo_push(message="Made")
     seen = reports()
     getattr(bpy.ops.meshfree, name)(**settings)
     undisturbed, count = scene(), len(seen)
     assert count > 0
 
-    fresh(make)
+    undo()
+    forget()
     before, threads = scene(), threading.active_count()
     error = core.Cancelled("injected") if kind == "Cancelled" else kind("injected")
     seen = reports(int(rng.integers(count)), error)

@@ -76,6 +76,7 @@ def write_las(path, points):
     las.write(path)
 
 
+@pytest.mark.any_blender
 @named(COMMANDS)
 def test_command(run, folder, snippet):  # noqa: F811
     words = shlex.split(snippet.text)[3:]
@@ -96,6 +97,7 @@ def test_background(folder, snippet):
     assert bpy.context.object.meshfree.total_area > 0.0
 
 
+@pytest.mark.any_blender
 @named(snippets("bpy"))
 def test_code(folder, snippet):
     """It runs with a selected cloud that has a boundary, and the groups that the tools look for."""
@@ -114,6 +116,7 @@ def test_code(folder, snippet):
     assert np.isfinite(bpy.context.object.meshfree.total_area)
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize(("verb", "options"), ROWS)
 def test_verbs_have_the_options_and_choices_of_the_table(extension, capsys, verb, options):
     command = importlib.import_module(f"{extension.__name__}.operators.files.command")

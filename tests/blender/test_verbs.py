@@ -85,6 +85,7 @@ class TestMesh:
         assert closed["open_edges"] == 0
         assert closed["faces"] > kept["faces"]
 
+    @pytest.mark.any_blender
     def test_detail(self, run, tmp_path):  # noqa: F811
         write(tmp_path / "a.csv", POINTS)
         coarse, fine = (run("mesh", tmp_path / "a.csv", "--detail", detail)[1][0] for detail in (1, 2))
@@ -163,6 +164,7 @@ class TestCompare:
         assert code == 1
         assert "with --reference-object: Plan, Scan" in line["error"]
 
+    @pytest.mark.any_blender
     def test_what_is_far_away_is_not_compared(self, run, tmp_path):  # noqa: F811
         write(tmp_path / "plan.csv", POINTS)
         both = np.vstack([sphere_points(1100), sphere_points(1000, seed=1) + (9.0, 0.0, 0.0)])
@@ -402,6 +404,7 @@ VERBS = {
 }
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_folder_of_numbered_files(run, tmp_path, monkeypatch, verb):  # noqa: F811
     monkeypatch.chdir(tmp_path)
@@ -428,6 +431,7 @@ def test_files_that_cannot_be_read(run, tmp_path, monkeypatch, verb):  # noqa: F
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -456,6 +460,7 @@ def test_wrong_usage(run, tmp_path, monkeypatch, arguments):  # noqa: F811
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("verb", ["mesh", "compare", "orient", "geodesic-distance", "harmonic-field", "deform"])
 def test_help(extension, capfd, verb):
     command = importlib.import_module(f"{extension.__name__}.operators.files.command")

@@ -33,6 +33,8 @@ def gui(window, request):
     if not window.running:  # it went down in the test before
         window.close()
         window.open()
+    # Most of the time would go by with smooth edges, drawn again and again without a graphics card.
+    window.python("bpy.context.preferences.system.viewport_aa = 'OFF'")
     window.new_file()
     window.python(CLOUDS)
     known = len(window.complaints)

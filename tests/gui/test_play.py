@@ -18,6 +18,7 @@ for vertex in bpy.context.object.data.vertices:
 [(min(members[name]), max(members[name])) for name in ("Handle", "Anchor")]
 """
 MOVED = "np.linalg.norm(attribute(bpy.data.objects['Cloud'], 'lb_displacement'), axis=1).max().round(3)"
+EXACT = "bpy.context.object.rotation_euler.y > 0.5 and bpy.data.objects['Cloud'].data['lb_pose'][0] == 1"
 RENDERING = """
 bpy.context.view_layer.objects.active = bpy.data.objects["Cloud"]
 bpy.ops.meshfree.colormap(attribute="lb_displacement", switch_shading=False)
@@ -234,8 +235,7 @@ class TestDeformation:
         gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'bent.blend')")
         gui.key("r", "y", "3", "0", "Return")
         bent = "attribute(bpy.data.objects['Cloud'], 'lb_displacement').round(3)"
-        gui.wait_until("bpy.data.is_dirty")
-        gui.settle()
+        gui.wait_until(EXACT)
         gui.key("ctrl+s")
         gui.wait_until("not bpy.data.is_dirty")
         gui.python(f"saved = {bent}")
