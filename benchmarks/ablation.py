@@ -200,9 +200,9 @@ def corrections_off(names):
     ]
     corrections = {
         "arcs of sixth order": [(module, "arc_squared", plain_arc) for module in (distances, cells, boundary)],
-        "arcs that bend unevenly": [(module, "arc_squared", even_arc) for module in (distances, cells, boundary)],
+        "arcs of uneven curvature": [(module, "arc_squared", even_arc) for module in (distances, cells, boundary)],
         "Gaussian curvature": [(curvature, "_curved", lambda lengths, *_: np.ones(len(lengths)))],
-        "relief": [(cloud, "measure_squared_slope", lambda nearest, _: np.zeros(len(nearest.points)))],
+        "squared slope": [(cloud, "measure_squared_slope", lambda nearest, _: np.zeros(len(nearest.points)))],
         "h that varies": [(areas, "uneven", np.zeros_like), (weights, "uneven", np.zeros_like)],
         "images across corners": mirrors,
         "areas of the kernel": [(areas, "fast_areas", lambda _, __, cell: cell)],

@@ -30,7 +30,7 @@ CLOUDS = {
     "too few": (lambda points: points[:20], "there are 20\\."),
     "collinear": (lambda points: points * (1, 0, 0), "1000 points.*line"),
     "all at one place": (lambda points: 0 * points, "there are 1 among 1000"),
-    "far from the origin": (far_away, "from the origin.*Move"),
+    "far from the origin": (far_away, "from the origin.*Shift"),
     "lone points only": (scattered, "of 1000 points are in components of too few points.*delete"),
 }
 
