@@ -249,6 +249,23 @@ def test_what_was_active_and_selected_stays_so_if_a_tool_fails_after_it_chose_wh
     assert not differences(scene(), before)
 
 
+def test_place_and_lock_are_put_back(module):
+    obj = handled()
+    bpy.context.view_layer.update()
+    before = scene()
+
+    def move_and_fail():
+        with module("operators.objects.all_or_nothing").all_or_nothing([obj]):
+            obj.location = 1.0, 2.0, 3.0
+            bpy.context.scene.render.use_lock_interface = True
+            raise MemoryError("injected")
+
+    with pytest.raises(MemoryError):
+        move_and_fail()
+    bpy.context.view_layer.update()
+    assert not differences(scene(), before)
+
+
 def with_modifiers():
     obj = keyed()
     bpy.ops.meshfree.colormap()

@@ -8,6 +8,7 @@ import pytest
 
 from tests.blender.clouds import add_group, add_object, sphere_points
 from tests.blender.test_panel import draw
+from tests.blender.test_seeing import add_camera
 
 
 @pytest.fixture
@@ -91,14 +92,6 @@ def test_places_are_shares_of_the_room(overlay):
     assert placed.shares((-50.0, 900.0)) == [0.0, 1.0]
     narrow = overlay.Placed((10.0, 20.0, 60.0, 420.0), (100.0, 200.0))
     assert narrow.corner(narrow.shares((10.0, 20.0))) == (10.0, 20.0)
-
-
-def add_camera():
-    scene = bpy.context.scene
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    camera.location.z = 5.0
 
 
 def legend_texts():

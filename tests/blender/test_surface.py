@@ -8,6 +8,8 @@ from mathutils.bvhtree import BVHTree
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import CORNERS, add_group, add_object, attribute, local_points, sphere_points
+from tests.blender.test_display import rendered
+from tests.blender.test_seeing import add_camera
 
 
 @pytest.fixture
@@ -249,20 +251,10 @@ class TestDeformed:
 
 def brightness(path, below):
     """Render a flat square from above or below; return how bright its middle is."""
-    scene = bpy.context.scene
-    camera = scene.camera or bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    if scene.camera is None:
-        scene.collection.objects.link(camera)
-        scene.camera = camera
-        camera.data.type, camera.data.ortho_scale = "ORTHO", 0.5
+    camera = bpy.context.scene.camera or add_camera()
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.5
     camera.location.z, camera.rotation_euler.x = (-5.0, np.pi) if below else (5.0, 0.0)
-    scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", 1
-    scene.render.resolution_x = scene.render.resolution_y = 8
-    scene.view_settings.view_transform = "Standard"
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(str(path))
-    return np.array(image.pixels).reshape(-1, 4)[:, :3].mean()
+    return rendered(path).mean()
 
 
 def test_the_back_side_is_dimmed_on_demand(tmp_path):
