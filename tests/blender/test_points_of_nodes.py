@@ -150,8 +150,8 @@ class TestUseModifiers:
     @pytest.mark.parametrize(
         ("parts", "reason"),
         [
-            (("points", "points"), "into 800 points, so.* node Points to Vertices at the end of the nodes and apply"),
-            (("cubes",), "into 3,200 points of instances, so.* node Realize Instances at the end of the nodes"),
+            (("points", "points"), "to 800 points, so.* node Points to Vertices at the end of the nodes and apply"),
+            (("cubes",), "to 3,200 points of instances, so.* node Realize Instances at the end of the nodes"),
             (("nothing",), "to 0, so results cannot be written. Apply these modifiers, or turn off Use Modifiers"),
         ],
     )
@@ -161,7 +161,7 @@ class TestUseModifiers:
             add_doubling(obj)
         obj.meshfree.use_modifiers = True
         before = everything(obj)
-        with pytest.raises(RuntimeError, match=f'The modifiers of "Cloud" turn its 400 points {reason}') as raised:
+        with pytest.raises(RuntimeError, match=f'The modifiers of "Cloud" change its 400 points {reason}') as raised:
             bpy.ops.meshfree.analyze()
         assert everything(obj) == before
         offered = bpy.app.version >= (4, 5) and "nothing" not in parts

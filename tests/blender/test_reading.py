@@ -94,7 +94,7 @@ def test_modifier_that_changes_the_number_of_points_is_refused():
     obj.modifiers.new("Array", "ARRAY")
     obj.meshfree.use_modifiers = True
     before = everything(obj)
-    with pytest.raises(RuntimeError, match=r"turn its 1000 points into 2000.*turn off Use Modifiers"):
+    with pytest.raises(RuntimeError, match=r"change its 1000 points to 2000.*turn off Use Modifiers"):
         bpy.ops.meshfree.analyze()
     assert everything(obj) == before
 
