@@ -280,7 +280,7 @@ bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
 print("RUN", bpy.ops.meshfree.analyze(modes=0))
 print("THEN", len([name for name in sys.modules if name.partition(".")[0] == "scipy"]) > 100)
 """
-LIGHT = ("core", "core.arguments", "core.errors", "core.memory", "core.options")
+LIGHT = ("core", "core.arguments", "core.errors", "core.memory", "core.options", "core.types")
 
 
 def test_blender_starts_without_what_only_the_tools_need(archive, tmp_path):
@@ -372,7 +372,7 @@ def test_a_scipy_that_only_looks_fit_is_told_by_the_tool(archive, tmp_path):
     other = other_extension(tmp_path / "other.zip", "1.15.99", {"scipy/__init__.py": "__version__ = '1.15.99'\n"})
     lines = run_apart(tmp_path, BROKEN_SCIPY, other, archive)
     (line,) = [line for line in lines if line.startswith("RESULT")]
-    assert "The scipy of this Python does not serve: cannot import name 'sparse'" in line
+    assert re.search(r"The scipy of this Python does not serve: .*'scipy\.\w+'", line)
     assert "disable the extension that brings another one, or install this one again; then restart." in line
     assert not [line for line in lines if "Traceback" in line]
 

@@ -8,54 +8,15 @@ import pytest
 
 import core
 
-SHOWN = [
-    "CoarseDeformer",
-    "Deformer",
-    "Geodesics",
-    "LaplaceBeltrami.apply",
-    "LaplaceBeltrami.eigenpairs",
-    "LaplaceBeltrami.toward",
-    "LaplacianOptions",
-    "paper.build_laplacian",
-    "Prolongation",
-    "Slopes",
-    "Transport",
-    "blue_noise_subset",
-    "build_laplacian",
-    "check_stability",
-    "deformation_gradients",
-    "displace_by_mode",
-    "estimate_areas",
-    "estimate_normals",
-    "example_sphere",
-    "fair_points",
-    "front_point",
-    "geodesic_distance",
-    "grow",
-    "harmonic_field",
-    "heat_kernel_signature",
-    "iso_lines",
-    "logarithmic_map",
-    "match_modes",
-    "mean_curvature",
-    "mesh_surface",
-    "minimal_surface",
-    "nearest_source",
-    "nodal_domains",
-    "opposite_ends",
-    "orient_normals",
-    "principal_curvatures",
-    "roughness",
-    "segment",
-    "signed_distance",
-    "smooth_points",
-    "solve_poisson",
-    "spectral_filter",
-    "surface_deviation",
-    "surface_discs",
-    "transport",
-    "wave_kernel_signature",
-]
+WITHOUT = {  # functions whose examples are those of what they go with, or which need a file
+    *("band", "boost", "exponential", "fairing", "chebyshev_filter", "check_points", "coarse_deformer", "floaters"),
+    *("modes_needed", "points_that_fit", "signature_energies", "signature_times", "smoothing_base", "values_on_mesh"),
+    *("read_splats", "write_splats"),
+}
+CLASSES = {"CoarseDeformer", "Deformer", "Geodesics", "LaplacianOptions", "Prolongation", "Slopes", "Transport"}
+METHODS = {"LaplaceBeltrami.apply", "LaplaceBeltrami.eigenpairs", "LaplaceBeltrami.toward", "paper.build_laplacian"}
+FUNCTIONS = {name for name in core.__all__ if inspect.isfunction(getattr(core, name))}
+SHOWN = sorted(CLASSES | METHODS | FUNCTIONS - WITHOUT)
 SECTIONS = ["Parameters", "Attributes", "Returns", "Raises", "See Also", "Notes", "References", "Examples"]
 FOUND = {
     test.name: test

@@ -79,7 +79,7 @@ class TestPresets:
 
         gui.click(*menu)
         gui.key("p")  # Paper
-        gui.wait_until("bpy.context.object.meshfree.bandwidth == 'GLOBAL'")
+        gui.wait_until("bpy.context.object.meshfree.laplacian == 'PAPER'")
         gui.click(*menu)
         gui.key("d")  # Default
         gui.wait_until("bpy.context.object.meshfree.bandwidth == 'ADAPTIVE'")
