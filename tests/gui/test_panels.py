@@ -82,7 +82,7 @@ class TestPresets:
         gui.wait_until("bpy.context.object.meshfree.laplacian == 'PAPER'")
         gui.click(*menu)
         gui.key("d")  # Default
-        gui.wait_until("bpy.context.object.meshfree.bandwidth == 'ADAPTIVE'")
+        gui.wait_until("bpy.context.object.meshfree.laplacian == 'DEFAULT'")
 
         gui.python(f"{NEIGHBORS} = {usual + 7}")
         gui.click(plus, y)
