@@ -107,7 +107,7 @@ def smooth_points(
     >>> print(np.linalg.norm(same, axis=1).mean().round(2))
     1.0
     """
-    if not (callable(response) or np.isfinite(whole(response))):
+    if not (callable(response) or whole(response) < np.inf):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
     blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
     base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
