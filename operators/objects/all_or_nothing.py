@@ -13,12 +13,12 @@ def all_or_nothing(objects):
 
     Their data are copied before, which is cheap: Blender copies the values of points only on write. So are the actions
     of shape keys, and the materials of our own modifiers. After a failure the copies replace them. Objects, materials,
-    modifiers and so on that were added since are removed, and objects are selected and active as before; removed
-    modifiers are not restored.
+    modifiers and so on that were added since are removed, and objects are visible, selected and active as before;
+    removed modifiers are not restored.
     """
     render, layer = bpy.context.scene.render, bpy.context.view_layer
     locked, active = render.use_lock_interface, getattr(layer.objects.active, "name", "")
-    selected = [obj.name for obj in layer.objects.selected]
+    seen = {obj.name: (obj.hide_get(), obj.hide_render, obj.select_get()) for obj in layer.objects}
     kept = {}  # one copy for objects that share their data
     try:
         for block in dict.fromkeys(block for obj in objects for block in _written(obj)):
@@ -35,7 +35,9 @@ def all_or_nothing(objects):
             _remove(set(bpy.data.user_map()) - there)
             layer.objects.active = layer.objects.get(active)
             for obj in layer.objects:
-                obj.select_set(obj.name in selected)
+                hidden, obj.hide_render, selected = seen.get(obj.name, (False, False, False))
+                obj.hide_set(hidden)
+                obj.select_set(selected)
             raise
     finally:
         _remove(kept.values())

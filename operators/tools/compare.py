@@ -119,12 +119,11 @@ class CompareOperator(Compare, ShownOperator):
             return f'"{context.object.name}" is compared with one other cloud, and {many} selected. Select one'
         return obstacle(other)
 
-    def finish(self, context, objects, results):
-        """Hide the reference, which covers the colors: last, since failures do not restore visibility."""
-        finished = super().finish(context, objects, results)
+    def conclude(self, context, objects):
+        """Hide the reference, which covers the colors."""
+        super().conclude(context, objects)
         if self.hide_reference:
             hide(objects[0].meshfree.compared_with)
-        return finished
 
 
 class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):
@@ -155,12 +154,11 @@ class MESHFREE_OT_compare_swap(CompareOperator, bpy.types.Operator):
             return "The active object was not compared yet. Press Compare Points under Measure"
         return super().obstacle(context)
 
-    def finish(self, context, objects, results):
+    def conclude(self, context, objects):
         """Make the former reference the active object too."""
-        finished = super().finish(context, objects, results)
+        super().conclude(context, objects)
         hide(objects[0], False)
         activate(context, objects[0])
-        return finished
 
 
 def _compared(context):

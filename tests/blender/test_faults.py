@@ -317,7 +317,7 @@ def test_change_while_computing_beside_the_window(fresh, reports, attended, tmp_
         assert result == {"FINISHED"}, run.reports
         found = everything(obj)["attributes"]
         if change is move:  # the display makes discs for one orientation, and may leave them to the next run
-            drawn = {"lb_disc", ".lb_slope", ".lb_slope_of"} - found.keys()
+            drawn = {"lb_disc", ".lb_slope", ".lb_slope_of", ".lb_color", ".lb_tilt"} - found.keys()
             undisturbed = {name: kept for name, kept in undisturbed.items() if name not in drawn}
         assert found == undisturbed
     else:

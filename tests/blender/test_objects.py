@@ -457,7 +457,7 @@ def test_counts_of_large_groups_come_by_and_by(cloud, module, monkeypatch):
     monkeypatch.setattr(counting, "bpy", Blender)
     monkeypatch.setattr(counting, "_AT_ONCE", 100)
     monkeypatch.setattr(counting, "_CHUNK", 70)
-    monkeypatch.setattr(counting, "_BIT", 0.0001)
+    monkeypatch.setattr(counting, "_STEP", 0.0001)
     cloud.meshfree.boundary_group = "Handle"
     assert counting.members(cloud, "Handle", glance=True) is None
     assert not module("operators.objects.reading").fingerprint(cloud, glance=True)

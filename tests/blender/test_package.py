@@ -203,6 +203,8 @@ def _registered():
 
 def test_switching_off_and_on_leaves_nothing_behind(extension):
     name = extension.__name__
+    bpy.ops.preferences.addon_disable(module=name)  # with what tests before have added
+    bpy.ops.preferences.addon_enable(module=name)
     enabled = _registered()
     assert "MESHFREE_OT_analyze" in enabled["types"]
     try:

@@ -167,7 +167,14 @@ def check_structure(laplacian):
     pairs = stiffness.tocoo()
     assert np.all(pairs.data[pairs.row != pairs.col] <= 0.0)
     assert np.linalg.eigvalsh(stiffness.toarray())[0] >= -1e-12 * abs(stiffness).max()
-    for name in ("normals", "mean_curvature", "gaussian_curvature", "trust", "smoothing_lengths", "kernel_widths"):
+    for name in (
+        "normals",
+        "quadric_mean_curvature",
+        "gaussian_curvature",
+        "trust",
+        "smoothing_lengths",
+        "kernel_widths",
+    ):
         assert np.isfinite(getattr(laplacian, name)).all(), name
     assert_allclose(np.linalg.norm(laplacian.normals, axis=1), 1.0, rtol=1e-9)
     assert 0.0 <= laplacian.trust.min() <= laplacian.trust.max() <= 1.0

@@ -67,6 +67,7 @@ def part(name):
 
 live, job = part("operators.deform.live"), part("operators.running.job")
 """
+EXACT = "bpy.data.objects['Cloud'].data['lb_pose'][0] == 1"
 RESTING = "all(followed.thread is None for followed in live._followed.values())"
 BINDING = "job.running() is not None and job.running().label == 'Bind'"
 
@@ -252,7 +253,7 @@ with bpy.context.temp_override(window=main_window(), area=area, region=region):
     def test_esc_and_return(self, bound):
         bound.python(ANIMATED)
         bound.python("bpy.context.scene.frame_set(6)")
-        bound.wait_until(f"{RESTING} and {MOVED} > 0.4")
+        bound.wait_until(f"{RESTING} and {EXACT} and {MOVED} > 0.4")
         bound.python("bpy.ops.ed.undo_push(message='Pose'); pose = everything(bpy.data.objects['Cloud'])")
         bound.point_at_view()
         bound.python(self.PRESS)
@@ -280,7 +281,7 @@ class TestBake:
         bound.python("bpy.context.scene.frame_set(4)")
         bound.python("handle.location.x = 0.25")  # without a keyframe
         bound.python("bpy.context.view_layer.update()")
-        bound.wait_until(f"{RESTING} and {MOVED} > 0.2")
+        bound.wait_until(f"{RESTING} and {EXACT} and {MOVED} > 0.2")
         bound.settle()
         bound.python("before, place = everything(bpy.data.objects['Cloud']), list(handle.matrix_basis)")
         bound.python("bent = attribute(bpy.data.objects['Cloud'], 'lb_displacement')")
