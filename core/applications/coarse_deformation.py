@@ -15,10 +15,9 @@ from ..operator import LaplaceBeltrami, narrow_laplacian
 from ..types import Bools, Floats, Ints, Progress
 from .deformation import (
     NEIGHBORS,
-    RTOL,
-    STEPS,
     Deformation,
     Deformer,
+    HandleSolver,
     check_constraints,
     components_held,
     followers,
@@ -34,7 +33,7 @@ _SHARP = 1e-10  # share of the squared distance to the last source within which 
 _RIDGE = 1e-2  # share of the spread of sources: weights need not balance less, such as heights above the surface
 
 
-class CoarseDeformer:
+class CoarseDeformer(HandleSolver):
     """Deforms a surface by its handles as `Deformer` does, in a fraction of the time, for dragging.
 
     Some of the points, spread as evenly as the given ones permit, are deformed by a `Deformer` of their own. Each of
@@ -175,36 +174,15 @@ class CoarseDeformer:
         self._rest = self.points[self._carried_points] - self._center
         self._offset = self._rest - weights @ (self.points[self._rows[sources]] - self._center)
 
-    def solve(
-        self,
-        handle_positions: ArrayLike,
-        *,
-        steps: int = STEPS,
-        rtol: float = RTOL,
-        start: ArrayLike | None = None,
-        progress: Progress | None = None,
-    ) -> Floats:
-        """Find the points for new positions of the handles; parameters and result as of `Deformer.solve`."""
-        return self.deform(handle_positions, steps=steps, rtol=rtol, start=start, progress=progress).points
-
-    def deform(
-        self,
-        handle_positions: ArrayLike,
-        *,
-        steps: int = STEPS,
-        rtol: float = RTOL,
-        start: ArrayLike | None = None,
-        progress: Progress | None = None,
+    def _deform(
+        self, target: Floats, most: int, share: float, start: ArrayLike | None, progress: Progress | None
     ) -> Deformation:
-        """Find the points as `solve` does, and report how many steps that took; see `Deformer.deform`."""
-        target = check_positions(handle_positions, len(self.handles), "handle positions", "handle")
-        target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
         result, taken, converged = self.points.copy(), 0, True
         if len(self._moving):
             if start is not None:
                 start = check_positions(start, len(self.points), "starting points", "point")[self._rows]
             placed, taken, converged = self._coarse.deform(
-                target[self._pulled], steps=steps, rtol=rtol, start=start, progress=progress
+                target[self._pulled], steps=most, rtol=share, start=start, progress=progress
             )
             result[self._carried_points] = self._carried(placed)
         result[self._held[self._placed]] = target[self._placed]

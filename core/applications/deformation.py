@@ -1,5 +1,6 @@
 """Deformation of a surface by moved handles, with differential coordinates: Figure 13 of the paper."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -42,7 +43,85 @@ class Deformation(NamedTuple):
     converged: bool
 
 
-class Deformer:
+class HandleSolver(ABC):
+    """The base of solvers for the points of a surface whose handles are moved.
+
+    Attributes
+    ----------
+    points : ndarray, (n, 3)
+        At rest [L].
+    handles, anchors : ndarray of int
+        The points that are moved, and those that stay.
+    """
+
+    points: Floats
+    handles: Ints
+    anchors: Ints
+    _chosen: Ints  # rows of handles, then anchors, whose weight is not zero
+
+    def solve(
+        self,
+        handle_positions: ArrayLike,
+        *,
+        steps: int = STEPS,
+        rtol: float = RTOL,
+        start: ArrayLike | None = None,
+        progress: Progress | None = None,
+    ) -> Floats:
+        """Find the points for new positions of the handles.
+
+        Parameters
+        ----------
+        handle_positions : array_like, (h, 3)
+            Where the handles are to be [L], in the order of their indices.
+        steps : int
+            Most rotation-aware steps; a single one suffices for dragging; with none each component rotates as a whole.
+        rtol : float
+            Stop when no point moves by more than this share of the size.
+        start : array_like, (n, 3), optional
+            Points to estimate the first rotations from, such as the last result of a drag; otherwise those of the
+            linear solution.
+        progress : callable, optional
+            Called as ``progress(stage, fraction)`` before each step; may raise `Cancelled`.
+
+        Returns
+        -------
+        ndarray, (n, 3)
+            The deformed points [L]. Those of components without constraints are where they were; those on no surface
+            follow the nearest point that is.
+
+        Raises
+        ------
+        InvalidPointsError
+            Positions of the wrong shape or type, or not finite.
+        PointCloudError
+            Steps or a tolerance below zero.
+        """
+        return self.deform(handle_positions, steps=steps, rtol=rtol, start=start, progress=progress).points
+
+    def deform(
+        self,
+        handle_positions: ArrayLike,
+        *,
+        steps: int = STEPS,
+        rtol: float = RTOL,
+        start: ArrayLike | None = None,
+        progress: Progress | None = None,
+    ) -> Deformation:
+        """Find the points as `solve` does, with its parameters and errors, and report how many steps that took."""
+        most, share = _check_steps(steps, rtol)
+        target = check_positions(handle_positions, len(self.handles), "handle positions", "handle")
+        target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
+        return self._deform(target, most, share, start, progress)
+
+    @abstractmethod
+    def _deform(
+        self, target: Floats, most: int, share: float, start: ArrayLike | None, progress: Progress | None
+    ) -> Deformation:
+        """Find the points for positions of the chosen constraints, in at most so many steps; see `deform`."""
+
+
+class Deformer(HandleSolver):
     """Deforms a surface by its handles and preserves its details; prepared once, solved for every move.
 
     The deformed points x minimise ``sum_i areas_i |(L x)_i - R_i (L x_o)_i|^2`` over all positions in which handles and
@@ -209,60 +288,10 @@ class Deformer:
             factorize(matrix, starts, lambda share: report("Factors", 0.6 + 0.4 * share)) if len(order) else None
         )
 
-    def solve(
-        self,
-        handle_positions: ArrayLike,
-        *,
-        steps: int = STEPS,
-        rtol: float = RTOL,
-        start: ArrayLike | None = None,
-        progress: Progress | None = None,
-    ) -> Floats:
-        """Find the points for new positions of the handles.
-
-        Parameters
-        ----------
-        handle_positions : array_like, (h, 3)
-            Where the handles are to be [L], in the order of their indices.
-        steps : int
-            Most rotation-aware steps; a single one suffices for dragging; with none each component rotates as a whole.
-        rtol : float
-            Stop when no point moves by more than this share of the size.
-        start : array_like, (n, 3), optional
-            Points to estimate the first rotations from, such as the last result of a drag; otherwise those of the
-            linear solution.
-        progress : callable, optional
-            Called as ``progress(stage, fraction)`` before each step; may raise `Cancelled`.
-
-        Returns
-        -------
-        ndarray, (n, 3)
-            The deformed points [L]. Those of components without constraints are where they were; those on no surface
-            follow the nearest point that is.
-
-        Raises
-        ------
-        InvalidPointsError
-            Positions of the wrong shape or type, or not finite.
-        PointCloudError
-            Steps or a tolerance below zero.
-        """
-        return self.deform(handle_positions, steps=steps, rtol=rtol, start=start, progress=progress).points
-
-    def deform(
-        self,
-        handle_positions: ArrayLike,
-        *,
-        steps: int = STEPS,
-        rtol: float = RTOL,
-        start: ArrayLike | None = None,
-        progress: Progress | None = None,
+    def _deform(
+        self, target: Floats, most: int, share: float, start: ArrayLike | None, progress: Progress | None
     ) -> Deformation:
-        """Find the points as `solve` does, with its parameters and errors, and report how many steps that took."""
         report = progress or (lambda stage, fraction: None)
-        most, share = _check_steps(steps, rtol)
-        target = check_positions(handle_positions, len(self.handles), "handle positions", "handle")
-        target = np.concatenate([target, self.points[self.anchors]])[self._chosen]
         result = self.points.copy()
         loose = self._row < 0
         result[self._held[loose]] = target[loose]
