@@ -11,6 +11,6 @@ from .pairs import Pairs
 from .patches import Patch
 from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values
 from .prolongation import Prolongation, balanced_weights
-from .quadrics import frames
+from .quadrics import along_curves, check_surface, frames
 from .subset import blue_noise_subset
 from .thinning import nearest_in_blocks, thin

@@ -301,7 +301,7 @@ def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None) -> 
     """
     nearest = sample.nearest
     if not sheets:
-        check_surface(nearest.quadrics)
+        check_surface(nearest.quadrics.curved)
         return Surface(sample, nearest.quadrics)
     fitted = fit_sheets(nearest, before.sheets if before else None)
     return Surface(replace(sample, nearest=fitted.nearest), fitted.quadrics, fitted)

@@ -95,7 +95,7 @@ def fit_quadrics(
         covariance = _covariance(offset, share)
         if normals is None:
             variance, frame = np.linalg.eigh(covariance)
-            fitted.curved[block] = variance[:, 1] < _CURVE * variance[:, 2]
+            fitted.curved[block] = along_curves(variance)
         else:
             frame = frames(normals[block])
         unit = 3.0 * np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))  # makes the equations well scaled
@@ -142,15 +142,20 @@ def _sums(left: Floats, right: Floats) -> Floats:
     return np.einsum("ik,ik->i", left, right)
 
 
-def check_surface(quadrics: Quadrics) -> None:
-    """Check that the points are those of a surface, for all that is known of it rests on their quadrics.
+def along_curves(variances: Floats) -> Bools:
+    """Return which neighbourhoods lie along a curve, (k,), by their variances in ascending order, (k, 3)."""
+    return variances[:, 1] < _CURVE * variances[:, 2]
+
+
+def check_surface(curved: Bools) -> None:
+    """Check that the points are those of a surface, by which neighbourhoods lie along a curve, (m,).
 
     Raises
     ------
     NotASurfaceError
         The points of many neighbourhoods lie along a curve.
     """
-    curves, count = np.count_nonzero(quadrics.curved), len(quadrics.curved)
+    curves, count = np.count_nonzero(curved), len(curved)
     if curves > _CURVES * count:
         raise NotASurfaceError(
             f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane."

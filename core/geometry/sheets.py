@@ -122,7 +122,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
     else:
         rows = changed_rows(nearest, before.nearest)
         mixed = before.mixed.put(rows, fit_quadrics(points, index[rows], whole[rows], rows))
-    check_surface(mixed)
+    check_surface(mixed.curved)
     spacing = nearest.spacing
     missed = mixed.misfit > ON * spacing
     planes = mixed.normals.copy()

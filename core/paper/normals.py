@@ -4,8 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
-from ..errors import NotASurfaceError
-from ..geometry import Pairs, fading_weights
+from ..geometry import Pairs, along_curves, check_surface, fading_weights
 from ..kernel import kernel
 from ..types import Floats
 
@@ -49,12 +48,7 @@ def covariance_normals(pairs: Pairs, weighted: bool = True) -> Floats:
         moments[:, 4:] - mean[:, axes[0]] * mean[:, axes[1]]
     )
     variances, directions = np.linalg.eigh(covariance)
-    curve = np.count_nonzero(variances[:, 1] < 5e-3 * variances[:, 2])
-    if curve > 0.01 * len(points):
-        raise NotASurfaceError(
-            f"Around {curve} of {len(points)} points the neighbors lie along a curve, so there is no tangent"
-            " plane. Use points of a surface."
-        )
+    check_surface(along_curves(variances))
     return np.ascontiguousarray(directions[:, :, 0])
 
 
