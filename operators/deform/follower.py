@@ -74,12 +74,14 @@ class Follower:
             self.exact = self._bind(core.Deformer, progress)
         return self
 
-    def move(self, pose: Pose, state: State, start=None, progress=None) -> Moved:
+    def move(self, pose: Pose, discs, state: State, start=None, progress=None) -> Moved:
         """Solve for all points in a pose.
 
         Parameters
         ----------
         pose : Pose
+        discs : ndarray, (n, 3), or None
+            Of the display at rest, normals times radii, to be deformed with the points.
         state : State
             SETTLED, or QUICK for one step.
         start : ndarray, (n, 3), optional
@@ -96,9 +98,9 @@ class Follower:
             solver, steps = self.prepare(progress).exact, pose.steps
         points, _, converged = solver.deform(handles @ bound.matrix.T, steps=steps, start=start, progress=progress)
         displacement, carried = (points - rest) @ np.linalg.inv(bound.matrix).T, {}
-        if bound.splats is not None or pose.discs is not None:
+        if bound.splats is not None or discs is not None:
             gradients = local_gradients(solver.gradients(points), bound.matrix)
-            carried = _carried(bound.splats, pose.discs, bound.rest + displacement, gradients, state)
+            carried = _carried(bound.splats, discs, bound.rest + displacement, gradients, state)
         return Moved(points, displacement, carried, state, converged)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core import Cancelled
+from ..objects.carried import discs_at_rest
 from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..running.job import STOPPED, Job, running
 from ..running.ready import TROUBLES, error_text
@@ -137,12 +138,12 @@ def plan_settled(obj, pose, waits=True):
 
     Unless it `waits`, a new `Follower` gives a quick result first.
     """
-    make, at_once = plan_follower(obj), waits or find(obj) is not None
+    make, discs, at_once = plan_follower(obj), discs_at_rest(obj), waits or find(obj) is not None
 
     def compute(progress):
         follower = make(progress)
         state = State.SETTLED if at_once or is_prepared(follower) else State.QUICK
-        return follower, follower.move(pose, state, progress=progress)
+        return follower, follower.move(pose, discs, state, progress=progress)
 
     return compute
 
@@ -178,7 +179,8 @@ def update(obj, depsgraph=None, wanted=State.SETTLED):
         write(obj, follower, moved, pose)
     elif State.PREPARING in (shown, wanted):
         if follower is not None:
-            write(obj, follower, follower.move(pose, State.QUICK, follower.last.get(obj.session_uid)), pose)
+            start = follower.last.get(obj.session_uid)
+            write(obj, follower, follower.move(pose, discs_at_rest(obj), State.QUICK, start), pose)
         settle_later(obj)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core import PointCloudError
 from ..objects.attributes import in_edit_mesh, point_count, positions_now, tag_changed, write_attribute
-from ..objects.carried import carries, discs_at_rest, write_moved
+from ..objects.carried import carries, write_moved
 from ..objects.quantities import DISPLACEMENT
 
 POSE = "lb_pose"  # custom property of the mesh: the pose of the displacements
@@ -41,8 +41,6 @@ class Pose:
         Transforms of groups by their empties since they were bound, in local space.
     edited : ndarray, (n, 3), or None
         Positions in local space, where some handles are moved in Edit Mode.
-    discs : ndarray, (n, 3), or None
-        Of the display at rest, normals times radii, to be deformed with the points.
     steps : int
         Maximum number of a settled result.
     numbers : ndarray
@@ -52,7 +50,6 @@ class Pose:
     key: tuple
     changes: dict
     edited: np.ndarray | None
-    discs: np.ndarray | None
     steps: int
     numbers: np.ndarray
 
@@ -76,7 +73,7 @@ def read_pose(obj, depsgraph=None) -> Pose:
     asked = (key[1], settings.steps, *(["carried"] if carries(obj) else []))
     checksums = [zlib.crc32(repr(asked).encode()), 0 if edited is None else zlib.crc32(edited)]
     numbers = np.concatenate([checksums, *(change.ravel() for change in changes.values())])
-    return Pose(key, changes, edited, discs_at_rest(obj), settings.steps, numbers)
+    return Pose(key, changes, edited, settings.steps, numbers)
 
 
 def binding_key(obj) -> tuple:
