@@ -178,7 +178,7 @@ def main():
                     suites.start_half(number, f"blender-{blender}", environment, "tests/blender", *narrowed)
                 narrowed = "-m", "not any_blender"
         for name, python in cores.items():
-            suites.start_half(2, name, python, "tests/core")
+            suites.start_half(2, name, python, "tests/core", **threads.get(name, {}))
         results = suites.results()
     if any(name.startswith(MEASURED) for name in results):
         tell_coverage(ensure(MEASURED, "test", pythons.find()[MEASURED.removeprefix("core-")]))
