@@ -81,7 +81,7 @@ class LaplacianOptions:
         _check_neighbors(self)
         _make_positive(self, "bandwidth_factor")
         # About 9 factor^2 neighbors points share a support of 3 h on an even sample; ten keep a plane well determined.
-        narrow = 0.3 if self.bandwidth == "adaptive" else 1.0
+        narrow = 0.12 if self.bandwidth == "adaptive" else 1.0
         if 9.0 * (narrow * self.bandwidth_factor) ** 2 * self.neighbors < 10.0:
             raise PointCloudError(
                 f"A bandwidth factor of {self.bandwidth_factor:g} with {self.neighbors} neighbors leaves fewer"

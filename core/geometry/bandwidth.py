@@ -6,17 +6,29 @@ from scipy.spatial import cKDTree
 
 from ..options import LaplacianOptions
 from ..types import Floats, Ints
+from .boundary import Boundary
+from .cells import Cells
+from .moments import least_error
 from .nearest import ROUNDS, Nearest
+from .quadrics import Quadrics
 
-_WIDTH = 0.18  # h over the radius of the cells, by the root of the neighbours of the options, 100: the narrowest kernel
-# at which the weights of random points have their moments
-_POWER = 8  # of the mean over the neighbourhood: the widest cells decide
+_NARROWEST = 0.108  # h over the radius of the cells, by the root of the neighbours of the options, 100
+_WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
+_MET = 3e-3  # relative error of the moments that no wider kernel is tried for
+_BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
+_POWER = 8  # of the mean over the neighbourhood: the widest cells, and kernels, decide
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
 _FURTHEST = 2.5  # spacings that a gap may be wide, as in rows 25 times denser along than across: it is a hole otherwise
 
 
 def smoothing_lengths(
-    nearest: Nearest, radius: Floats, options: LaplacianOptions, component: Ints | None = None
+    nearest: Nearest,
+    normals: Floats,
+    quadrics: Quadrics,
+    cells: Cells,
+    boundary: Boundary,
+    options: LaplacianOptions,
+    component: Ints | None = None,
 ) -> Floats:
     """Choose h for every point.
 
@@ -24,8 +36,13 @@ def smoothing_lengths(
     ----------
     nearest : Nearest
         Of m points.
-    radius : ndarray, (m,)
-        Radius of each point's Voronoi cell.
+    normals : ndarray, (m, 3)
+        Unit normals of any sign.
+    quadrics : Quadrics
+        Of the points, for how the surface bends.
+    cells : Cells
+        Of the points.
+    boundary : Boundary
     options : LaplacianOptions
         Its bandwidth, neighbors and bandwidth_factor.
     component : ndarray, (m,) int, optional
@@ -35,17 +52,47 @@ def smoothing_lengths(
     -------
     ndarray, (m,)
         Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
-        twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: 1.8 times the radius of
-        the cells around, in the eighth mean. The width of a gap in one direction decides, not the number of points in
-        the others: even points have some 45 inside the kernel then, random ones 115.
+        twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: as narrow as the points
+        and the shape let it be. It starts from 1.08 times the radius of the cells around, in the eighth mean: the width
+        of a gap in one direction decides, not the number of points in the others. Where a wider kernel would meet its
+        moments better by more than the bend of the surface costs it, it is up to 2.2 times as wide. Even points have
+        some 15 others inside it then, random ones 60.
     """
     if options.bandwidth == "adaptive":
-        scale = options.bandwidth_factor * _WIDTH * np.sqrt(options.neighbors)
-        return scale * mean_gaps(nearest, radius, _POWER)
+        lengths = _NARROWEST * np.sqrt(options.neighbors) * mean_gaps(nearest, cells.radius, _POWER)
+        wider = _widening(nearest, normals, quadrics, cells, boundary, lengths)
+        return options.bandwidth_factor * wider * lengths
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
         return np.full(len(distance), options.bandwidth_factor * distance.mean())
     return options.bandwidth_factor * _repeat(nearest.averaging(), distance, 2)
+
+
+def _widening(
+    nearest: Nearest, normals: Floats, quadrics: Quadrics, cells: Cells, boundary: Boundary, lengths: Floats
+) -> Floats:
+    """Return the factor of the narrowest h of every point, (m,), whose errors are least, in the eighth mean.
+
+    Both errors are known before any weights are: what the moments of a point are off by at least, and what the bend of
+    the surface within the kernel costs, which grows with h^2. Wider kernels are tried as long as their sum falls.
+    """
+
+    def error(rows: Ints, factor: float) -> Floats:
+        return least_error(nearest, normals, cells.areas, boundary, factor * lengths, rows) + factor**2 * bend[rows]
+
+    averaging = nearest.averaging()
+    bend = _BENT * lengths**2 * (averaging @ np.einsum("iab,iab->i", quadrics.shape_operator, quadrics.shape_operator))
+    rows, result, factor = np.arange(len(lengths)), np.ones(len(lengths)), 1.0
+    least = error(rows, factor)
+    for _ in range(_TIMES):
+        # Where the moments are met, or better than what more of the bend costs, nothing is to be gained.
+        open_ = least > np.maximum((_WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + _MET)
+        rows, least, factor = rows[open_], least[open_], _WIDER * factor
+        found = error(rows, factor)
+        better = found < least
+        rows, least = rows[better], found[better]
+        result[rows] = factor
+    return (averaging @ result**_POWER) ** (1.0 / _POWER)
 
 
 def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:

@@ -181,7 +181,7 @@ def read_cloud(
     if gaps is None or np.isfinite(edge.distance).any():
         cells = cells_within(edge)
     report("Neighbors", 0.25)
-    lengths = smoothing_lengths(nearest, cells.radius, options, sample.component)
+    lengths = smoothing_lengths(nearest, oriented, quadrics, cells, edge, options, sample.component)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
     own = oriented if given is None else given
 

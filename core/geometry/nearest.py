@@ -43,12 +43,12 @@ class Nearest:
         """Coordinates, (m, 3)."""
         return self.tree.data
 
-    @property
+    @functools.cached_property
     def spacing(self) -> Floats:
         """Distance between points of an even sample as dense as the nearest twelve neighbours, (m,)."""
         return spacing_of(self.distance)
 
-    @property
+    @functools.cached_property
     def apart(self) -> Bools:
         """Which neighbours were left out, as they lie on another sheet, (m, 41) bool."""
         return (self.weight == 0.0) & (fading_weights(self.distance) > 0.0)

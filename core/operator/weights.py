@@ -9,20 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..algebra import Anderson, inverses, on_all_cores
-from ..geometry import dots, frames
-from ..kernel import SECOND_MOMENT, SUPPORT
+from ..geometry import RIDGE, TERMS, EdgeTerms, dots, frames, put_terms
+from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
 
 if TYPE_CHECKING:
     from ..geometry import Cloud, Patch
 
-_ROUNDS = 12  # of the solver, at most
-_ENOUGH = 1e-3  # root mean square of that over h, which a first moment makes of a slope, at which it stops
-_RIDGE = 1e-3  # added to the entropy's Hessian, where the points do not determine the terms
-_LARGEST = 1.0  # largest change of the logarithm of a weight: where more is needed the moments cannot be met
+_ROUNDS = 30  # of the solver, at most
+_ENOUGH = 1e-4  # root mean square of that over h, which a first moment makes of a slope, at which it stops
+_LARGEST = 2.0  # largest change of the logarithm of a weight: where more is needed the moments cannot be met
 _SMALLEST = 1e-8  # regularization of the extrapolation, see `Anderson`
-_TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 
 
 @dataclass(frozen=True)
@@ -80,8 +78,8 @@ def balance_weights(
     """
     lengths = cloud.pairs.lengths
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
-    inverse = inverses(moments.curvature() + _RIDGE * np.eye(_TERMS))
-    goal = np.zeros((len(areas), _TERMS))
+    inverse = inverses(moments.curvature() + RIDGE * np.eye(TERMS))
+    goal = np.zeros((len(areas), TERMS))
     goal[:, 0] = 1.0
     terms, acceleration = np.zeros_like(goal), Anderson(_SMALLEST)
     for step in range(_ROUNDS + 1):
@@ -89,7 +87,7 @@ def balance_weights(
         residual = np.linalg.norm(missing, axis=1)
         if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
-        change = np.einsum("iab,ib->ia", inverse, missing - _RIDGE * terms)
+        change = np.einsum("iab,ib->ia", inverse, missing - RIDGE * terms)
         terms = acceleration.extrapolate(terms, terms + change)
     return Balance(moments.factor(terms), residual)
 
@@ -110,31 +108,6 @@ def _trace(cloud: Cloud, weights: Floats, areas: Floats) -> Floats:
     return second_moment(pairs.lengths, cloud.gaussian_curvature) * (1.0 + uneven(gain))
 
 
-class _Edges:
-    """The terms of points next to boundaries, where the images make all functions even across them."""
-
-    def __init__(self, cloud: Cloud, tangents: Floats) -> None:
-        boundary, lengths = cloud.boundary, cloud.pairs.lengths[:, None]
-        across = np.einsum("tci,isc->sti", tangents, boundary.outward)
-        self._across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
-        self._inside = np.minimum(boundary.distance / lengths, SUPPORT).T
-        self._corner = self._inside[1] < SUPPORT
-
-    def terms(self, rows: Ints, x: Floats, y: Floats) -> tuple[Floats, ...]:
-        """Return the terms of the offsets (x, y) from some points, (5, k).
-
-        The first is the change of the squared distance n to the boundary, ``s^2 - 2 n s`` for an offset by s towards
-        it. Next to a corner, where there are two boundaries, there are no others.
-        """
-        (to_x, to_y), (other_x, other_y) = self._across[:, :, rows]
-        along = to_x * y - to_y * x
-        step, other = to_x * x + to_y * y, other_x * x + other_y * y
-        first = step * (step - 2.0 * self._inside[0, rows])
-        second = np.where(self._corner[rows], other * (other - 2.0 * self._inside[1, rows]), along**2)
-        none = np.zeros_like(x)
-        return first + second, np.where(self._corner[rows], 0.0, along), none, second - first, none
-
-
 class _Moments:
     """The moments of weights around every point, in units of those of the kernel."""
 
@@ -145,7 +118,7 @@ class _Moments:
         self._offsets = np.empty((2, 2, len(weights)), dtype=np.float32)  # seven digits, of numbers about one
         places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
         tangents = frames(cloud.normals)[:, :, 1:].transpose(2, 1, 0).copy()
-        near, edges = cloud.boundary.reached(lengths), _Edges(cloud, tangents)
+        near, edges = cloud.boundary.reached(lengths), EdgeTerms(cloud.boundary, lengths, tangents)
         edge = np.where(near, np.arange(len(near)), -1)
 
         def describe(patch: Patch) -> list[tuple[Ints, Any]]:
@@ -187,11 +160,11 @@ class _Moments:
             basis *= self._weights[patch.pairs] * _factor(patch, basis, terms)
             return basis
 
-        return self._sums(weighted, _TERMS)
+        return self._sums(weighted, TERMS)
 
     def curvature(self) -> Floats:
         """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
-        places = [(i, j) for i in range(_TERMS) for j in range(i + 1)]
+        places = [(i, j) for i in range(TERMS) for j in range(i + 1)]
 
         def products(patch: Patch) -> list[list[Floats]]:
             basis = self._basis(patch)
@@ -199,7 +172,7 @@ class _Moments:
             return [[own[i] * other[j] for i, j in places] for own, other in zip(weighted, basis, strict=True)]
 
         left, right = np.transpose(places)
-        result = np.empty((len(self._unit), _TERMS, _TERMS))
+        result = np.empty((len(self._unit), TERMS, TERMS))
         result[:, left, right] = result[:, right, left] = self._sums(products, len(places))
         return result
 
@@ -209,16 +182,10 @@ class _Moments:
 
     def _basis(self, patch: Patch) -> Floats:
         """Return the terms of the pairs of a patch, (2, 5, pairs), as each end sees them."""
-        result = np.empty((2, _TERMS, patch.pairs.stop - patch.pairs.start))
+        result = np.empty((2, TERMS, patch.pairs.stop - patch.pairs.start))
         at_edges = self._at_edges[patch.pairs.start]
         for basis, offset, (rows, terms) in zip(result, self._offsets[:, :, patch.pairs], at_edges, strict=True):
-            square, x, y, difference, product = basis
-            x[:], y[:] = offset
-            np.multiply(x, x, out=square)
-            np.multiply(y, y, out=product)
-            np.subtract(square, product, out=difference)
-            square += product
-            np.multiply(2.0 * x, y, out=product)
+            put_terms(offset[0], offset[1], basis)
             basis[:, rows] = terms
         return result
 

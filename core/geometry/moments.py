@@ -1,0 +1,162 @@
+"""Moments of pair weights: the terms they are sums of, and how well any weights around a point can meet them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..algebra import blocks, eliminate, on_all_cores
+from ..kernel import SUPPORT, pair_kernel
+from ..types import Floats, Ints
+from .nearest import COUNT, Nearest
+from .quadrics import frames
+from .sheets import on_sheet
+
+if TYPE_CHECKING:
+    from .boundary import Boundary
+
+TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
+RIDGE = 1e-3  # added to the entropy's Hessian, where the points do not determine the terms
+_MOST = (COUNT, 64, 160)  # neighbours looked at, more where the kernel holds more; beyond, any sampling is dense enough
+_LARGEST = 1.0  # change of the logarithm of a weight: a single point leaves as much to the other ends of its pairs
+_STEPS = 8  # of Newton's method
+_SMALL = 1e-3  # relative error of the moments that is none
+_BLOCK = 1 << 11
+
+
+class EdgeTerms:
+    """The terms of points next to boundaries, where the images make all functions even across them."""
+
+    def __init__(self, boundary: Boundary, lengths: Floats, tangents: Floats) -> None:
+        across = np.einsum("tci,isc->sti", tangents, boundary.outward)
+        self._across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+        self._inside = np.minimum(boundary.distance / lengths[:, None], SUPPORT).T
+        self._corner = self._inside[1] < SUPPORT
+
+    def terms(self, rows: Ints, x: Floats, y: Floats) -> tuple[Floats, ...]:
+        """Return the terms of the offsets (x, y) from some points, (5, k).
+
+        The first is the change of the squared distance n to the boundary, ``s^2 - 2 n s`` for an offset by s towards
+        it. Next to a corner, where there are two boundaries, there are no others.
+        """
+        (to_x, to_y), (other_x, other_y) = self._across[:, :, rows]
+        along = to_x * y - to_y * x
+        step, other = to_x * x + to_y * y, other_x * x + other_y * y
+        first = step * (step - 2.0 * self._inside[0, rows])
+        second = np.where(self._corner[rows], other * (other - 2.0 * self._inside[1, rows]), along**2)
+        none = np.zeros_like(x)
+        return first + second, np.where(self._corner[rows], 0.0, along), none, second - first, none
+
+
+def put_terms(x: Floats, y: Floats, terms: Floats) -> None:
+    """Compute the terms of offsets, in units of h: ``x^2 + y^2, x, y, x^2 - y^2, 2 x y``, into (5, ...)."""
+    square, first, second, difference, product = terms
+    first[:], second[:] = x, y
+    np.multiply(x, x, out=square)
+    np.multiply(y, y, out=product)
+    np.subtract(square, product, out=difference)
+    square += product
+    np.multiply(2.0 * x, y, out=product)
+
+
+def least_error(
+    nearest: Nearest, normals: Floats, areas: Floats, boundary: Boundary, lengths: Floats, rows: Ints
+) -> Floats:
+    """Return what the moments around some points are off by at least, relatively, whatever the weights, (k,).
+
+    Each point has the weights of the kernel times ``exp(p(u))``, with the quadratic polynomial p of the offset u that
+    meets its moments best, as in `balance_weights`, but for itself alone: no other point has a say. The problem is
+    convex in the five coefficients, and solved by Newton's method.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals of any sign.
+    areas : ndarray, (m,)
+        Of the points.
+    boundary : Boundary
+    lengths : ndarray, (m,)
+        Smoothing lengths.
+    rows : ndarray, (k,) int
+        Of which points; zero where the kernel holds more than 160 others.
+    """
+    result, tangents = np.zeros(len(rows)), frames(normals)[:, :, 1:].transpose(2, 1, 0).copy()
+    edges, near = EdgeTerms(boundary, lengths, tangents), boundary.reached(lengths)
+
+    def measure(part: slice) -> None:
+        block = rows[part]
+        found, open_ = np.zeros(len(block)), np.arange(len(block))
+        for most in _MOST:
+            asked = block[open_]
+            if most == COUNT:
+                distance, index = nearest.distance[asked], nearest.index[asked]
+            else:
+                distance, index = nearest.tree.query(nearest.points[asked], k=min(most, len(normals)))
+            whole = (distance[:, -1] > SUPPORT * lengths[asked]) | (len(normals) <= most)
+            found[open_[whole]] = solve(asked[whole], distance[whole, 1:], index[whole, 1:])
+            open_ = open_[~whole]
+            if not len(open_):
+                break
+        result[part] = found
+
+    def solve(rows: Ints, distance: Floats, index: Ints) -> Floats:
+        """Return the least error of some points with these neighbours."""
+        if not len(rows):
+            return np.zeros(0)
+        lengths_here = lengths[rows, None]
+        within = slice(np.count_nonzero(distance < SUPPORT * lengths_here, axis=1).max())
+        distance, index = distance[:, within], index[:, within]
+        density, folded = areas[index], np.flatnonzero(nearest.apart[rows].any(axis=1))
+        density[folded] *= on_sheet(nearest, normals, rows[folded], index[folded], distance[folded])[0]
+        distance = distance / lengths_here
+        chord = nearest.points[index] - nearest.points[rows, None]
+        x, y = (np.einsum("ikc,ci->ik", chord, axis[:, rows]) for axis in tangents)
+        size = distance / np.maximum(np.hypot(x, y), 1e-300)
+        terms = np.empty((TERMS, *x.shape))
+        put_terms(x * size, y * size, terms)
+        weights = pair_kernel(distance)
+        beside = np.flatnonzero(near[rows])
+        if len(beside):
+            width = x.shape[1]
+            of_edge = edges.terms(np.repeat(rows[beside], width), terms[1, beside].ravel(), terms[2, beside].ravel())
+            own, other = boundary.distance[rows[beside], None], boundary.distance[index[beside]]
+            seen = np.isfinite(own) & np.isfinite(other)
+            mirrored = np.where(seen, own, np.inf) * np.where(seen, other, 1.0) / lengths_here[beside, :, None] ** 2
+            image = np.sqrt(distance[beside, :, None] ** 2 + 4.0 * mirrored)
+            weights[beside] += pair_kernel(np.minimum(image, SUPPORT)).sum(axis=2)
+            terms[:, beside] = np.reshape(of_edge, (TERMS, len(beside), width))
+        weights *= density / (4.0 * lengths_here**2)
+        return _solve(terms.astype(np.float32), weights.astype(np.float32))
+
+    on_all_cores(measure, blocks(len(rows), _BLOCK))
+    return result
+
+
+def _solve(terms: Floats, weights: Floats) -> Floats:
+    """Return how near to ``(1, 0, 0, 0, 0)`` the sums of terms, (5, k, views), can be, by weights, (k, views)."""
+    rows = np.arange(len(weights))
+    result, coefficients = np.full(len(rows), np.inf), np.zeros((TERMS, len(rows)), dtype=terms.dtype)
+    for step in range(_STEPS + 1):
+        power = np.einsum("tik,ti->ik", terms, coefficients)
+        weighted = weights * np.exp(np.clip(power, -_LARGEST, _LARGEST))
+        products = [weighted * term for term in terms]
+        missing = -np.array([product.sum(axis=1) for product in products])
+        missing[0] += 1.0
+        result[rows] = np.minimum(result[rows], np.linalg.norm(missing, axis=0))
+        open_ = result[rows] > _SMALL
+        if step == _STEPS or not open_.any():
+            break
+        equations = np.empty((TERMS, TERMS + 1, len(rows)))
+        for row, product in enumerate(products):
+            for column in range(row + 1):
+                equations[row, column] = equations[column, row] = np.einsum("ik,ik->i", product, terms[column])
+        equations[range(TERMS), range(TERMS)] += RIDGE
+        equations[:, TERMS] = missing
+        change = eliminate(equations)[:, TERMS]
+        coefficients += (change / np.maximum(np.linalg.norm(change, axis=0), 1.0)).astype(terms.dtype)
+        if np.count_nonzero(open_) < 0.7 * len(rows):
+            rows, terms, weights, coefficients = rows[open_], terms[:, open_], weights[open_], coefficients[:, open_]
+    return result
