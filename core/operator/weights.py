@@ -17,8 +17,9 @@ from .curvature import second_moment, uneven
 if TYPE_CHECKING:
     from ..geometry import Cloud, Patch
 
-_ROUNDS = 30  # of the solver, at most
-_ENOUGH = 1e-4  # root mean square of that over h, which a first moment makes of a slope, at which it stops
+_ROUNDS = 16  # of the solver, at most
+_AGAIN = 0, 2, 6  # rounds before which the Hessian is computed
+_ENOUGH = 3e-4  # root mean square of that over h, which a first moment makes of a slope, at which it stops
 _LARGEST = 2.0  # largest change of the logarithm of a weight: where more is needed the moments cannot be met
 _SMALLEST = 1e-8  # regularization of the extrapolation, see `Anderson`
 
@@ -55,8 +56,8 @@ def balance_weights(
     Next to a boundary images complete the sums, and functions do not change across it: the quadratic ones are the
     square of the distance to it, and those along it. A pair and its image take one factor.
 
-    It is solved by Newton's method point by point, the other ends of the pairs fixed, and Anderson's extrapolation from
-    the last rounds. Where a few points lie in a row, or on one side, no weights have these moments, and the residual
+    It is solved by Newton's method point by point, the other ends of the pairs fixed, in steps of one at most, and
+    Anderson's extrapolation from the last rounds. Where a few points lie in a row, or on one side, no weights have these moments, and the residual
     is large.
 
     Parameters
@@ -78,16 +79,19 @@ def balance_weights(
     """
     lengths = cloud.pairs.lengths
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
-    inverse = inverses(moments.curvature() + RIDGE * np.eye(TERMS))
     goal = np.zeros((len(areas), TERMS))
     goal[:, 0] = 1.0
-    terms, acceleration = np.zeros_like(goal), Anderson(_SMALLEST)
+    terms = np.zeros_like(goal)
     for step in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)
         if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
+        if step in _AGAIN:
+            inverse = inverses(moments.curvature(terms) + RIDGE * np.eye(TERMS))
+            acceleration = Anderson(_SMALLEST)
         change = np.einsum("iab,ib->ia", inverse, missing - RIDGE * terms)
+        change /= np.maximum(np.linalg.norm(change, axis=1, keepdims=True), 1.0)
         terms = acceleration.extrapolate(terms, terms + change)
     return Balance(moments.factor(terms), residual)
 
@@ -162,13 +166,13 @@ class _Moments:
 
         return self._sums(weighted, TERMS)
 
-    def curvature(self) -> Floats:
+    def curvature(self, terms: Floats) -> Floats:
         """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
-        places = [(i, j) for i in range(TERMS) for j in range(i + 1)]
+        places, terms = [(i, j) for i in range(TERMS) for j in range(i + 1)], terms.T.copy()
 
         def products(patch: Patch) -> list[list[Floats]]:
             basis = self._basis(patch)
-            weighted = self._weights[patch.pairs] * basis
+            weighted = self._weights[patch.pairs] * _factor(patch, basis, terms) * basis
             return [[own[i] * other[j] for i, j in places] for own, other in zip(weighted, basis, strict=True)]
 
         left, right = np.transpose(places)
