@@ -50,6 +50,7 @@ def measure_cells(
     boundary: Boundary,
     component: Ints | None = None,
     report: Report = lambda: None,
+    before: Cells | None = None,
 ) -> Cells:
     """Measure the cell of every point in geodesic polar coordinates around it.
 
@@ -70,6 +71,8 @@ def measure_cells(
         Component of each point; those of others cut nothing.
     report : callable
         Called now and then; may raise `Cancelled`.
+    before : Cells, optional
+        Of the same points without the boundary: only those near it are measured again.
 
     Returns
     -------
@@ -77,9 +80,13 @@ def measure_cells(
     """
     count = len(normals)
     component = np.zeros(count, dtype=int) if component is None else component
-    cells = Cells(np.empty(count), np.empty(count))
+    if before is None:
+        cells, rows = Cells(np.empty(count), np.empty(count)), np.arange(count)
+    else:
+        cells = Cells(before.areas.copy(), before.radius.copy())
+        rows = np.flatnonzero(boundary.distance[:, 0] < np.maximum(nearest.distance[:, -1], before.radius))
     whole = ~np.any(nearest.apart, axis=1)  # no neighbour was left out: more of them can close a cell
-    spacing, rows = nearest.spacing, np.arange(count)
+    spacing = nearest.spacing
     for wider in _WIDER:
         still_open = np.zeros(count, dtype=bool)
 

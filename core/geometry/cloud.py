@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from .boundary import Boundary, find_boundary, given_boundary, measure_boundary,
 from .cells import Cells, measure_cells
 from .components import label_components, move_apart
 from .distances import measure_squared_slope
-from .nearest import Nearest, changed_rows, find_nearest
+from .nearest import Nearest, find_nearest
 from .noise import FILLING, LEFT, MOST, near_misfit, noise_level, project_points
 from .normals import orient_outwards, unit_normals
 from .outliers import find_outliers
@@ -171,15 +172,16 @@ def read_cloud(
     gaussian = quadrics.gaussian_curvature
     gaps, edge = None, no_boundary(len(oriented))
 
-    def cells_within(boundary: Boundary) -> Cells:
-        return measure_cells(nearest, oriented, gaussian, boundary, sample.component, lambda: report("Neighbors", 0.2))
+    def cells_within(boundary: Boundary, before: Cells | None = None) -> Cells:
+        reported = functools.partial(report, "Neighbors", 0.2)
+        return measure_cells(nearest, oriented, gaussian, boundary, sample.component, reported, before)
 
+    cells = cells_within(edge)
     if options.boundary == "auto" and boundary is None and boundary_distance is None:
-        cells = cells_within(edge)
         gaps = mean_gaps(nearest, cells.radius, 1)
     edge = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
-    if gaps is None or np.isfinite(edge.distance).any():
-        cells = cells_within(edge)
+    if np.isfinite(edge.distance).any():
+        cells = cells_within(edge, cells)
     report("Neighbors", 0.25)
     lengths = smoothing_lengths(nearest, oriented, quadrics, cells, edge, options, sample.component)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
@@ -290,10 +292,10 @@ def divide_components(sample: Sample, needed: int) -> Sample:
     return _regroup(sample, label_components(sample.nearest), needed)
 
 
-def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None) -> Surface:
+def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, changed: Bools | None = None) -> Surface:
     """Fit a quadric around every point, to the neighbours of its own sheet if close sheets are to be kept apart.
 
-    `before` is the surface of the same points before some of them moved.
+    `before` is the surface of the same points before some of them, and neighbours of others, `changed`.
 
     Returns
     -------
@@ -303,7 +305,7 @@ def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None) -> 
     if not sheets:
         check_surface(nearest.quadrics.curved)
         return Surface(sample, nearest.quadrics)
-    fitted = fit_sheets(nearest, before.sheets if before else None)
+    fitted = fit_sheets(nearest, before.sheets if before else None, changed)
     return Surface(replace(sample, nearest=fitted.nearest), fitted.quadrics, fitted)
 
 
@@ -322,16 +324,14 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
     near = near_misfit(surface.sample.nearest)
     noise = _noise(surface, near)
     if options.projection != "auto":
-        return _project(surface, noise, np.ones(len(noise), dtype=bool))
+        return _project(surface, noise, np.ones(len(noise), dtype=bool))[0]
     noisy = noise > 0.0
     if noisy.mean() < _MANY:
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
     for _ in range(MOST):
-        level, before = np.where(filling, first, noise), surface.sample.nearest
-        surface = _project(surface, level, noisy)
-        nearest = surface.sample.nearest
-        rows = changed_rows(nearest, before)
+        surface, changed = _project(surface, np.where(filling, first, noise), noisy)
+        nearest, rows = surface.sample.nearest, np.flatnonzero(changed)
         near[rows] = near_misfit(nearest, rows)
         noise, missed = _noise(surface, near), surface.quadrics.misfit / nearest.spacing
         noisy &= np.where(filling, np.median(missed[filling]) if filling.any() else 0.0, noise) > LEFT
@@ -344,11 +344,21 @@ def _noise(surface: Surface, near: Floats) -> Floats:
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 
-def _project(surface: Surface, noise: Floats, moving: Bools) -> Surface:
-    sample, tree = surface.sample, surface.sample.nearest.tree
-    points, rows = tree.data.copy(), np.flatnonzero(moving)
-    points[rows] = project_points(tree, rows, noise, sample.component)
-    return fit_surface(replace(sample, nearest=find_nearest(points)), surface.sheets is not None, surface)
+def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, Bools]:
+    """Move some points onto quadrics through their neighbours.
+
+    Returns
+    -------
+    Surface
+    ndarray, (m,) bool
+        Points that have moved, or have neighbours that did.
+    """
+    sample, nearest = surface.sample, surface.sample.nearest
+    points, rows = nearest.points.copy(), np.flatnonzero(moving)
+    points[rows] = project_points(nearest.tree, rows, noise, sample.component)
+    changed = moving | moving[nearest.index].any(axis=1)
+    moved = replace(sample, nearest=nearest.renewed(points, changed))
+    return fit_surface(moved, surface.sheets is not None, surface, changed), changed
 
 
 def divide_sheets(surface: Surface, needed: int) -> Surface:
@@ -364,25 +374,32 @@ def divide_sheets(surface: Surface, needed: int) -> Surface:
     ComponentError
         Too few points are left.
     """
-    sample = surface.sample
+    sample, fitted = surface.sample, surface.sheets
     sheets = label_sheets(sample.nearest, surface.quadrics.normals, sample.component)
     divided = _regroup(sample, sheets, needed)
-    return surface if divided is sample else fit_surface(divided, True)
+    if divided is sample or fitted is None:
+        return surface
+    kept, changed = sheets >= 0, sample.nearest.across(sheets)
+    rows = np.flatnonzero(kept)
+    before = fitted.take(rows, divided.nearest)
+    return fit_surface(divided, True, Surface(divided, before.quadrics, before), changed[rows])
 
 
 def _regroup(sample: Sample, component: Ints, needed: int) -> Sample:
     """Assign points to other components, and leave out those of component -1; the same sample if nothing changes."""
-    out = component < 0
-    if not out.any() and component.max() == sample.component.max():
+    kept = component >= 0
+    if kept.all() and component.max() == sample.component.max():
         return sample
-    count, left = int(np.count_nonzero(out)), int(np.count_nonzero(~out))
+    count, left = int(np.count_nonzero(~kept)), int(np.count_nonzero(kept))
     if left < max(needed, count):
         raise ComponentError(
-            f"{count} of {len(out)} points are in components of too few points. Use points of a surface, or delete the"
+            f"{count} of {len(kept)} points are in components of too few points. Use points of a surface, or delete the"
             " lone ones."
         )
-    scaled, component, moved = sample.scaled.leave_out(out), component[~out], sample.moved[~out]
-    return Sample(scaled, component, find_nearest(move_apart(scaled.points, component) + moved), sample.noise[~out])
+    scaled, changed, moved = sample.scaled.leave_out(~kept), sample.nearest.across(component), sample.moved[kept]
+    component = component[kept]
+    nearest = sample.nearest.renewed(move_apart(scaled.points, component) + moved, changed, kept)
+    return Sample(scaled, component, nearest, sample.noise[kept])
 
 
 def locate_boundary(

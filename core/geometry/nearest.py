@@ -1,8 +1,9 @@
 """The nearest neighbours of every point: a fixed number, before any smoothing length is known."""
 
+from __future__ import annotations
+
 import functools
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 from scipy import sparse
@@ -58,13 +59,44 @@ class Nearest:
         """A quadric around every point through its neighbours, fitted once: `Quadrics`."""
         return fit_quadrics(self.points, self.index, self.weight)
 
-    def keep(self, kept: Bools) -> Self:
+    def keep(self, kept: Bools) -> Nearest:
         """Return the same neighbours with the weight of those not kept, (m, 41) bool, set to zero.
 
         A quadric has six coefficients: a point that would keep fewer than a dozen neighbours keeps all of them.
         """
         few = np.count_nonzero(kept & (self.weight > 0.0), axis=1) < 12
         return replace(self, weight=np.where(kept | few[:, None], self.weight, 0.0))
+
+    def across(self, component: Ints) -> Bools:
+        """Tell which points have neighbours of another component than their own, (m,) bool, by those, (m,) int."""
+        return (component[self.index] != component[:, None]).any(axis=1)
+
+    def renewed(self, points: Floats, changed: Bools, kept: Bools | None = None) -> Nearest:
+        """Return the neighbours of the same points at other places, searched for only where they may be others.
+
+        Quadrics that are known stay so, and are fitted again there.
+
+        Parameters
+        ----------
+        points : ndarray, (k, 3)
+            Of all m points, or of those kept.
+        changed : ndarray, (m,) bool
+            Around which points something has moved against them, or is gone.
+        kept : ndarray, (m,) bool, optional
+            Points that are not left out; all if not given.
+        """
+        width = self.index.shape[1]
+        if len(points) < width:
+            return find_nearest(points)
+        kept = np.ones(len(self.index), dtype=bool) if kept is None else kept
+        rows, row = np.flatnonzero(changed[kept]), (np.cumsum(kept) - 1).astype(np.int32)
+        tree, index, distance = cKDTree(points), row[self.index[kept]], self.distance[kept]
+        distance[rows], index[rows] = tree.query(points[rows], k=width, workers=-1)
+        result = Nearest(tree, index, distance, fading_weights(distance))
+        if "quadrics" in vars(self):
+            fitted = fit_quadrics(points, index[rows], result.weight[rows], rows)
+            vars(result)["quadrics"] = self.quadrics.take(np.flatnonzero(kept)).put(rows, fitted)
+        return result
 
     def averaging(self) -> sparse.csr_array:
         """Return the (m, m) CSR matrix whose product is the weighted mean over the neighbours."""
@@ -79,12 +111,6 @@ def find_nearest(points: Floats) -> Nearest:
     tree = cKDTree(points)
     distance, index = tree.query(points, k=min(COUNT, len(points)), workers=-1)
     return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance))
-
-
-def changed_rows(nearest: Nearest, before: Nearest) -> Ints:
-    """Return which of the same points have moved, or have neighbours that did or that are others than before, (k,)."""
-    moved = (nearest.points != before.points).any(axis=1)
-    return np.flatnonzero(moved | moved[nearest.index].any(axis=1) | (nearest.index != before.index).any(axis=1))
 
 
 def spacing_of(distance: Floats) -> Floats:

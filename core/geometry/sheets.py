@@ -1,5 +1,7 @@
 """Keep close sheets of a surface apart: which points lie on the same sheet, by normals and by paths along it."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,7 +14,7 @@ from ..algebra import blocks, on_all_cores
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import pair_heights
-from .nearest import ON, SMOOTH, Nearest, changed_rows
+from .nearest import ON, SMOOTH, Nearest
 from .pairs import Pairs
 from .patches import Patch
 from .quadrics import Quadrics, check_surface, fit_quadrics, frames
@@ -100,8 +102,13 @@ class Sheets(NamedTuple):
     mixed: Quadrics
     planes: Floats
 
+    def take(self, rows: Ints, nearest: Nearest) -> Sheets:
+        """Return those of some rows, (k,) int, by the neighbours of these points."""
+        kept = replace(nearest, weight=self.nearest.weight[rows])
+        return Sheets(self.quadrics.take(rows), kept, self.mixed.take(rows), self.planes[rows])
 
-def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
+
+def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | None = None) -> Sheets:
     """Fit a quadric around every point to the neighbours of its own sheet.
 
     Where the quadric of all neighbours misses them, a plane is looked for among those through the point and two of its
@@ -114,13 +121,15 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
         Of m points.
     before : Sheets, optional
         Of the same points before some of them moved, which is kept where nothing has changed.
+    changed : ndarray, (m,) bool, optional
+        Points that have moved, or have neighbours that did or that are others than before.
     """
     points, index, whole = nearest.points, nearest.index, nearest.weight
-    if before is None:
-        rows: Ints = np.arange(len(points))
+    if before is None or changed is None:
+        changed = np.ones(len(points), dtype=bool)
         mixed = nearest.quadrics
     else:
-        rows = changed_rows(nearest, before.nearest)
+        rows = np.flatnonzero(changed)
         mixed = before.mixed.put(rows, fit_quadrics(points, index[rows], whole[rows], rows))
     check_surface(mixed.curved)
     spacing = nearest.spacing
@@ -128,7 +137,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
     planes = mixed.normals.copy()
     if before is not None:
         planes[missed] = before.planes[missed]
-    looked = rows[missed[rows]]
+    looked = np.flatnonzero(missed & changed)
 
     def find(part: slice) -> None:
         block = looked[part]
@@ -136,9 +145,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None) -> Sheets:
         planes[block] = _own_plane(offset, whole[block], spacing[block])
 
     on_all_cores(find, blocks(len(looked), _BLOCK))
-    changed = np.zeros(len(points), dtype=bool)
-    changed[rows] = True
-    changed |= changed[index].any(axis=1)
+    changed = changed | changed[index].any(axis=1)
     asked = np.flatnonzero(changed & (missed | missed[index].any(axis=1)))
     kept = np.ones(index.shape, dtype=bool)
     kept[asked] = on_sheet(nearest, planes, asked, index[asked], nearest.distance[asked])[0]

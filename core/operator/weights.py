@@ -57,8 +57,8 @@ def balance_weights(
     square of the distance to it, and those along it. A pair and its image take one factor.
 
     It is solved by Newton's method point by point, the other ends of the pairs fixed, in steps of one at most, and
-    Anderson's extrapolation from the last rounds. Where a few points lie in a row, or on one side, no weights have these moments, and the residual
-    is large.
+    Anderson's extrapolation from the last rounds. Where a few points lie in a row, or on one side, no weights have
+    these moments, and the residual is large.
 
     Parameters
     ----------
