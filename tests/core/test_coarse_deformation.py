@@ -57,8 +57,8 @@ class TestThinning:
     """Fewer points, as evenly spread."""
 
     def test_none_are_close_and_none_far(self):
-        points = random_sphere(20_000)
-        rows = thin(points, np.full(20_000, 4.0 * np.pi / 20_000), np.ones(20_000), 1000)
+        points = random_sphere(10_000)
+        rows = thin(points, np.full(10_000, 4.0 * np.pi / 10_000), np.ones(10_000), 1000)
         assert 800 < len(rows) < 1200
         assert (np.diff(rows) > 0).all()
         apart = np.linalg.norm(points[rows, None] - points[None, rows], axis=2) + 9.0 * np.eye(len(rows))
@@ -67,9 +67,9 @@ class TestThinning:
         assert apart.min(axis=1).max() < 2.0 * reach
 
     def test_it_does_not_depend_on_the_order(self):
-        points = random_sphere(4000)
-        order = np.random.default_rng(1).permutation(4000)
-        areas, spacing = np.ones(4000), 1.0 + points[:, 0] ** 2
+        points = random_sphere(2000)
+        order = np.random.default_rng(1).permutation(2000)
+        areas, spacing = np.ones(2000), 1.0 + points[:, 0] ** 2
         one = thin(points, areas, spacing, 500)
         other = thin(points[order], areas, spacing[order], 500)
         np.testing.assert_array_equal(np.sort(order[other]), one)
@@ -157,10 +157,10 @@ def test_handles_and_anchors_are_where_they_should_be():
 
 
 def test_it_does_not_depend_on_the_order_of_the_points():
-    points = random_sphere(4000, 3)
-    order = np.random.default_rng(1).permutation(4000)
+    points = random_sphere(2000, 3)
+    order = np.random.default_rng(1).permutation(2000)
     results = []
-    for rows in (np.arange(4000), order):
+    for rows in (np.arange(2000), order):
         given = points[rows]
         top = np.flatnonzero(given[:, 2] > 0.8)
         deformer = core.CoarseDeformer(core.build_laplacian(given), top, given[:, 2] < -0.8, count=800)
@@ -205,7 +205,7 @@ def test_it_goes_on_from_the_last_result():
 
 
 def test_few_points_are_all_solved_on():
-    laplacian = core.build_laplacian(random_sphere(1500))
+    laplacian = core.build_laplacian(random_sphere(750))
     z = laplacian.points[:, 2]
     deformer = core.coarse_deformer(laplacian, z > 0.9, z < -0.9, neighbors=40)
     assert isinstance(deformer, core.Deformer)

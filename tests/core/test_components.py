@@ -44,7 +44,7 @@ class TestLabels:
         np.testing.assert_array_equal(label, np.repeat([0, -1 if count < 50 else 1], [1500, count]))
 
     @pytest.mark.parametrize(
-        "points", [random_sphere(3000), uneven_sphere(4000), noisy_sphere(2000, 0.5)], ids=["random", "jump", "noisy"]
+        "points", [random_sphere(1500), uneven_sphere(1000), noisy_sphere(1000, 0.5)], ids=["random", "jump", "noisy"]
     )
     def test_one_surface_is_one_component(self, points):
         assert np.all(label_components(find_nearest(points)) == 0)
@@ -119,7 +119,7 @@ class TestIslands:
 
     @pytest.mark.parametrize("count", [60, 80, 100])
     def test_fewer_points_than_neighbors_are_enough(self, count):
-        points = np.concatenate([fibonacci_sphere(1500), 0.2 * fibonacci_sphere(count) + [3.0, 0.0, 0.0]])
+        points = np.concatenate([fibonacci_sphere(750), 0.2 * fibonacci_sphere(count) + [3.0, 0.0, 0.0]])
         laplacian = core.build_laplacian(points)
         small = laplacian.component == 1
         assert np.count_nonzero(small) == count
@@ -131,7 +131,7 @@ class TestIslands:
 
     def test_a_small_component_has_the_area_that_the_same_points_have_alone(self):
         component = 0.2 * fibonacci_sphere(120) + [3.0, 0.0, 0.0]
-        together = core.estimate_areas(np.concatenate([fibonacci_sphere(1500), component]))[1500:]
+        together = core.estimate_areas(np.concatenate([fibonacci_sphere(750), component]))[750:]
         assert together.sum() == pytest.approx(core.estimate_areas(component).sum(), rel=1e-2)
 
     def test_a_small_open_component(self):
@@ -174,7 +174,7 @@ class TestIslands:
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi * 1.49, rel=3e-3)
 
     def test_a_small_noisy_component(self):
-        points = np.concatenate([noisy_sphere(2000, 0.4), 0.15 * noisy_sphere(70, 0.4, 1) + [3.0, 0.0, 0.0]])
+        points = np.concatenate([noisy_sphere(1000, 0.4), 0.15 * noisy_sphere(70, 0.4, 1) + [3.0, 0.0, 0.0]])
         laplacian = core.build_laplacian(points)
         area = laplacian.areas[laplacian.component == 1].sum()
         assert area == pytest.approx(4.0 * np.pi * 0.15**2, rel=0.5)
@@ -229,12 +229,6 @@ class TestLonePoints:
         assert np.all(laplacian.areas[1500:1508] < 1e-200)
         np.testing.assert_allclose(laplacian.areas[1508:], laplacian.areas[:10], rtol=1e-9)
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=3e-3)
-
-    @pytest.mark.parametrize("scale", [1e-4, 1e4])
-    def test_in_any_unit(self, scale):
-        laplacian = core.build_laplacian(scale * np.concatenate([LARGE, LONE]))
-        assert np.all(laplacian.component[1500:] == -1)
-        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi * scale**2, rel=3e-3)
 
     def test_stability_passes_them_by(self, parts):
         stability = core.check_stability(parts)

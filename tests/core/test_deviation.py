@@ -16,7 +16,7 @@ def spacing_of(laplacian):
 @pytest.mark.parametrize("radius", [1.0, 1.02, 1.3, 0.9])
 def test_spheres_of_other_radii(operators, name, radius):
     laplacian = operators(name)
-    normals = fibonacci_sphere(1777)
+    normals = fibonacci_sphere(890)
     found = core.surface_deviation(radius * normals, normals, laplacian)
     assert found.known.all()
     np.testing.assert_allclose(found.distance, radius - 1.0, atol=0.01 * spacing_of(laplacian))
@@ -32,9 +32,9 @@ def test_signs_are_those_of_the_normals(operators):
 
 def test_flat_squares_at_a_distance(operators):
     laplacian = operators("square grid")
-    points = square_random(1000, 5) + [0.0, 0.0, 0.07]
+    points = square_random(500, 5) + [0.0, 0.0, 0.07]
     inside = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.5 - spacing_of(laplacian)
-    found = core.surface_deviation(points, np.tile([0.0, 0.0, 1.0], (1000, 1)), laplacian)
+    found = core.surface_deviation(points, np.tile([0.0, 0.0, 1.0], (500, 1)), laplacian)
     assert found.known[inside].all()
     np.testing.assert_allclose(found.distance[inside], 0.07, atol=1e-6)
 
@@ -56,7 +56,7 @@ def test_points_beside_the_other_surface_are_not_compared(operators):
 
 def test_clouds_that_are_far_apart():
     """As when one is in the coordinates of a national grid, and the other is not: nothing is met."""
-    normals = random_sphere(1500, 0)
+    normals = random_sphere(750, 0)
     rough = normals * (1.0 + 0.2 * np.sin(5.0 * normals[:, :1]) * np.sin(7.0 * normals[:, 1:2]))
     laplacian = core.build_laplacian(rough)
     for far in (1e2, 1e4, 4e6, 1e9):

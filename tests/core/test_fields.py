@@ -16,7 +16,7 @@ def strip():
 
 @pytest.fixture(scope="module")
 def random_strip():
-    return core.build_laplacian(strip_points(2800))
+    return core.build_laplacian(strip_points(1400))
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ def test_a_thin_line_of_fixed_points_parts_the_strip(request, name, value):
 
 
 def test_fixed_boundary_of_a_square():
-    points = square_grid(40)
+    points = square_grid(28)
     laplacian = core.build_laplacian(points)
     boundary = ((points == 0.0) | (points == 1.0))[:, :2].any(axis=1)
     exact = np.sin(np.pi * points[:, 0]) * np.sin(np.pi * points[:, 1])

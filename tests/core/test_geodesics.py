@@ -49,7 +49,7 @@ def test_flat_square_with_its_boundary(operators, sources):
 
 
 def test_the_way_leads_around_a_hole():
-    points = disc_random(3000, 0)[0]
+    points = disc_random(2100, 0)[0]
     radius = np.hypot(points[:, 0], points[:, 1])
     points, radius = points[radius > 0.3], radius[radius > 0.3]
     source = int(np.argmin(np.hypot(points[:, 0] + 0.8, points[:, 1])))

@@ -709,12 +709,6 @@ def test_colors_of_an_obj_with_alpha_are_no_weights(tmp_path):
     assert_allclose(read_points(tmp_path / "a.obj").colors, [[0.5, 0.25, 1.0, 0.75], [1.0, 0.0, 0.0, 1.0]])
 
 
-def test_colors_of_some_vertices_of_an_obj_are_told(tmp_path):
-    (tmp_path / "a.obj").write_text("v 1 2 3\nv 4 5 6 1 0 0\n")
-    (notice,) = read_points(tmp_path / "a.obj").notices
-    assert "left out r, g, b" in notice
-
-
 TURNED = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [500_000, 5_400_000, 300, 1]])
 
 

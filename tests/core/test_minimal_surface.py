@@ -117,7 +117,7 @@ class TestFlat:
         assert film.areas.sum() == pytest.approx(1.0, rel=1e-2)
 
     def test_a_band_of_fixed_points(self):
-        points = square_grid(30)
+        points = square_grid(21)
         inset = np.minimum(points, 1.0 - points)[:, :2].min(axis=1)
         points[:, 2] = 3.0 * np.maximum(inset - 0.1, 0.0) ** 2
         film = core.minimal_surface(points, inset < 0.1)
@@ -126,7 +126,7 @@ class TestFlat:
         assert film.areas.sum() == pytest.approx(1.0, rel=5e-3)
 
     def test_pinned_part_of_a_closed_surface(self):
-        points = fibonacci_sphere(1200)
+        points = fibonacci_sphere(600)
         free = points[:, 2] > 0.6
         film = core.minimal_surface(points, ~free, max_steps=3)
         np.testing.assert_array_equal(film.points[~free], points[~free])
@@ -318,7 +318,7 @@ class TestBoundaryCurve:
 
 
 def test_given_distances_hold_beside_corners_only():
-    points = square_grid(30)
+    points = square_grid(21)
     inset = np.sort(np.minimum(points, 1.0 - points)[:, :2], axis=1)
     boundary = inset[:, 0] == 0.0
     both = core.build_laplacian(points, boundary=boundary, boundary_distance=inset[:, 0])

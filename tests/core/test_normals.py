@@ -25,14 +25,14 @@ def normals_by(method, points):
 
 @pytest.mark.parametrize(("method", "bound"), [("quadric", 0.01), ("wpca", 0.06), ("pca", 0.12)])
 def test_normals_of_a_torus(method, bound):
-    points = torus_points(4000)
+    points = torus_points(2800)
     normals = normals_by(method, points)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, rtol=1e-12)
     assert np.sqrt(np.mean(angle(normals, torus_normals(points)) ** 2)) < bound
 
 
 def test_weighted_covariance_beats_the_plain_one_on_uneven_points():
-    points = torus_points(4000)
+    points = torus_points(2000)
     exact = torus_normals(points)
     errors = {method: angle(normals_by(method, points), exact).mean() for method in ("wpca", "pca")}
     assert errors["wpca"] < errors["pca"]
@@ -40,7 +40,7 @@ def test_weighted_covariance_beats_the_plain_one_on_uneven_points():
 
 @pytest.mark.parametrize("method", ["quadric", "wpca"])
 def test_orientation_points_outwards_on_closed_surfaces(method):
-    points = torus_points(3000)
+    points = torus_points(1500)
     normals = normals_by(method, points)
     assert np.all(np.einsum("ij,ij->i", normals, torus_normals(points)) > 0.9)
 
@@ -89,7 +89,7 @@ def test_terrain_with_what_overhangs_faces_up():
 @pytest.mark.parametrize("turn", [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [1.0, 0.0, 0.0]])
 def test_bowls_and_bodies_face_outwards_whichever_way_they_are_turned(turn):
     """Half a sphere, open above, below or at a side, is what a scanner sees of a body: its outer side is told."""
-    points = hemisphere_random(1500)
+    points = hemisphere_random(750)
     points = points[:, [2, 0, 1]] if turn[1] == 0.0 else points * turn
     normals = core.estimate_normals(points)
     assert np.all(np.einsum("ij,ij->i", normals, points) > 0.5)

@@ -39,7 +39,7 @@ def rms(values):
 @pytest.fixture(scope="module")
 def clouds():
     return {
-        bumpy: (core.build_laplacian(noisy_sphere(4000, bumpy)[0]), noisy_sphere(4000, bumpy)[1])
+        bumpy: (core.build_laplacian(noisy_sphere(2000, bumpy)[0]), noisy_sphere(2000, bumpy)[1])
         for bumpy in (False, True)
     }
 
@@ -138,7 +138,7 @@ def test_few_modes_of_a_sphere_give_the_sphere():
 
 
 def test_details_are_boosted(clouds):
-    laplacian = core.build_laplacian(noisy_sphere(4000, True, 0.0)[0])
+    laplacian = core.build_laplacian(noisy_sphere(2000, True, 0.0)[0])
     boosted = core.smooth_points(laplacian, core.boost(1.5, 15.0))
     error, height = radial(boosted, False)
     assert 1.35 < height < 1.6

@@ -77,11 +77,17 @@ class TestTorus:
 
 
 @pytest.mark.parametrize(
-    ("name", "bound", "mean"),
-    [("random sphere", 1.5e-2, 2.5e-3), ("marching cubes", 5e-3, 1.2e-3), ("edges collapsed", 1e-2, 3e-3)],
+    ("name", "bound", "area", "mean"),
+    [
+        ("even sphere", 3e-3, 1e-4, 1e-3),
+        ("random sphere", 1.5e-2, 1e-4, 2.5e-3),
+        ("marching cubes", 5e-3, 5e-4, 1.2e-3),
+        ("edges collapsed", 1e-2, 1e-3, 3e-3),
+    ],
 )
-def test_sphere(operators, eigenvalues, name, bound, mean):
+def test_sphere(operators, eigenvalues, name, bound, area, mean):
     assert max(sphere_errors(operators(name))[:2]) < bound
+    assert area_error(operators(name), 4.0 * np.pi) < area
     assert errors(eigenvalues(name, 100), sphere_eigenvalues(100)).mean() < mean
 
 
