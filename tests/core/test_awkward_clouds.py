@@ -446,6 +446,30 @@ def test_wrong_arguments_are_refused_in_words(function, fixed, arguments):
                 function(**fixed, **{**arguments, name: junk})
 
 
+@pytest.mark.parametrize(
+    ("function", "fixed", "arguments"),
+    [
+        call
+        for call in PUBLIC
+        if "progress" in inspect.signature(call[0]).parameters and call[0] is not core.smooth_points  # has modes here
+    ],
+)
+def test_work_reports_how_far_it_is_and_may_be_stopped_at_any_report(function, fixed, arguments):
+    reports = []
+    function(**fixed, **arguments, progress=lambda *report: reports.append(report))
+    assert all(0.0 <= fraction <= 1.0 for _, fraction in filter(None, reports))
+    # Minimal surfaces return what they have.
+    for last in {0} if function is core.minimal_surface else {0, len(reports) // 2, len(reports) - 1}:
+        left = iter(range(last))
+
+        def stop(*report, left=left):
+            if next(left, None) is None:
+                raise core.Cancelled
+
+        with pytest.raises(core.Cancelled):
+            function(**fixed, **arguments, progress=stop)
+
+
 @functools.cache
 def bumpy(unit):
     points = square_grid(12) + [0.0, 0.0, 1.0]

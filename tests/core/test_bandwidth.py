@@ -140,7 +140,7 @@ class TestAny:
             pairs.first
         )
 
-    @pytest.mark.parametrize("bandwidth", ["adaptive", "local", "global"])
+    @pytest.mark.parametrize("bandwidth", ["local", "global"])
     def test_free_of_units_position_and_order(self, bandwidth):
         points = uneven_sphere(600)
         order = np.random.default_rng(1).permutation(len(points))

@@ -10,7 +10,7 @@ from benchmarks.samplings import bar, bent_end, fibonacci_sphere, random_sphere,
 from core.applications.coarse_deformation import _linear_weights
 from core.geometry.thinning import thin
 
-COUNT = 1500
+COUNT = 1000
 TURN = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
 TURN *= np.linalg.det(TURN)
 MODES = [
@@ -22,17 +22,17 @@ MODES = [
 
 @functools.cache
 def sphere():
-    return core.build_laplacian(random_sphere(5000))
+    return core.build_laplacian(random_sphere(4000))
 
 
 @functools.cache
 def long_bar():
-    return core.build_laplacian(bar(16, 64)[0])
+    return core.build_laplacian(bar(12, 48)[0])
 
 
 @functools.cache
 def strip():
-    return core.build_laplacian(strip_points(5000))
+    return core.build_laplacian(strip_points(3000))
 
 
 def caps():
@@ -86,14 +86,6 @@ class TestThinning:
     def test_few_points_all_stay(self):
         np.testing.assert_array_equal(thin(random_sphere(50), np.ones(50), np.ones(50), 50), np.arange(50))
 
-    def test_it_may_be_stopped(self):
-        def stop():
-            raise core.Cancelled
-
-        with pytest.raises(core.Cancelled):
-            thin(random_sphere(500), np.ones(500), np.ones(500), 50, report=stop)
-
-
 def test_weights_carry_linear_functions_along_the_surface():
     points = np.random.default_rng(0).uniform(size=(3000, 3)) * (1.0, 1.0, 0.0)
     inside = (np.abs(points - 0.5) < 0.4)[:, :2].all(axis=1)
@@ -124,7 +116,7 @@ def test_what_is_turned_turns(weights):
 @pytest.mark.parametrize("mode", MODES)
 def test_a_lifted_cap_is_close_to_the_exact_one(mode):
     top, bottom = caps()
-    coarse, exact = both(sphere(), top, bottom, 3000, **mode)
+    coarse, exact = both(sphere(), top, bottom, 2600, **mode)
     target = sphere().points[top] + (0.5, 0.0, 0.5)
     assert off(coarse.solve(target), exact.solve(target), sphere()) < 0.02
 
@@ -169,11 +161,11 @@ def test_it_does_not_depend_on_the_order_of_the_points():
 
 
 def test_components_move_by_themselves_and_small_ones_are_not_lost():
-    one, other, free = fibonacci_sphere(6000), 0.2 * fibonacci_sphere(400) + (3.0, 0.0, 0.0), fibonacci_sphere(500)
+    one, other, free = fibonacci_sphere(3000), 0.2 * fibonacci_sphere(400) + (3.0, 0.0, 0.0), fibonacci_sphere(500)
     points = np.concatenate([one, other, free - (3.0, 0.0, 0.0), [[0.0, 9.0, 0.0]]])
     laplacian = core.build_laplacian(points, options=core.LaplacianOptions(neighbors=40))
-    label = np.repeat([0, 1, 2, 3], [6000, 400, 500, 1])
-    handles = np.concatenate([np.arange(0, 6000, 50), np.arange(6000, 6400, 20), [6900]])
+    label = np.repeat([0, 1, 2, 3], [3000, 400, 500, 1])
+    handles = np.concatenate([np.arange(0, 3000, 50), np.arange(3000, 3400, 20), [3900]])
     goal = points.copy()
     goal[label == 0] = one @ TURN.T
     goal[label == 1] += 1.0
@@ -181,9 +173,9 @@ def test_components_move_by_themselves_and_small_ones_are_not_lost():
     deformer = core.CoarseDeformer(laplacian, handles, count=COUNT)
     np.testing.assert_allclose(deformer.solve(goal[handles]), goal, atol=1e-9)
     assert deformer.notices == core.Deformer(laplacian, handles).notices
-    lone = core.CoarseDeformer(laplacian, [6900], count=COUNT).solve([[1.0, 2.0, 3.0]])
-    np.testing.assert_array_equal(lone[:6900], points[:6900])
-    np.testing.assert_array_equal(lone[6900], [1.0, 2.0, 3.0])
+    lone = core.CoarseDeformer(laplacian, [3900], count=COUNT).solve([[1.0, 2.0, 3.0]])
+    np.testing.assert_array_equal(lone[:3900], points[:3900])
+    np.testing.assert_array_equal(lone[3900], [1.0, 2.0, 3.0])
 
 
 def test_weights_of_zero_hold_nothing():
@@ -227,15 +219,9 @@ def test_bad_input_is_refused_as_by_all_points():
             make(sphere(), [0], count=0)
 
 
-def test_progress_is_reported_and_may_stop_the_work():
+def test_stages_are_reported():
     seen = []
     core.CoarseDeformer(sphere(), [0], [1], count=COUNT, progress=lambda *report: seen.append(report))
     assert list(dict.fromkeys(stage for stage, _ in seen)) == ["Points", "Operator", "Equations", "Factors"]
     shares = [share for _, share in seen]
     assert shares == sorted(shares)
-
-    def stop(stage, fraction):
-        raise core.Cancelled
-
-    with pytest.raises(core.Cancelled):
-        core.CoarseDeformer(sphere(), [0], [1], count=COUNT, progress=stop)

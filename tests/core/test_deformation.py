@@ -166,26 +166,6 @@ def test_linear_mode_is_linear():
     assert np.abs(moved[0]).max() > 0.1
 
 
-@pytest.mark.parametrize("aware", [False, True])
-def test_result_follows_scaling_turning_and_order_of_all_points(aware):
-    points = random_sphere(900, 3)
-    top, bottom = np.flatnonzero(points[:, 2] > 0.8), np.flatnonzero(points[:, 2] < -0.8)
-    move = np.array([0.5, 0.0, 0.3])
-    options = core.LaplacianOptions(neighbors=40)
-    deformer = core.Deformer(core.build_laplacian(points, options=options), top, bottom, rotation_aware=aware)
-    plain = deformer.solve(points[top] + move, rtol=1e-9, steps=200)
-    turn = proper(1, 5)[0]
-    order = np.random.default_rng(1).permutation(len(points))
-    rank = np.argsort(order)
-    changed = (100.0 * points @ turn.T + 7.0)[order]
-    laplacian = core.build_laplacian(changed, options=options)
-    deformer = core.Deformer(laplacian, rank[top], rank[bottom], rotation_aware=aware)
-    target = 100.0 * (points[top] + move) @ turn.T + 7.0
-    result = deformer.solve(target, rtol=1e-9, steps=200)
-    assert np.abs(plain - points).max() > 0.5
-    np.testing.assert_allclose(result, (100.0 * plain @ turn.T + 7.0)[order], atol=1e-3)
-
-
 def test_bar_bends_smoothly_and_keeps_its_section():
     points, section, laplacian = small_bar()
     first, last = ends()
@@ -354,7 +334,7 @@ def bound_to_two():
     return core.Deformer(small_sphere(), [0, 1], [2])
 
 
-def test_progress_is_reported_and_may_stop_the_work():
+def test_stages_and_steps_are_reported():
     seen = []
     core.Deformer(small_sphere(), [0], [1], progress=lambda *report: seen.append(report))
     assert list(dict.fromkeys(stage for stage, _ in seen)) == ["Operator", "Equations", "Factors"]
@@ -365,14 +345,6 @@ def test_progress_is_reported_and_may_stop_the_work():
     assert len(fractions) == found.steps + 1
     assert fractions == sorted(fractions)
     assert 0.0 <= fractions[0] < fractions[-1] < 1.0
-
-    def stop(stage, fraction):
-        raise core.Cancelled
-
-    with pytest.raises(core.Cancelled):
-        core.Deformer(small_sphere(), [0], [1], progress=stop)
-    with pytest.raises(core.Cancelled):
-        bound_to_two().solve(small_sphere().points[:2], progress=stop)
 
 
 def test_ends_of_the_benchmarks_bar_are_whole_rows():

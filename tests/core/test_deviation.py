@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
@@ -78,24 +77,6 @@ def test_greatest_distance(operators):
     assert np.array_equal(found.known, normals[:, 2] > 0.0)
 
 
-def test_turned_moved_and_scaled_together(operators):
-    points, normals = 1.1 * random_sphere(700, 3), random_sphere(700, 3)
-    turn, shift = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix(), np.array([30.0, -2.0, 5.0])
-    laplacian = operators("even sphere")
-    before = core.surface_deviation(points, normals, laplacian)
-    moved = core.build_laplacian(20.0 * laplacian.points @ turn.T + shift)
-    after = core.surface_deviation(20.0 * points @ turn.T + shift, normals @ turn.T, moved)
-    np.testing.assert_allclose(after.distance, 20.0 * before.distance, atol=1e-3)
-
-
-def test_order_of_the_points_makes_no_difference(operators):
-    normals = fibonacci_sphere(700)
-    order = np.random.default_rng(2).permutation(700)
-    laplacian = operators("random sphere")
-    one, other = (core.surface_deviation(1.1 * way, way, laplacian) for way in (normals, normals[order]))
-    np.testing.assert_allclose(other.distance, one.distance[order], rtol=1e-12)
-
-
 @pytest.mark.parametrize("greatest", [0.0, -1.0, np.nan, "far"])
 def test_wrong_greatest_distance(operators, greatest):
     with pytest.raises(core.PointCloudError, match="greatest distance"):
@@ -105,11 +86,3 @@ def test_wrong_greatest_distance(operators, greatest):
 def test_normals_that_do_not_fit(operators):
     with pytest.raises(core.InvalidPointsError, match="do not fit 4 points"):
         core.surface_deviation(np.eye(4, 3), np.eye(3), operators("even sphere"))
-
-
-def test_stops(operators):
-    def stop(stage, fraction):
-        raise core.Cancelled
-
-    with pytest.raises(core.Cancelled):
-        core.surface_deviation(np.eye(3), np.eye(3), operators("even sphere"), progress=stop)

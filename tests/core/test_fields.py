@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import fibonacci_sphere, random_sphere, square_grid, strip_points, torus_potential
+from benchmarks.samplings import fibonacci_sphere, square_grid, strip_points, torus_potential
 
 OFF = 1e-6  # rounding, and the tolerance of the solver
 
@@ -155,22 +155,6 @@ def test_indices_and_masks_agree_whatever_their_order(strip):
     )
 
 
-def test_motion_and_scale_do_not_matter():
-    points = random_sphere(800)
-    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
-    order = np.random.default_rng(1).permutation(len(points))
-    moved = core.build_laplacian(50.0 * points[order] @ turn + [1.0, 2.0, 3.0])
-    plain = core.build_laplacian(points)
-    x = points[:, 0]
-    fixed = np.abs(x) > 0.9
-    first = core.harmonic_field(plain, fixed, x[fixed])
-    second = core.harmonic_field(moved, fixed[order], x[order][fixed[order]])
-    np.testing.assert_allclose(second, first[order], atol=1e-5)
-    source = x - plain.areas @ x / plain.areas.sum()
-    first, second = core.solve_poisson(plain, source), core.solve_poisson(moved, source[order])
-    np.testing.assert_allclose(second / 2500.0, first[order], atol=1e-5)
-
-
 def test_parts_without_fixed_points_have_the_mean_value(components):
     top = components.points[:900, 2] > 0.8
     bottom = components.points[:900, 2] < -0.8
@@ -230,13 +214,3 @@ def test_bad_fixed_points(strip, fixed, values, text):
 def test_bad_sources(strip, source, text):
     with pytest.raises(core.InvalidPointsError, match=text):
         core.solve_poisson(strip, source, [0], [0.0])
-
-
-def test_progress_can_cancel(strip):
-    def stop(stage, fraction):
-        assert 0.0 <= fraction < 1.0
-        raise core.Cancelled
-
-    fixed, exact = ends(strip.points)
-    with pytest.raises(core.Cancelled):
-        core.harmonic_field(strip, fixed, exact[fixed], progress=stop)

@@ -132,12 +132,3 @@ class TestProgress:
         fractions = [fraction for _, fraction in calls]
         assert fractions == sorted(fractions)
         assert 0.0 <= fractions[0] <= fractions[-1] < 1.0
-
-    @pytest.mark.parametrize("when", ["Normals", "Operator", "Spectrum"])
-    def test_a_callback_can_cancel(self, when):
-        def stop(stage, fraction):
-            if stage == when:
-                raise core.Cancelled
-
-        with pytest.raises(core.Cancelled):
-            core.build_laplacian(random_sphere(400), progress=stop).eigenpairs(5, progress=stop)

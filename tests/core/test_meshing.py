@@ -208,11 +208,3 @@ def test_detail_that_no_memory_holds(operators):
 def test_detail_coarser_than_the_surface(operators):
     with pytest.raises(core.PointCloudError, match="Raise the detail"):
         core.mesh_surface(operators("even sphere"), 1e-3)
-
-
-def test_stops(operators):
-    def stop(stage, fraction):
-        raise core.Cancelled
-
-    with pytest.raises(core.Cancelled):
-        core.mesh_surface(operators("even sphere"), progress=stop)

@@ -30,7 +30,7 @@ def mixed(normals, seed=0):
 
 @pytest.mark.parametrize("method", ["outside", "winding"])
 def test_torus_and_box_point_outwards(method):
-    points = torus_points(3000)
+    points = torus_points(1500)
     np.testing.assert_allclose(
         core.orient_normals(points, mixed(torus_normals(points)), method=method), torus_normals(points), atol=1e-12
     )
@@ -90,7 +90,7 @@ def test_viewpoint_within_turns_all_inwards_and_one_per_point_outwards():
 
 @pytest.mark.parametrize("distance", [1.5, 3.0, 1000.0])
 def test_the_hidden_side_of_a_closed_surface_does_not_vote(distance):
-    sphere = fibonacci_sphere(1000)
+    sphere = fibonacci_sphere(700)
     seen = core.orient_normals(sphere, mixed(sphere), method="viewpoint", viewpoint=[0.0, distance, 0.0])
     np.testing.assert_allclose(seen, sphere, atol=1e-12)
     half = sphere[:, 1] > 0.2
@@ -107,7 +107,7 @@ def test_viewpoint_of_a_flat_cloud():
 
 
 def test_few_wrong_viewpoints_are_outvoted():
-    sphere = fibonacci_sphere(1000)
+    sphere = fibonacci_sphere(500)
     seen = 3.0 * sphere
     seen[::10] *= -1.0
     np.testing.assert_allclose(

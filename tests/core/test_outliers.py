@@ -55,9 +55,9 @@ def cone_random(count, seed=0):
 def spheres_of_three_densities():
     return np.concatenate(
         [
-            random_sphere(3000),
+            random_sphere(750),
             0.8 * random_sphere(400, 1) + [2.5, 0.0, 0.0],
-            0.1 * fibonacci_sphere(1500) + [0.0, 2.5, 0.0],
+            0.1 * fibonacci_sphere(750) + [0.0, 2.5, 0.0],
         ]
     )
 
@@ -122,7 +122,7 @@ def test_a_layer_of_them_near_the_surface_does_not_change_the_area(share):
 
 
 def test_they_do_not_join_components():
-    points = np.concatenate([random_sphere(2000), random_sphere(2000, 1) + [2.6, 0.0, 0.0]])
+    points = np.concatenate([random_sphere(1000), random_sphere(1000, 1) + [2.6, 0.0, 0.0]])
     laplacian = core.build_laplacian(np.concatenate([points, box_around(points, 0.1)]))
     np.testing.assert_array_equal(np.unique(laplacian.component), [-1, 0, 1])
     assert laplacian.areas.sum() == pytest.approx(8.0 * np.pi, rel=1e-2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import fibonacci_sphere, random_sphere
+from benchmarks.samplings import fibonacci_sphere
 from core.geometry.points import scale_points
 
 
@@ -169,10 +169,13 @@ class TestDuplicates:
 
     def test_the_operator_and_its_spectrum_are_the_same(self, both):
         single, doubled, place = both
-        expected, found = (each.apply(np.sin(3.0 * each.points[:, 0]) + each.points[:, 1]) for each in (single, doubled))
+        expected, found = (
+            each.apply(np.sin(3.0 * each.points[:, 0]) + each.points[:, 1]) for each in (single, doubled)
+        )
         np.testing.assert_allclose(found[place][:600], expected, rtol=0.0, atol=1e-9)
         expected, found = (each.eigenpairs(12).eigenvalues for each in (single, doubled))
         np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-9)
+
 
 class TestGivenNormals:
     def test_they_are_used_as_they_are(self, sphere):
