@@ -86,6 +86,7 @@ class TestThinning:
     def test_few_points_all_stay(self):
         np.testing.assert_array_equal(thin(random_sphere(50), np.ones(50), np.ones(50), 50), np.arange(50))
 
+
 def test_weights_carry_linear_functions_along_the_surface():
     points = np.random.default_rng(0).uniform(size=(3000, 3)) * (1.0, 1.0, 0.0)
     inside = (np.abs(points - 0.5) < 0.4)[:, :2].all(axis=1)

@@ -87,7 +87,7 @@ def test_the_operator_moves_with_the_points(cloud, change):
 
 @pytest.fixture(scope="module", params=["grid", "bent capsule"])
 def even(request):
-    return core.build_laplacian(square_grid(36) if request.param == "grid" else sausage(2000, bent=True)[0])
+    return core.build_laplacian(square_grid(30) if request.param == "grid" else sausage(1400, bent=True)[0])
 
 
 @pytest.mark.parametrize("change", CHANGES)

@@ -237,6 +237,7 @@ class TestEnding:
         assert (film.steps, film.reason) == (1, "cancelled")
         np.testing.assert_array_equal(film.area_history, expected.area_history[:1])
 
+
 class TestRefusals:
     @pytest.mark.parametrize("fixed", [[], [0, 1, 2], np.ones(480, dtype=bool)])
     def test_too_few_or_too_many_fixed(self, coarse, fixed):

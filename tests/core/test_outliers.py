@@ -55,9 +55,9 @@ def cone_random(count, seed=0):
 def spheres_of_three_densities():
     return np.concatenate(
         [
-            random_sphere(750),
+            random_sphere(3000),
             0.8 * random_sphere(400, 1) + [2.5, 0.0, 0.0],
-            0.1 * fibonacci_sphere(750) + [0.0, 2.5, 0.0],
+            0.1 * fibonacci_sphere(1500) + [0.0, 2.5, 0.0],
         ]
     )
 
