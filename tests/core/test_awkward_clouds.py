@@ -79,6 +79,13 @@ KINDS = {
     "flattened": lambda rng, count: sphere(rng, count) * [1.0, 1.0, 1e-6],
     "strip": lambda rng, count: rng.random((count, 3)) * [1.0, 0.01, 0.0],
 }
+SHAPES = {
+    "sphere": lambda u, v: np.stack([np.sqrt(1 - v**2) * np.cos(u), np.sqrt(1 - v**2) * np.sin(u), v], axis=1),
+    "patch": lambda u, v: np.stack([u / np.pi, v, 0.2 * np.sin(u) * v], axis=1),
+    "cylinder": lambda u, v: np.stack([np.cos(u), np.sin(u), v], axis=1),
+    "cube": lambda u, v: np.stack([u / np.pi - 1.0, v, np.sin(40.0 * u * v)], axis=1),  # hardly a surface
+    "line": lambda u, v: np.stack([u, 2.0 * u, -u], axis=1),
+}
 LAYOUTS = {
     "plain": np.asarray,
     "list": lambda points: points.tolist(),
@@ -179,6 +186,8 @@ def check_structure(laplacian):
     assert_allclose(np.linalg.norm(laplacian.normals, axis=1), 1.0, rtol=1e-9)
     assert 0.0 <= laplacian.trust.min() <= laplacian.trust.max() <= 1.0
     assert np.isfinite(core.mean_curvature(laplacian)).all()
+    constant = laplacian.apply(np.ones(len(areas)))[taken]
+    assert np.abs(constant).max() <= 1e-7 * np.max(stiffness.diagonal()[taken] / areas[taken])
     curvatures = core.principal_curvatures(laplacian)
     assert np.isfinite(curvatures.direction).all()
     assert np.abs(curvatures.shape_index).max() <= 1.0
@@ -209,6 +218,50 @@ def test_any_cloud_with_any_options_in_any_order_and_layout(points, options, see
     np.testing.assert_array_equal(after.areas, before.areas[order])
     np.testing.assert_array_equal(after.normals, before.normals[order])
     assert abs(after.stiffness - before.stiffness[order][:, order]).max() <= 1e-15 * abs(before.stiffness).max()
+
+
+@st.composite
+def samples(draw):
+    """Random points on a shape, stretched, noisy and partly doubled, in some unit and place."""
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count = draw(st.integers(110, 220) | st.integers(110, 220) | st.integers(110, 220) | st.integers(1, 110))
+    u, v = random.uniform(0.0, 2.0 * np.pi, count), random.uniform(-1.0, 1.0, count)
+    points = SHAPES[draw(st.sampled_from(list(SHAPES)))](u, v)
+    points *= draw(st.tuples(*[st.sampled_from([0.3, 1.0, 1.0, 2.0])] * 3))
+    points += draw(st.sampled_from([0.0, 0.0, 0.01, 0.1])) * random.standard_normal(points.shape)
+    doubled = draw(st.integers(0, 80))
+    return np.concatenate([points, points[random.integers(0, count, doubled)]])
+
+
+@st.composite
+def changes(draw):
+    """A unit, a rotation and a place."""
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    turn = np.linalg.qr(random.standard_normal((3, 3)))[0]
+    return 10.0 ** draw(st.integers(-6, 6)), turn, draw(st.sampled_from([0.0, 1.0, 100.0])) * random.standard_normal(3)
+
+
+@tried(25)
+@given(points=samples(), change=changes(), seed=st.integers(0, 2**32 - 1))
+def test_any_sample_of_a_shape_has_an_operator_that_moves_with_it_or_is_refused(points, change, seed):
+    scale, turn, shift = change
+    order = np.random.default_rng(seed).permutation(len(points))
+    before = build(points, core.LaplacianOptions())
+    after = build(scale * (points @ turn + shift)[order], core.LaplacianOptions())
+    if isinstance(before, type) or isinstance(after, type):
+        assert before is after
+        return
+    check_structure(before)
+    check_structure(after)
+    np.testing.assert_array_equal(after.component, before.component[order])
+    np.testing.assert_array_equal(after.boundary, before.boundary[order])
+    np.testing.assert_allclose(after.areas, scale**2 * before.areas[order], rtol=1e-5)
+    np.testing.assert_allclose(after.smoothing_lengths, scale * before.smoothing_lengths[order], rtol=1e-6)
+    values = np.sin(3.0 * np.arange(len(points)))
+    size = np.abs(before.apply(values)).max()
+    np.testing.assert_allclose(
+        scale**2 * after.apply(values[order]), before.apply(values)[order], rtol=0.0, atol=1e-4 * size
+    )
 
 
 def ends(laplacian):

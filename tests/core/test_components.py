@@ -102,6 +102,24 @@ class TestIslands:
     def test_nothing_couples_them(self, parts):
         assert parts.stiffness[parts.component == 0][:, parts.component == 1].count_nonzero() == 0
 
+    @pytest.mark.parametrize(
+        ("use", "elsewhere"),
+        [
+            (lambda on: core.geodesic_distance(on, [0]), np.inf),
+            (lambda on: core.signed_distance(on, [0, 1]), np.inf),
+            (lambda on: core.nearest_source(on, [0]), -1),
+            (lambda on: core.grow(on, [0], np.inf), False),
+            (lambda on: np.linalg.norm(core.transport(on, [0], [0.3, 0.5, 0.9]), axis=1), 0.0),
+            (lambda on: core.logarithmic_map(on, 0)[:, 1], np.nan),
+        ],
+        ids=["distance", "signed distance", "nearest source", "grown", "transport", "map"],
+    )
+    def test_what_begins_on_one_stays_there(self, parts, use, elsewhere):
+        found = use(parts)
+        assert np.isfinite(found[:900]).all()
+        assert not np.any(found[:900] == elsewhere)
+        np.testing.assert_array_equal(found[900:], elsewhere)
+
     def test_each_is_oriented_outward(self, parts):
         outward = np.concatenate([SMALL - [4.0, 0.0, 0.0], LARGE])
         normals = np.delete(parts.normals, OUT, axis=0)

@@ -45,14 +45,6 @@ def test_along_a_bent_sausage_and_not_across_the_gap(operators):
     assert not np.any(grown[along > 1.7])
 
 
-def test_only_within_the_part_and_not_to_points_left_out():
-    lone = [[0.0, 9.0, 0.0], [0.0, -9.0, 0.0]]
-    points = np.concatenate([fibonacci_sphere(600), lone, 2.0 * fibonacci_sphere(900) + [9.0, 0.0, 0.0]])
-    laplacian = core.build_laplacian(points)
-    grown = core.grow(laplacian, [0, 601], np.inf)
-    np.testing.assert_array_equal(grown, np.isin(np.arange(len(points)), [*range(600), 601]))
-
-
 def test_points_at_one_place_grow_together():
     laplacian = core.build_laplacian(np.repeat(fibonacci_sphere(600), 2, axis=0))
     grown = core.grow(laplacian, [0], 0.5).reshape(600, 2)

@@ -165,11 +165,6 @@ class TestTransport:
         assert found[near[:, 0] < 0.5 * near[:, 1], 0].min() > 0.95
         assert found[near[:, 1] < 0.5 * near[:, 0], 1].min() > 0.95
 
-    def test_nothing_comes_to_other_components(self):
-        points = np.concatenate([random_sphere(600), random_sphere(600, 1) + [4.0, 0.0, 0.0]])
-        found = core.transport(core.build_laplacian(points), [0], [0.3, 0.5, 0.9])
-        assert_allclose(np.linalg.norm(found, axis=1), np.repeat([1.0, 0.0], 600))
-
     @pytest.mark.parametrize(
         ("sources", "directions", "message"),
         [
@@ -236,12 +231,6 @@ class TestLogarithmicMap:
         laplacian, reports = core.build_laplacian(random_sphere(600)), []
         core.logarithmic_map(laplacian, 7, progress=lambda stage, fraction: reports.append(stage))
         assert {"Equations", "Factors", "Directions", "Lengths", "Distance", "Map"} == set(reports)
-
-    def test_other_components_have_no_place(self):
-        points = np.concatenate([random_sphere(600), random_sphere(600, 1) + [4.0, 0.0, 0.0]])
-        found = core.logarithmic_map(core.build_laplacian(points), 0)
-        assert np.isfinite(found[:600]).all()
-        assert np.isnan(found[600:]).all()
 
     def test_wrong_source(self, square):
         with pytest.raises(core.InvalidPointsError, match="whole numbers below"):
