@@ -174,15 +174,6 @@ class TestText:
         assert table.points.tolist() == [[1.5, 2.0, 3.0], [4.0, 5.0, 6.0]]
         assert (table.attributes, table.colors, table.notices) == ({}, None, [])
 
-    def test_names_say_what_columns_are(self, tmp_path):
-        (tmp_path / "a.csv").write_text(
-            '"id",label,Z,Y,X,R,G,B,heat\n7,tree,3,2,1,255,0,51,0.5\n8,rock,6,5,4,0,0,0,-1\n'
-        )
-        table = read_points(tmp_path / "a.csv")
-        assert table.points.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
-        assert {name: values.tolist() for name, values in table.attributes.items()} == {"id": [7, 8], "heat": [0.5, -1]}
-        assert_allclose(table.colors, [[1.0, 0.0, 0.2, 1.0], [0.0, 0.0, 0.0, 1.0]])
-
     @pytest.mark.parametrize(
         ("text", "error"),
         [

@@ -503,15 +503,10 @@ def named(kind, names, values):
 
 XYZ = named("double", "xyz", PLACES)
 RGB = ("red", "green", "blue")
-PURE = BYTES % 2
 VERTICES = {
     "plain": (XYZ, None, {}),
     "bytes": (XYZ | named("uchar", RGB, BYTES), BYTES / 255.0, {}),
     "single": (XYZ | named("float", RGB, (BYTES / 255.0).astype("f4")), BYTES / 255.0, {}),
-    "floats to 255": (XYZ | named("float", RGB, BYTES.astype("f4")), BYTES / 255.0, {}),
-    "floats 0 or 1": (XYZ | named("float", RGB, PURE.astype("f4")), PURE, {}),
-    "16 bits": (XYZ | named("ushort", RGB, BYTES * 257), BYTES / 255.0, {}),
-    "8 in 16 bits": (XYZ | named("ushort", RGB, BYTES), BYTES / 255.0, {}),
     "normals": (XYZ | named("double", ("nx", "ny", "nz"), UNIT), None, {"normal": UNIT}),
     "numbers": (
         XYZ | {("int", "number"): 2**24 + 1 + np.arange(COUNT)},
