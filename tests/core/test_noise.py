@@ -167,7 +167,7 @@ class TestOperator:
 
     def test_by_planes_that_lie_inside_the_sphere(self):
         plain, plane = (
-            core.paper.build_laplacian(random_sphere(900), denoise=d, areas="uniform") for d in (False, True)
+            core.paper.build_laplacian(random_sphere(600), denoise=d, areas="uniform") for d in (False, True)
         )
         assert plane.areas.sum() < 0.99 * plain.areas.sum()
         assert plane.notices == plain.notices
