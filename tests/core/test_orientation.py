@@ -12,7 +12,7 @@ from core.geometry.orientation import _energies, _least, _near_energies, _patch_
 from tests.core.test_normals import torus_normals
 
 
-def box(count=24):
+def box(count=18):
     """Points of the faces of a cube without its edges, so that no two faces are joined smoothly, and their normals."""
     side = (np.arange(count) + 0.5) / count
     u, v = (grid.ravel() for grid in np.meshgrid(side, side))
@@ -40,7 +40,7 @@ def test_torus_and_box_point_outwards(method):
 
 def test_winding_joins_parts_that_the_scan_left_apart():
     """Four bands of a tube, no two of which share a neighbour: each alone hardly knows its outside."""
-    angle, height = np.meshgrid(2.0 * np.pi * np.arange(120) / 120, np.linspace(-3.0, 3.0, 100))
+    angle, height = np.meshgrid(2.0 * np.pi * np.arange(80) / 80, np.linspace(-3.0, 3.0, 76))
     angle, height = angle.ravel(), height.ravel()
     normals = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
     points = normals + height[:, None] * [0.0, 0.0, 1.0]
