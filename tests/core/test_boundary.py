@@ -232,12 +232,9 @@ class TestImages:
         near = cloud.boundary.distance[:, 0] < 3.0 * cloud.pairs.lengths
         return sums[near]
 
-    def test_they_complete_the_kernel_at_straight_boundaries_and_at_corners(self):
-        cloud = read_cloud(square_grid(42), LaplacianOptions())
-        np.testing.assert_allclose(row_sums(cloud), 1.0, atol=1.5e-2)
-
-    def test_they_complete_the_kernel_halfway_between_corners(self):
-        cloud = read_cloud(square_grid(28), LaplacianOptions())
+    @pytest.mark.parametrize("side", [28, 42])
+    def test_they_complete_the_kernel_at_straight_boundaries_at_corners_and_between(self, side):
+        cloud = read_cloud(square_grid(side), LaplacianOptions())
         np.testing.assert_allclose(row_sums(cloud), 1.0, atol=1.5e-2)
 
     def test_without_them_it_is_cut(self):
@@ -253,19 +250,6 @@ class TestImages:
     def test_both_boundaries_of_a_strip(self, wide):
         points = grid_points(np.arange(wide + 1.0), np.arange(80.0), [0.0])
         assert core.estimate_areas(points).sum() == pytest.approx(79.0 * wide, rel=0.12)
-
-    @pytest.mark.parametrize(
-        "points", [square_random(900), hemisphere_random(900)], ids=["corners and straight", "curved"]
-    )
-    def test_the_stiffness_keeps_its_structure(self, points):
-        laplacian = core.build_laplacian(points)
-        assert np.any(laplacian.boundary)
-        stiffness = laplacian.stiffness
-        assert abs(stiffness - stiffness.T).max() == 0.0
-        assert np.all(np.abs(stiffness.sum(axis=1)) <= 1e-10 * stiffness.diagonal())
-        values = np.linalg.eigvalsh(stiffness.toarray())
-        assert values[0] >= -1e-10 * values[-1]
-        assert values[1] > 1e-8 * values[-1]
 
     def test_areas_of_a_grid_are_even_up_to_its_boundary(self, operators):
         laplacian = operators("square grid")

@@ -218,12 +218,6 @@ class TestLonePoints:
         assert np.all(core.mean_curvature(parts)[OUT] == 0.0)
         assert parts.stiffness[OUT].count_nonzero() == 0
 
-    def test_all_is_finite(self, parts, spectrum):
-        for values in (parts.areas, parts.normals, parts.gaussian_curvature, parts.smoothing_lengths):
-            assert np.all(np.isfinite(values))
-        for values in (parts.stiffness.data, spectrum.eigenvectors, parts.apply(parts.points)):
-            assert np.all(np.isfinite(values))
-
     def test_the_rest_is_what_it_is_without_them(self, parts):
         without = core.build_laplacian(np.concatenate([SMALL, LARGE]))
         np.testing.assert_allclose(np.delete(parts.areas, OUT), without.areas, rtol=1e-7)

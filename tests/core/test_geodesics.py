@@ -94,12 +94,6 @@ def test_points_left_out():
         core.geodesic_distance(laplacian, [900])
 
 
-def test_duplicates_are_no_way_apart():
-    points = fibonacci_sphere(900)
-    found = core.geodesic_distance(core.build_laplacian(np.concatenate([points, points[:5]])), [0])
-    np.testing.assert_allclose(found[900:], found[:5], atol=1e-12)
-
-
 def test_masks_are_sets_too(operators):
     laplacian = operators("even sphere")
     mask = laplacian.points[:, 2] > 0.9

@@ -167,6 +167,24 @@ class TestDuplicates:
         np.testing.assert_allclose(areas[:10], areas[640:], rtol=1e-12)
         assert areas.sum() == pytest.approx(expected.sum(), rel=1e-12)
 
+    @pytest.mark.parametrize(
+        "use",
+        [
+            lambda on: core.geodesic_distance(on, [0]),
+            lambda on: core.grow(on, [0], 0.5).astype(float),
+            lambda on: core.segment(on, 4),
+            lambda on: core.smooth_points(on, 20, keep="area"),
+            lambda on: core.fair_points(on, keep="volume"),
+        ],
+        ids=["distance", "grown", "parts", "smooth", "fair"],
+    )
+    def test_all_that_is_done_is_the_same_at_each_copy(self, both, use):
+        _, doubled, place = both
+        found = use(doubled)[place]
+        np.testing.assert_allclose(found[600:640], found[:40], atol=1e-9)
+        np.testing.assert_allclose(found[640:], found[:10], atol=1e-9)
+        assert np.ptp(found[:40]) > 0.0
+
     def test_the_operator_and_its_spectrum_are_the_same(self, both):
         single, doubled, place = both
         expected, found = (

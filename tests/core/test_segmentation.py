@@ -296,12 +296,6 @@ class TestSegment:
         assert pieces(labels, two_spheres) == [1] * 6
         assert len(np.unique(core.segment(two_spheres, 12)[:600])) == 3
 
-    def test_points_at_one_place_belong_together(self):
-        points = fibonacci_sphere(600) * [1.0, 0.9, 2.5]
-        labels = core.segment(core.build_laplacian(np.repeat(points, 2, axis=0)), 4).reshape(600, 2)
-        np.testing.assert_array_equal(labels[:, 0], labels[:, 1])
-        assert labels.max() == 3
-
     def test_fewer_modes_are_resolved_than_wanted(self, rectangle):
         parts = 35
         with pytest.raises(core.UnresolvedModesError):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import fibonacci_sphere, parallel_sheets, random_sphere, sausage
+from benchmarks.samplings import random_sphere, sausage
 
 
 @pytest.fixture(scope="module")
@@ -31,25 +31,11 @@ def test_nothing_grows_from_nothing_or_by_nothing(sphere):
     np.testing.assert_array_equal(np.flatnonzero(core.grow(sphere, [17, 3], 0.0)), [3, 17])
 
 
-def test_not_to_a_close_sheet():
-    points, sheet, _ = parallel_sheets(20, 1.5)
-    laplacian = core.build_laplacian(points)
-    grown = core.grow(laplacian, np.flatnonzero(sheet == 0)[:1], np.inf)
-    np.testing.assert_array_equal(grown, sheet == 0)
-
-
 def test_along_a_bent_sausage_and_not_across_the_gap(operators):
     laplacian, along = operators("bent capsule"), sausage(bent=True)[1]
     grown = core.grow(laplacian, along < 0.0, 1.5)
     assert np.all(grown[along < 1.3])
     assert not np.any(grown[along > 1.7])
-
-
-def test_points_at_one_place_grow_together():
-    laplacian = core.build_laplacian(np.repeat(fibonacci_sphere(600), 2, axis=0))
-    grown = core.grow(laplacian, [0], 0.5).reshape(600, 2)
-    np.testing.assert_array_equal(grown[:, 0], grown[:, 1])
-    assert 20 < grown[:, 0].sum() < 60
 
 
 @pytest.mark.parametrize("distance", [-1.0, np.nan, None, "far"])
