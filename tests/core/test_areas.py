@@ -163,9 +163,9 @@ def test_areas_by_least_squares_do_not_depend_on_the_unit(points, method):
     np.testing.assert_allclose(0.0254**2 * inches, areas, rtol=0.0, atol=1e-6 * areas.mean())
 
 
-@pytest.mark.parametrize(("method", "count"), [("constrained", 1000), ("uniform", 300)])
+@pytest.mark.parametrize(("method", "count"), [("constrained", 500), ("uniform", 300)])
 def test_areas_that_are_not_found_are_told_with_what_is_left(method, count):
-    points = np.cumsum(np.random.default_rng(0).standard_normal((count, 3)), axis=0)  # hardly a surface
+    points = np.cumsum(np.random.default_rng(1).standard_normal((count, 3)), axis=0)  # hardly a surface
     notices = core.paper.build_laplacian(points, areas=method, regularization=1e-12).notices
     assert any(
         re.match(r"The areas were not found in [\d,]+ steps: a share of \S+ of their eq", text) for text in notices

@@ -181,6 +181,7 @@ USES = {
     "directions": lambda on: on.axes(core.principal_curvatures(on.on).direction),
     "deformed": lambda on: on.places(on.lifted(core.Deformer)),
     "deformed linearly": lambda on: on.places(on.lifted(core.Deformer, rotation_aware=False)),
+    "variation": lambda on: on.numbers(core.surface_variation(on.on)),
     "gradients": lambda on: on.matrices(core.deformation_gradients(on.on, on.on.points * 2.0 - on.shift)),
     "deviation": shifted,
 }
