@@ -19,13 +19,13 @@ from benchmarks.samplings import (
 )
 
 CLOUDS = {
-    "even sphere": lambda: fibonacci_sphere(4000),
-    "random sphere": lambda: random_sphere(5000),
-    "another random sphere": lambda: random_sphere(3500, 11),
-    "marching cubes": lambda: marching_cubes_sphere(39),
-    "edges collapsed": lambda: edge_collapsed_sphere(4000),
-    "density jump": lambda: uneven_sphere(4500),
-    "random torus": lambda: torus_points(5000),
+    "even sphere": lambda: fibonacci_sphere(2500),
+    "random sphere": lambda: random_sphere(4000),
+    "another random sphere": lambda: random_sphere(2000, 11),
+    "marching cubes": lambda: marching_cubes_sphere(30),
+    "edges collapsed": lambda: edge_collapsed_sphere(3000),
+    "density jump": lambda: uneven_sphere(3000),
+    "random torus": lambda: torus_points(3000),
     "coarse torus": lambda: torus_low_discrepancy(2000),
     "fine torus": lambda: torus_low_discrepancy(8000),
     "square grid": lambda: square_grid(60),

@@ -1,6 +1,7 @@
 """The arrows of the house: ui -> operators -> core, the wings of core among themselves, and no bpy in core."""
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -21,14 +22,17 @@ PUBLIC = [
 ]
 
 
+@functools.cache
 def imported(path):
     """Names of the modules that a file imports, relative ones with their dots."""
+    found = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             stem = "." * node.level + (node.module or "")
-            yield from (f"{stem}{'' if stem.endswith('.') else '.'}{alias.name}" for alias in node.names)
+            found += [f"{stem}{'' if stem.endswith('.') else '.'}{alias.name}" for alias in node.names]
+    return found
 
 
 def taken(path):

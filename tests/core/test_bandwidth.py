@@ -39,26 +39,26 @@ def spread(values):
 class TestAdaptive:
     @pytest.mark.parametrize("seed", range(2))
     def test_constant_where_the_density_is(self, seed):
-        points = random_sphere(2500, seed)
+        points = random_sphere(1200, seed)
         adaptive = lengths(points)
         assert spread(adaptive) < 0.06
         assert np.abs(adaptive / adaptive.mean() - 1.0).max() < 0.2
 
     @pytest.mark.parametrize("seed", range(2))
     def test_follows_a_density_jump(self, seed):
-        points = uneven_sphere(4000, seed)
+        points = uneven_sphere(2000, seed)
         adaptive = lengths(points)
         coarse, dense = (adaptive[side * points[:, 2] > 0.5].mean() for side in (-1.0, 1.0))
         assert 1.5 < coarse / dense < 3.3  # the spacing changes threefold, and the sphere bends
 
     def test_varies_slowly(self):
-        for points, most in ((random_sphere(2000), 0.2), (uneven_sphere(2500), 0.9)):
+        for points, most in ((random_sphere(1000), 0.2), (uneven_sphere(1200), 0.9)):
             pairs = read_cloud(points, LaplacianOptions()).pairs
             assert np.abs(np.log(pairs.lengths[pairs.first] / pairs.lengths[pairs.second])).max() < most
 
     def test_a_change_of_density_leaves_the_operator_right(self):
         # Even points, of which one half has four times as many.
-        few, many = fibonacci_sphere(1500), fibonacci_sphere(6000)
+        few, many = fibonacci_sphere(750), fibonacci_sphere(3000)
         points = np.concatenate([few[few[:, 2] > 0.0], many[many[:, 2] < 0.0]])
         laplacian = core.build_laplacian(points)
         x = points[:, 0]
@@ -91,19 +91,18 @@ class TestAdaptive:
         assert lengths(points).min() > 1.2 * spacing
 
     def test_widens_with_irregularity(self):
-        spacing = np.sqrt(4.0 * np.pi / 2500)
-        even, random = (lengths(sphere(2500)).mean() / spacing for sphere in (fibonacci_sphere, random_sphere))
+        spacing = np.sqrt(4.0 * np.pi / 1200)
+        even, random = (lengths(sphere(1200)).mean() / spacing for sphere in (fibonacci_sphere, random_sphere))
         assert random > 1.5 * even
 
-    @pytest.mark.parametrize("side", [40, 60])
-    def test_no_other_at_the_boundary_of_a_grid(self, side):
-        points = square_grid(side)
+    def test_no_other_at_the_boundary_of_a_grid(self):
+        points = square_grid(40)
         adaptive = lengths(points)
         middle = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.25
         np.testing.assert_allclose(adaptive, adaptive[middle].mean(), rtol=0.04)
 
     def test_hardly_any_other_at_the_boundary_of_a_random_square(self):
-        points = square_random(2500)
+        points = square_random(1200)
         adaptive = lengths(points)
         middle = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.25
         np.testing.assert_allclose(adaptive, adaptive[middle].mean(), rtol=0.2)
@@ -121,7 +120,7 @@ class TestAdaptive:
         np.testing.assert_allclose(lengths(points, bandwidth_factor=1.3), 1.3 * lengths(points), rtol=1e-9)
 
     def test_fewer_neighbors_make_them_narrower(self):
-        points = random_sphere(2000)
+        points = random_sphere(1000)
         ratio = lengths(points, neighbors=50).mean() / lengths(points).mean()
         assert ratio == pytest.approx(np.sqrt(0.5), rel=0.05)
 
@@ -140,7 +139,7 @@ class TestAny:
             pairs.first
         )
 
-    @pytest.mark.parametrize("bandwidth", ["adaptive", "local", "global"])
+    @pytest.mark.parametrize("bandwidth", ["local", "global"])
     def test_free_of_units_position_and_order(self, bandwidth):
         points = uneven_sphere(600)
         order = np.random.default_rng(1).permutation(len(points))

@@ -32,14 +32,14 @@ from core.operator.areas import KernelMatrix
 from core.options import LaplacianOptions
 
 CLOSED = {
-    "random sphere": random_sphere(3000),
-    "another random sphere": random_sphere(3000, 5),
-    "marching cubes": marching_cubes_sphere(25),
-    "density jump": uneven_sphere(4000),
-    "random torus": torus_points(3000),
-    "even torus": torus_low_discrepancy(2000),
-    "thin torus": torus_points(3000, minor=0.15),
-    "bent capsule": sausage(bent=True)[0],
+    "random sphere": random_sphere(1500),
+    "another random sphere": random_sphere(1500, 5),
+    "marching cubes": marching_cubes_sphere(20),
+    "density jump": uneven_sphere(2000),
+    "random torus": torus_points(1500),
+    "even torus": torus_low_discrepancy(1000),
+    "thin torus": torus_points(2000, minor=0.15),
+    "bent capsule": sausage(2000, bent=True)[0],
     "closed plate": closed_plate()[0],
 }
 UP = (0.0, 0.0, 1.0)
@@ -97,22 +97,22 @@ class TestFinding:
         np.testing.assert_array_equal(cloud.boundary.at_boundary, np.abs(points[cloud.scaled.first, 2]) > 1.0 - 1e-9)
 
     def test_only_points_near_the_boundary_of_a_random_disc(self):
-        points, distance = disc_random(4000)
+        points, distance = disc_random(2000)
         at_boundary = flat_boundary(points).at_boundary
-        spacing = np.sqrt(np.pi / 4000)
+        spacing = np.sqrt(np.pi / 2000)
         assert distance[at_boundary].max() < 4.0 * spacing
         # A boundary point in every stretch of four spacings.
         angle = np.sort(np.arctan2(points[at_boundary, 1], points[at_boundary, 0]))
         assert np.diff(np.append(angle, angle[0] + 2.0 * np.pi)).max() < 4.0 * spacing
 
     def test_the_boundary_of_a_hole(self):
-        points = square_random(6000)
+        points = square_random(4200)
         center = np.linalg.norm(points - [0.5, 0.5, 0.0], axis=1)
         points, center = points[center > 0.15], center[center > 0.15]
         boundary = flat_boundary(points)
         around = boundary.at_boundary & (center < 0.3)
         assert np.count_nonzero(around) > 40
-        assert center[around].max() < 0.15 + 4.0 / np.sqrt(6000)
+        assert center[around].max() < 0.15 + 4.0 / np.sqrt(4200)
         close = center < 0.2
         # The boundary of a hole bends the other way.
         assert np.median(boundary.curvature[close, 0]) == pytest.approx(-1.0 / 0.15, rel=0.2)
@@ -125,17 +125,17 @@ class TestFinding:
     def test_none_at_the_edge_of_a_thin_lens(self, seed):
         # Two caps that meet at an acute edge, and hardly bend elsewhere.
         rng = np.random.default_rng(seed)
-        radius, angle = np.sqrt(rng.random(6000)), 2.0 * np.pi * rng.random(6000)
-        height = 0.25 * (1.0 - radius**2) * np.where(np.arange(6000) % 2, 1.0, -1.0)
+        radius, angle = np.sqrt(rng.random(3000)), 2.0 * np.pi * rng.random(3000)
+        height = 0.25 * (1.0 - radius**2) * np.where(np.arange(3000) % 2, 1.0, -1.0)
         points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
         assert not np.any(read_cloud(points, LaplacianOptions()).boundary.at_boundary)
 
     @pytest.mark.parametrize("level", [0.1, 0.5])
     def test_none_on_a_noisy_sphere(self, level):
-        assert not np.any(read_cloud(noisy_sphere(2000, level), LaplacianOptions()).boundary.at_boundary)
+        assert not np.any(read_cloud(noisy_sphere(1000, level), LaplacianOptions()).boundary.at_boundary)
 
     def test_switched_off(self):
-        points = square_grid(25)
+        points = square_grid(18)
         off = read_cloud(points, LaplacianOptions(boundary="off")).boundary
         assert not np.any(off.at_boundary)
         assert np.all(np.isinf(off.distance))
@@ -163,8 +163,8 @@ class TestMeasuring:
 
     @pytest.mark.parametrize("seed", range(3))
     def test_distances_and_curvature_on_a_random_disc(self, seed):
-        points, exact = disc_random(2000, seed)
-        spacing = np.sqrt(np.pi / 2000)
+        points, exact = disc_random(1400, seed)
+        spacing = np.sqrt(np.pi / 1400)
         boundary = flat_boundary(points)
         near = exact < 8.0 * spacing
         error = (boundary.distance[near, 0] - exact[near]) / spacing
@@ -176,7 +176,7 @@ class TestMeasuring:
 
     @pytest.mark.parametrize("seed", range(2))
     def test_both_distances_on_a_random_square(self, seed):
-        points = 60.0 * square_random(3600, seed)
+        points = 60.0 * square_random(1800, seed)
         boundary, exact = flat_boundary(points), side_distances(points, 60.0, 60.0)
         near = exact[:, 0] < 8.0
         assert np.abs(boundary.distance[near, 0] - exact[near, 0]).mean() < 0.35
@@ -187,11 +187,11 @@ class TestMeasuring:
         assert np.median(np.abs(boundary.distance[seen, 1] - exact[seen, 1])) < 0.5
 
     def test_distances_along_a_curved_surface(self):
-        points = hemisphere_random(4000)
+        points = hemisphere_random(2000)
         cloud = read_cloud(points, LaplacianOptions())
         scaled = cloud.scaled
         exact = np.arcsin(points[scaled.first, 2])
-        spacing = np.sqrt(2.0 * np.pi / 4000)
+        spacing = np.sqrt(2.0 * np.pi / 2000)
         near = exact < 8.0 * spacing
         error = (cloud.boundary.distance[near, 0] * scaled.scale - exact[near]) / spacing
         assert abs(error.mean()) < 0.15
@@ -200,7 +200,7 @@ class TestMeasuring:
         assert abs(np.median(cloud.boundary.curvature[near, 0])) < 0.1
 
     def test_the_course_leads_no_further_than_its_points(self):
-        points = square_grid(40)
+        points = square_grid(28)
         step = 1.0 / 39.0
         some = (points[:, 0] == 0.0) & (np.abs(points[:, 1] - 0.5) < 6.0 * step)
         nearest = find_nearest(points)
@@ -232,16 +232,13 @@ class TestImages:
         near = cloud.boundary.distance[:, 0] < 3.0 * cloud.pairs.lengths
         return sums[near]
 
-    def test_they_complete_the_kernel_at_straight_boundaries_and_at_corners(self):
-        cloud = read_cloud(square_grid(60), LaplacianOptions())
-        np.testing.assert_allclose(row_sums(cloud), 1.0, atol=1.5e-2)
-
-    def test_they_complete_the_kernel_halfway_between_corners(self):
-        cloud = read_cloud(square_grid(40), LaplacianOptions())
+    @pytest.mark.parametrize("side", [28, 42])
+    def test_they_complete_the_kernel_at_straight_boundaries_at_corners_and_between(self, side):
+        cloud = read_cloud(square_grid(side), LaplacianOptions())
         np.testing.assert_allclose(row_sums(cloud), 1.0, atol=1.5e-2)
 
     def test_without_them_it_is_cut(self):
-        cloud = read_cloud(square_grid(40), LaplacianOptions(boundary="off"))
+        cloud = read_cloud(square_grid(28), LaplacianOptions(boundary="off"))
         sums = row_sums(cloud)
         assert sums.min() < 0.4
         assert sums.max() == pytest.approx(1.0, abs=4e-2)
@@ -254,19 +251,6 @@ class TestImages:
         points = grid_points(np.arange(wide + 1.0), np.arange(80.0), [0.0])
         assert core.estimate_areas(points).sum() == pytest.approx(79.0 * wide, rel=0.12)
 
-    @pytest.mark.parametrize(
-        "points", [square_random(900), hemisphere_random(900)], ids=["corners and straight", "curved"]
-    )
-    def test_the_stiffness_keeps_its_structure(self, points):
-        laplacian = core.build_laplacian(points)
-        assert np.any(laplacian.boundary)
-        stiffness = laplacian.stiffness
-        assert abs(stiffness - stiffness.T).max() == 0.0
-        assert np.all(np.abs(stiffness.sum(axis=1)) <= 1e-10 * stiffness.diagonal())
-        values = np.linalg.eigvalsh(stiffness.toarray())
-        assert values[0] >= -1e-10 * values[-1]
-        assert values[1] > 1e-8 * values[-1]
-
     def test_areas_of_a_grid_are_even_up_to_its_boundary(self, operators):
         laplacian = operators("square grid")
         areas, sides = laplacian.areas * 59.0**2, (side_distances(laplacian.points, 1.0, 1.0) < 1e-9).sum(axis=1)
@@ -278,7 +262,7 @@ class TestImages:
 
     @pytest.mark.parametrize("given", [True, False], ids=["boundary given", "boundary found"])
     def test_few_areas_of_a_random_disc_are_near_the_floor(self, given):
-        points, distance = disc_random(2000)
+        points, distance = disc_random(1000)
         areas = core.estimate_areas(points, boundary_distance=distance if given else None)
         assert np.mean(areas < 0.1 * areas.mean()) < 0.05
         assert areas.max() < 6.0 * areas.mean()
@@ -295,7 +279,7 @@ class TestGiven:
             np.testing.assert_array_equal(given.stiffness.data, found.stiffness.data)
 
     def test_a_given_boundary_wins_over_the_options(self):
-        points = square_grid(30)
+        points = square_grid(21)
         border = side_distances(points, 1.0, 1.0)[:, 0] < 1e-9
         options = LaplacianOptions(boundary="off")
         laplacian = core.build_laplacian(points, options=options, boundary=border)
@@ -317,17 +301,17 @@ class TestGiven:
             np.testing.assert_array_equal(laplacian.areas, expected)
 
     def test_exact_distances_give_the_eigenvalues_of_the_disc(self):
-        points, distance = disc_random(3000, 3)
+        points, distance = disc_random(2100, 3)
         laplacian = core.build_laplacian(points, boundary_distance=distance)
         values = laplacian.eigenpairs(13).eigenvalues
         np.testing.assert_allclose(values[1:], disc_eigenvalues(13)[1:], rtol=1e-2)
         assert np.abs(values[1:] / disc_eigenvalues(13)[1:] - 1.0).mean() < 3e-3
-        spacing = np.sqrt(np.pi / 3000)
+        spacing = np.sqrt(np.pi / 2100)
         assert np.all(distance[laplacian.boundary] < spacing)
         assert np.all(laplacian.boundary[distance < 0.2 * spacing])
 
     def test_distances_beyond_reach_may_be_infinite(self):
-        points, distance = disc_random(1200)
+        points, distance = disc_random(600)
         areas = core.estimate_areas(points, boundary_distance=distance)
         cut = core.estimate_areas(points, boundary_distance=np.where(distance < 0.5, distance, np.inf))
         assert cut.sum() == pytest.approx(np.pi, rel=5e-3)
@@ -362,4 +346,4 @@ class TestGiven:
 
     def test_too_few_points_of_a_boundary_are_refused(self):
         with pytest.raises(core.InvalidPointsError, match="given by 3 different points"):
-            core.build_laplacian(square_grid(25), boundary=[0, 1, 2])
+            core.build_laplacian(square_grid(18), boundary=[0, 1, 2])

@@ -65,7 +65,7 @@ def test_too_few_points_left_are_an_error():
 
 @pytest.mark.parametrize("sheets", [True, False])
 def test_quadrics_have_the_normals_and_curvature_of_a_sphere(sheets):
-    sample = sample_of(fibonacci_sphere(2000))
+    sample = sample_of(fibonacci_sphere(1400))
     surface = fit_surface(sample, sheets)
     outward = sample.nearest.points * sample.scaled.scale
     np.testing.assert_allclose(np.abs(np.sum(surface.quadrics.normals * outward, axis=1)), 1.0, atol=1e-4)
@@ -73,7 +73,7 @@ def test_quadrics_have_the_normals_and_curvature_of_a_sphere(sheets):
 
 
 def test_noise_is_removed_where_it_is_measured():
-    points = fibonacci_sphere(3000)
+    points = fibonacci_sphere(2100)
     points *= 1.0 + 0.02 * np.random.default_rng(0).standard_normal(len(points))[:, None]
     surface = fit_surface(sample_of(points), True)
     smooth = remove_noise(surface, core.LaplacianOptions())
@@ -83,13 +83,13 @@ def test_noise_is_removed_where_it_is_measured():
         smooth.sample.nearest.points - surface.sample.nearest.points, smooth.sample.moved, atol=1e-15
     )
     assert remove_noise(surface, core.LaplacianOptions(projection="off")) is surface
-    clean = fit_surface(sample_of(fibonacci_sphere(3000)), True)
+    clean = fit_surface(sample_of(fibonacci_sphere(2100)), True)
     assert remove_noise(clean, core.LaplacianOptions()) is clean
     assert remove_noise(clean, core.LaplacianOptions(projection="quadric")) is not clean
 
 
 def test_noise_is_removed_on_the_noisy_side_alone():
-    points = fibonacci_sphere(4000)
+    points = fibonacci_sphere(2000)
     noise = 0.01 * np.random.default_rng(0).standard_normal(len(points)) * (points[:, 2] > 0.0)
     smooth = remove_noise(fit_surface(sample_of(points * (1.0 + noise[:, None])), True), core.LaplacianOptions())
     moved = np.linalg.norm(smooth.sample.moved, axis=1)[np.argsort(smooth.sample.scaled.first)]
@@ -120,7 +120,7 @@ class TestBoundary:
         return surface.sample, locate_boundary(surface.sample, oriented, gaps, **given)
 
     def test_a_closed_surface_has_none(self):
-        _, boundary = self.located(random_sphere(1500))
+        _, boundary = self.located(random_sphere(750))
         assert not boundary.at_boundary.any()
         assert not np.isfinite(boundary.distance).any()
 

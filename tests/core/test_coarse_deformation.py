@@ -10,7 +10,7 @@ from benchmarks.samplings import bar, bent_end, fibonacci_sphere, random_sphere,
 from core.applications.coarse_deformation import _linear_weights
 from core.geometry.thinning import thin
 
-COUNT = 1500
+COUNT = 1000
 TURN = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
 TURN *= np.linalg.det(TURN)
 MODES = [
@@ -22,17 +22,17 @@ MODES = [
 
 @functools.cache
 def sphere():
-    return core.build_laplacian(random_sphere(5000))
+    return core.build_laplacian(random_sphere(4000))
 
 
 @functools.cache
 def long_bar():
-    return core.build_laplacian(bar(16, 64)[0])
+    return core.build_laplacian(bar(12, 48)[0])
 
 
 @functools.cache
 def strip():
-    return core.build_laplacian(strip_points(5000))
+    return core.build_laplacian(strip_points(3000))
 
 
 def caps():
@@ -57,8 +57,8 @@ class TestThinning:
     """Fewer points, as evenly spread."""
 
     def test_none_are_close_and_none_far(self):
-        points = random_sphere(20_000)
-        rows = thin(points, np.full(20_000, 4.0 * np.pi / 20_000), np.ones(20_000), 1000)
+        points = random_sphere(10_000)
+        rows = thin(points, np.full(10_000, 4.0 * np.pi / 10_000), np.ones(10_000), 1000)
         assert 800 < len(rows) < 1200
         assert (np.diff(rows) > 0).all()
         apart = np.linalg.norm(points[rows, None] - points[None, rows], axis=2) + 9.0 * np.eye(len(rows))
@@ -67,9 +67,9 @@ class TestThinning:
         assert apart.min(axis=1).max() < 2.0 * reach
 
     def test_it_does_not_depend_on_the_order(self):
-        points = random_sphere(4000)
-        order = np.random.default_rng(1).permutation(4000)
-        areas, spacing = np.ones(4000), 1.0 + points[:, 0] ** 2
+        points = random_sphere(2000)
+        order = np.random.default_rng(1).permutation(2000)
+        areas, spacing = np.ones(2000), 1.0 + points[:, 0] ** 2
         one = thin(points, areas, spacing, 500)
         other = thin(points[order], areas, spacing[order], 500)
         np.testing.assert_array_equal(np.sort(order[other]), one)
@@ -85,13 +85,6 @@ class TestThinning:
 
     def test_few_points_all_stay(self):
         np.testing.assert_array_equal(thin(random_sphere(50), np.ones(50), np.ones(50), 50), np.arange(50))
-
-    def test_it_may_be_stopped(self):
-        def stop():
-            raise core.Cancelled
-
-        with pytest.raises(core.Cancelled):
-            thin(random_sphere(500), np.ones(500), np.ones(500), 50, report=stop)
 
 
 def test_weights_carry_linear_functions_along_the_surface():
@@ -124,7 +117,7 @@ def test_what_is_turned_turns(weights):
 @pytest.mark.parametrize("mode", MODES)
 def test_a_lifted_cap_is_close_to_the_exact_one(mode):
     top, bottom = caps()
-    coarse, exact = both(sphere(), top, bottom, 3000, **mode)
+    coarse, exact = both(sphere(), top, bottom, 2600, **mode)
     target = sphere().points[top] + (0.5, 0.0, 0.5)
     assert off(coarse.solve(target), exact.solve(target), sphere()) < 0.02
 
@@ -157,10 +150,10 @@ def test_handles_and_anchors_are_where_they_should_be():
 
 
 def test_it_does_not_depend_on_the_order_of_the_points():
-    points = random_sphere(4000, 3)
-    order = np.random.default_rng(1).permutation(4000)
+    points = random_sphere(2000, 3)
+    order = np.random.default_rng(1).permutation(2000)
     results = []
-    for rows in (np.arange(4000), order):
+    for rows in (np.arange(2000), order):
         given = points[rows]
         top = np.flatnonzero(given[:, 2] > 0.8)
         deformer = core.CoarseDeformer(core.build_laplacian(given), top, given[:, 2] < -0.8, count=800)
@@ -169,11 +162,11 @@ def test_it_does_not_depend_on_the_order_of_the_points():
 
 
 def test_components_move_by_themselves_and_small_ones_are_not_lost():
-    one, other, free = fibonacci_sphere(6000), 0.2 * fibonacci_sphere(400) + (3.0, 0.0, 0.0), fibonacci_sphere(500)
+    one, other, free = fibonacci_sphere(3000), 0.2 * fibonacci_sphere(400) + (3.0, 0.0, 0.0), fibonacci_sphere(500)
     points = np.concatenate([one, other, free - (3.0, 0.0, 0.0), [[0.0, 9.0, 0.0]]])
     laplacian = core.build_laplacian(points, options=core.LaplacianOptions(neighbors=40))
-    label = np.repeat([0, 1, 2, 3], [6000, 400, 500, 1])
-    handles = np.concatenate([np.arange(0, 6000, 50), np.arange(6000, 6400, 20), [6900]])
+    label = np.repeat([0, 1, 2, 3], [3000, 400, 500, 1])
+    handles = np.concatenate([np.arange(0, 3000, 50), np.arange(3000, 3400, 20), [3900]])
     goal = points.copy()
     goal[label == 0] = one @ TURN.T
     goal[label == 1] += 1.0
@@ -181,9 +174,9 @@ def test_components_move_by_themselves_and_small_ones_are_not_lost():
     deformer = core.CoarseDeformer(laplacian, handles, count=COUNT)
     np.testing.assert_allclose(deformer.solve(goal[handles]), goal, atol=1e-9)
     assert deformer.notices == core.Deformer(laplacian, handles).notices
-    lone = core.CoarseDeformer(laplacian, [6900], count=COUNT).solve([[1.0, 2.0, 3.0]])
-    np.testing.assert_array_equal(lone[:6900], points[:6900])
-    np.testing.assert_array_equal(lone[6900], [1.0, 2.0, 3.0])
+    lone = core.CoarseDeformer(laplacian, [3900], count=COUNT).solve([[1.0, 2.0, 3.0]])
+    np.testing.assert_array_equal(lone[:3900], points[:3900])
+    np.testing.assert_array_equal(lone[3900], [1.0, 2.0, 3.0])
 
 
 def test_weights_of_zero_hold_nothing():
@@ -205,7 +198,7 @@ def test_it_goes_on_from_the_last_result():
 
 
 def test_few_points_are_all_solved_on():
-    laplacian = core.build_laplacian(random_sphere(1500))
+    laplacian = core.build_laplacian(random_sphere(750))
     z = laplacian.points[:, 2]
     deformer = core.coarse_deformer(laplacian, z > 0.9, z < -0.9, neighbors=40)
     assert isinstance(deformer, core.Deformer)
@@ -227,15 +220,9 @@ def test_bad_input_is_refused_as_by_all_points():
             make(sphere(), [0], count=0)
 
 
-def test_progress_is_reported_and_may_stop_the_work():
+def test_stages_are_reported():
     seen = []
     core.CoarseDeformer(sphere(), [0], [1], count=COUNT, progress=lambda *report: seen.append(report))
     assert list(dict.fromkeys(stage for stage, _ in seen)) == ["Points", "Operator", "Equations", "Factors"]
     shares = [share for _, share in seen]
     assert shares == sorted(shares)
-
-    def stop(stage, fraction):
-        raise core.Cancelled
-
-    with pytest.raises(core.Cancelled):
-        core.CoarseDeformer(sphere(), [0], [1], count=COUNT, progress=stop)

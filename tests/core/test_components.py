@@ -44,7 +44,7 @@ class TestLabels:
         np.testing.assert_array_equal(label, np.repeat([0, -1 if count < 50 else 1], [1500, count]))
 
     @pytest.mark.parametrize(
-        "points", [random_sphere(3000), uneven_sphere(4000), noisy_sphere(2000, 0.5)], ids=["random", "jump", "noisy"]
+        "points", [random_sphere(1500), uneven_sphere(1000), noisy_sphere(1000, 0.5)], ids=["random", "jump", "noisy"]
     )
     def test_one_surface_is_one_component(self, points):
         assert np.all(label_components(find_nearest(points)) == 0)
@@ -102,6 +102,24 @@ class TestIslands:
     def test_nothing_couples_them(self, parts):
         assert parts.stiffness[parts.component == 0][:, parts.component == 1].count_nonzero() == 0
 
+    @pytest.mark.parametrize(
+        ("use", "elsewhere"),
+        [
+            (lambda on: core.geodesic_distance(on, [0]), np.inf),
+            (lambda on: core.signed_distance(on, [0, 1]), np.inf),
+            (lambda on: core.nearest_source(on, [0]), -1),
+            (lambda on: core.grow(on, [0], np.inf), False),
+            (lambda on: np.linalg.norm(core.transport(on, [0], [0.3, 0.5, 0.9]), axis=1), 0.0),
+            (lambda on: core.logarithmic_map(on, 0)[:, 1], np.nan),
+        ],
+        ids=["distance", "signed distance", "nearest source", "grown", "transport", "map"],
+    )
+    def test_what_begins_on_one_stays_there(self, parts, use, elsewhere):
+        found = use(parts)
+        assert np.isfinite(found[:900]).all()
+        assert not np.any(found[:900] == elsewhere)
+        np.testing.assert_array_equal(found[900:], elsewhere)
+
     def test_each_is_oriented_outward(self, parts):
         outward = np.concatenate([SMALL - [4.0, 0.0, 0.0], LARGE])
         normals = np.delete(parts.normals, OUT, axis=0)
@@ -119,7 +137,7 @@ class TestIslands:
 
     @pytest.mark.parametrize("count", [60, 80, 100])
     def test_fewer_points_than_neighbors_are_enough(self, count):
-        points = np.concatenate([fibonacci_sphere(1500), 0.2 * fibonacci_sphere(count) + [3.0, 0.0, 0.0]])
+        points = np.concatenate([fibonacci_sphere(750), 0.2 * fibonacci_sphere(count) + [3.0, 0.0, 0.0]])
         laplacian = core.build_laplacian(points)
         small = laplacian.component == 1
         assert np.count_nonzero(small) == count
@@ -131,7 +149,7 @@ class TestIslands:
 
     def test_a_small_component_has_the_area_that_the_same_points_have_alone(self):
         component = 0.2 * fibonacci_sphere(120) + [3.0, 0.0, 0.0]
-        together = core.estimate_areas(np.concatenate([fibonacci_sphere(1500), component]))[1500:]
+        together = core.estimate_areas(np.concatenate([fibonacci_sphere(750), component]))[750:]
         assert together.sum() == pytest.approx(core.estimate_areas(component).sum(), rel=1e-2)
 
     def test_a_small_open_component(self):
@@ -174,7 +192,7 @@ class TestIslands:
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi * 1.49, rel=3e-3)
 
     def test_a_small_noisy_component(self):
-        points = np.concatenate([noisy_sphere(2000, 0.4), 0.15 * noisy_sphere(70, 0.4, 1) + [3.0, 0.0, 0.0]])
+        points = np.concatenate([noisy_sphere(1000, 0.4), 0.15 * noisy_sphere(70, 0.4, 1) + [3.0, 0.0, 0.0]])
         laplacian = core.build_laplacian(points)
         area = laplacian.areas[laplacian.component == 1].sum()
         assert area == pytest.approx(4.0 * np.pi * 0.15**2, rel=0.5)
@@ -200,12 +218,6 @@ class TestLonePoints:
         assert np.all(core.mean_curvature(parts)[OUT] == 0.0)
         assert parts.stiffness[OUT].count_nonzero() == 0
 
-    def test_all_is_finite(self, parts, spectrum):
-        for values in (parts.areas, parts.normals, parts.gaussian_curvature, parts.smoothing_lengths):
-            assert np.all(np.isfinite(values))
-        for values in (parts.stiffness.data, spectrum.eigenvectors, parts.apply(parts.points)):
-            assert np.all(np.isfinite(values))
-
     def test_the_rest_is_what_it_is_without_them(self, parts):
         without = core.build_laplacian(np.concatenate([SMALL, LARGE]))
         np.testing.assert_allclose(np.delete(parts.areas, OUT), without.areas, rtol=1e-7)
@@ -229,12 +241,6 @@ class TestLonePoints:
         assert np.all(laplacian.areas[1500:1508] < 1e-200)
         np.testing.assert_allclose(laplacian.areas[1508:], laplacian.areas[:10], rtol=1e-9)
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=3e-3)
-
-    @pytest.mark.parametrize("scale", [1e-4, 1e4])
-    def test_in_any_unit(self, scale):
-        laplacian = core.build_laplacian(scale * np.concatenate([LARGE, LONE]))
-        assert np.all(laplacian.component[1500:] == -1)
-        assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi * scale**2, rel=3e-3)
 
     def test_stability_passes_them_by(self, parts):
         stability = core.check_stability(parts)

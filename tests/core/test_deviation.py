@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
@@ -16,7 +15,7 @@ def spacing_of(laplacian):
 @pytest.mark.parametrize("radius", [1.0, 1.02, 1.3, 0.9])
 def test_spheres_of_other_radii(operators, name, radius):
     laplacian = operators(name)
-    normals = fibonacci_sphere(1777)
+    normals = fibonacci_sphere(890)
     found = core.surface_deviation(radius * normals, normals, laplacian)
     assert found.known.all()
     np.testing.assert_allclose(found.distance, radius - 1.0, atol=0.01 * spacing_of(laplacian))
@@ -32,9 +31,9 @@ def test_signs_are_those_of_the_normals(operators):
 
 def test_flat_squares_at_a_distance(operators):
     laplacian = operators("square grid")
-    points = square_random(1000, 5) + [0.0, 0.0, 0.07]
+    points = square_random(500, 5) + [0.0, 0.0, 0.07]
     inside = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.5 - spacing_of(laplacian)
-    found = core.surface_deviation(points, np.tile([0.0, 0.0, 1.0], (1000, 1)), laplacian)
+    found = core.surface_deviation(points, np.tile([0.0, 0.0, 1.0], (500, 1)), laplacian)
     assert found.known[inside].all()
     np.testing.assert_allclose(found.distance[inside], 0.07, atol=1e-6)
 
@@ -56,7 +55,7 @@ def test_points_beside_the_other_surface_are_not_compared(operators):
 
 def test_clouds_that_are_far_apart():
     """As when one is in the coordinates of a national grid, and the other is not: nothing is met."""
-    normals = random_sphere(1500, 0)
+    normals = random_sphere(750, 0)
     rough = normals * (1.0 + 0.2 * np.sin(5.0 * normals[:, :1]) * np.sin(7.0 * normals[:, 1:2]))
     laplacian = core.build_laplacian(rough)
     for far in (1e2, 1e4, 4e6, 1e9):
@@ -78,24 +77,6 @@ def test_greatest_distance(operators):
     assert np.array_equal(found.known, normals[:, 2] > 0.0)
 
 
-def test_turned_moved_and_scaled_together(operators):
-    points, normals = 1.1 * random_sphere(700, 3), random_sphere(700, 3)
-    turn, shift = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix(), np.array([30.0, -2.0, 5.0])
-    laplacian = operators("even sphere")
-    before = core.surface_deviation(points, normals, laplacian)
-    moved = core.build_laplacian(20.0 * laplacian.points @ turn.T + shift)
-    after = core.surface_deviation(20.0 * points @ turn.T + shift, normals @ turn.T, moved)
-    np.testing.assert_allclose(after.distance, 20.0 * before.distance, atol=1e-3)
-
-
-def test_order_of_the_points_makes_no_difference(operators):
-    normals = fibonacci_sphere(700)
-    order = np.random.default_rng(2).permutation(700)
-    laplacian = operators("random sphere")
-    one, other = (core.surface_deviation(1.1 * way, way, laplacian) for way in (normals, normals[order]))
-    np.testing.assert_allclose(other.distance, one.distance[order], rtol=1e-12)
-
-
 @pytest.mark.parametrize("greatest", [0.0, -1.0, np.nan, "far"])
 def test_wrong_greatest_distance(operators, greatest):
     with pytest.raises(core.PointCloudError, match="greatest distance"):
@@ -105,11 +86,3 @@ def test_wrong_greatest_distance(operators, greatest):
 def test_normals_that_do_not_fit(operators):
     with pytest.raises(core.InvalidPointsError, match="do not fit 4 points"):
         core.surface_deviation(np.eye(4, 3), np.eye(3), operators("even sphere"))
-
-
-def test_stops(operators):
-    def stop(stage, fraction):
-        raise core.Cancelled
-
-    with pytest.raises(core.Cancelled):
-        core.surface_deviation(np.eye(3), np.eye(3), operators("even sphere"), progress=stop)

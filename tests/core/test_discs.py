@@ -33,7 +33,7 @@ def test_they_cover_the_surface_and_not_much_more(name):
 
 
 def test_normals_point_outwards():
-    points = random_sphere(2000)
+    points = random_sphere(1000)
     assert np.einsum("ij,ij->i", core.surface_discs(points).normals, points).min() > 0.99
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import fibonacci_sphere, random_sphere, square_grid, strip_points, torus_potential
+from benchmarks.samplings import fibonacci_sphere, square_grid, strip_points, torus_potential
 
 OFF = 1e-6  # rounding, and the tolerance of the solver
 
@@ -16,7 +16,7 @@ def strip():
 
 @pytest.fixture(scope="module")
 def random_strip():
-    return core.build_laplacian(strip_points(2800))
+    return core.build_laplacian(strip_points(1400))
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_without_fixed_points_it_inverts_apply(operators):
 
 def test_a_source_with_a_mean_is_refused(operators):
     laplacian = operators("even sphere")
-    with pytest.raises(core.PointCloudError, match="mean 1 over a component of 4000 points"):
+    with pytest.raises(core.PointCloudError, match="mean 1 over a component of 2500 points"):
         core.solve_poisson(laplacian, 1.0)
     with pytest.raises(core.PointCloudError, match="Subtract"):
         core.solve_poisson(laplacian, laplacian.points[:, 0] + 0.1)
@@ -87,7 +87,7 @@ def test_harmonic_strip_is_linear(request, name, bound):
 
 
 def test_harmonic_strip_with_uniform_areas():
-    laplacian = core.paper.build_laplacian(strip_points(), areas="uniform", neighbors=30)
+    laplacian = core.paper.build_laplacian(strip_points(), areas="uniform", neighbors=30, regularization=1.0)
     fixed, exact = ends(laplacian.points)
     assert np.abs(core.harmonic_field(laplacian, fixed, exact[fixed]) - exact).max() < 2e-3
 
@@ -111,7 +111,7 @@ def test_a_thin_line_of_fixed_points_parts_the_strip(request, name, value):
 
 
 def test_fixed_boundary_of_a_square():
-    points = square_grid(40)
+    points = square_grid(28)
     laplacian = core.build_laplacian(points)
     boundary = ((points == 0.0) | (points == 1.0))[:, :2].any(axis=1)
     exact = np.sin(np.pi * points[:, 0]) * np.sin(np.pi * points[:, 1])
@@ -131,12 +131,12 @@ def test_fixed_boundaries_of_a_cylinder():
 def test_maximum_principle_with_every_kind_of_set(operators):
     laplacian = operators("random sphere")
     random = np.random.default_rng(0)
-    chosen = np.unique(np.concatenate([random.choice(5000, 20), np.flatnonzero(laplacian.points[:, 2] > 0.7)]))
+    chosen = np.unique(np.concatenate([random.choice(4000, 20), np.flatnonzero(laplacian.points[:, 2] > 0.7)]))
     values = random.random(len(chosen)) + 3.0
     found = core.solve_poisson(laplacian, 0.0, chosen, values)
     assert found.min() > values.min() - OFF
     assert found.max() < values.max() + OFF
-    free = np.setdiff1d(np.arange(5000), chosen)
+    free = np.setdiff1d(np.arange(4000), chosen)
     assert found[free].std() > 0.0
 
 
@@ -153,22 +153,6 @@ def test_indices_and_masks_agree_whatever_their_order(strip):
     np.testing.assert_array_equal(
         core.harmonic_field(strip, order, exact[order]), core.harmonic_field(strip, fixed, exact[fixed])
     )
-
-
-def test_motion_and_scale_do_not_matter():
-    points = random_sphere(800)
-    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
-    order = np.random.default_rng(1).permutation(len(points))
-    moved = core.build_laplacian(50.0 * points[order] @ turn + [1.0, 2.0, 3.0])
-    plain = core.build_laplacian(points)
-    x = points[:, 0]
-    fixed = np.abs(x) > 0.9
-    first = core.harmonic_field(plain, fixed, x[fixed])
-    second = core.harmonic_field(moved, fixed[order], x[order][fixed[order]])
-    np.testing.assert_allclose(second, first[order], atol=1e-5)
-    source = x - plain.areas @ x / plain.areas.sum()
-    first, second = core.solve_poisson(plain, source), core.solve_poisson(moved, source[order])
-    np.testing.assert_allclose(second / 2500.0, first[order], atol=1e-5)
 
 
 def test_parts_without_fixed_points_have_the_mean_value(components):
@@ -230,13 +214,3 @@ def test_bad_fixed_points(strip, fixed, values, text):
 def test_bad_sources(strip, source, text):
     with pytest.raises(core.InvalidPointsError, match=text):
         core.solve_poisson(strip, source, [0], [0.0])
-
-
-def test_progress_can_cancel(strip):
-    def stop(stage, fraction):
-        assert 0.0 <= fraction < 1.0
-        raise core.Cancelled
-
-    fixed, exact = ends(strip.points)
-    with pytest.raises(core.Cancelled):
-        core.harmonic_field(strip, fixed, exact[fixed], progress=stop)

@@ -174,31 +174,6 @@ class TestText:
         assert table.points.tolist() == [[1.5, 2.0, 3.0], [4.0, 5.0, 6.0]]
         assert (table.attributes, table.colors, table.notices) == ({}, None, [])
 
-    def test_names_say_what_columns_are(self, tmp_path):
-        (tmp_path / "a.csv").write_text(
-            '"id",label,Z,Y,X,R,G,B,heat\n7,tree,3,2,1,255,0,51,0.5\n8,rock,6,5,4,0,0,0,-1\n'
-        )
-        table = read_points(tmp_path / "a.csv")
-        assert table.points.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
-        assert {name: values.tolist() for name, values in table.attributes.items()} == {"id": [7, 8], "heat": [0.5, -1]}
-        assert_allclose(table.colors, [[1.0, 0.0, 0.2, 1.0], [0.0, 0.0, 0.0, 1.0]])
-
-    def test_columns_without_names_are_kept(self, tmp_path):
-        (tmp_path / "a.xyz").write_text("1 2 3 4 5\n6 7 8 9 10\n")
-        table = read_points(tmp_path / "a.xyz")
-        assert {name: values.tolist() for name, values in table.attributes.items()} == {
-            "column_4": [4, 9],
-            "column_5": [5, 10],
-        }
-        assert "column_1, column_2, column_3 as x y z; column_4, column_5 as attributes" in table.notices[0]
-
-    def test_an_empty_cell_is_no_number(self, tmp_path):
-        (tmp_path / "a.csv").write_text("x,y,z,heat\n1,2,3,4\n5,6,7,\n")
-        table = read_points(tmp_path / "a.csv")
-        assert table.points.tolist() == [[1.0, 2.0, 3.0], [5.0, 6.0, 7.0]]
-        assert_array_equal(table.attributes["heat"], [4.0, np.nan])
-        assert table.notices == ["a.csv: cells without a number are NaN: 1 of heat."]
-
     @pytest.mark.parametrize(
         ("text", "error"),
         [
@@ -243,14 +218,6 @@ class TestText:
 
 
 class TestObj:
-    def test_vertices_and_colors(self, tmp_path):
-        rows = "".join(f"v {x:.3f} {y:.3f} {z:.3f} 1 0.5 0\nvn 0 0 1\n" for x, y, z in POINTS)
-        (tmp_path / "a.obj").write_text(f"# made\no Thing\n{rows}f 1 2 3\n")
-        table = read_points(tmp_path / "a.obj")
-        assert_allclose(table.points, POINTS, rtol=0.0, atol=1e-9)
-        assert_allclose(table.colors, np.tile([1.0, 0.5, 0.0, 1.0], (200, 1)))
-        assert table.notices == ["a.obj: left out 1 faces and lines. Only points are read."]
-
     @pytest.mark.parametrize(
         ("text", "error"),
         [("vn 0 0 1\n", "no vertices"), ("v 1 2 3\n\nv 4 x 6\n", "line 3 has 'x'"), ("", "no vertices")],
@@ -262,12 +229,6 @@ class TestObj:
 
 
 class TestArrays:
-    def test_points(self, tmp_path):
-        np.save(tmp_path / "a.npy", POINTS)
-        np.savez(tmp_path / "a.npz", points=POINTS, areas=np.ones(200))
-        for name in ("a.npy", "a.npz"):
-            assert_array_equal(read_points(tmp_path / name).points, POINTS)
-
     def test_under_the_name_of_the_other_kind(self, tmp_path):
         np.save(tmp_path / "a.npy", POINTS)
         (tmp_path / "a.npy").rename(tmp_path / "b.npz")
@@ -322,11 +283,6 @@ def test_points_without_a_place_are_left_out(tmp_path, kind, missing):
     )
     what = "NaN" if missing == "nan" else "NaN or infinity"
     assert table.notices == [f"a.{kind}: left out 1 points that the sensor missed ({what})."]
-
-
-def test_points_of_an_array_without_a_place_are_left_out(tmp_path):
-    np.save(tmp_path / "a.npy", [[1.0, 2.0, 3.0], [4.0, np.nan, 6.0]])
-    assert read_points(tmp_path / "a.npy").points.tolist() == [[1.0, 2.0, 3.0]]
 
 
 @pytest.mark.parametrize(("name", "text"), [("a.dxf", "not a file with points"), ("a.ply", "no file")])

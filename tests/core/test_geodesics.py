@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import disc_random, fibonacci_sphere, grid_points, parallel_sheets, random_sphere
+from benchmarks.samplings import disc_random, fibonacci_sphere, grid_points
 
 
 def on_sphere(points, sources):
@@ -14,7 +14,7 @@ def mean_error(found, exact):
 
 
 @pytest.mark.parametrize("name", ["even sphere", "random sphere", "marching cubes", "density jump"])
-@pytest.mark.parametrize("sources", [[5], [0, 700, 1400, 2100, 2800]], ids=["one", "five"])
+@pytest.mark.parametrize("sources", [[5], [0, 500, 1000, 1500, 2000]], ids=["one", "five"])
 def test_great_circles(operators, name, sources):
     laplacian = operators(name)
     exact = on_sphere(laplacian.points, sources)
@@ -49,7 +49,7 @@ def test_flat_square_with_its_boundary(operators, sources):
 
 
 def test_the_way_leads_around_a_hole():
-    points = disc_random(3000, 0)[0]
+    points = disc_random(2100, 0)[0]
     radius = np.hypot(points[:, 0], points[:, 1])
     points, radius = points[radius > 0.3], radius[radius > 0.3]
     source = int(np.argmin(np.hypot(points[:, 0] + 0.8, points[:, 1])))
@@ -76,15 +76,6 @@ def test_around_the_edges_of_a_cube():
     np.testing.assert_allclose(found[side], 2.0 - points[side, 2], rtol=0.05)
 
 
-def test_other_parts_are_infinitely_far():
-    points, sheet, _ = parallel_sheets(side=30)
-    laplacian = core.build_laplacian(points)
-    source = int(np.flatnonzero(sheet == 0)[0])
-    found = core.geodesic_distance(laplacian, [source])
-    assert np.isfinite(found[sheet == 0]).all()
-    assert np.isinf(found[sheet == 1]).all()
-
-
 def test_the_poles_of_few_points_are_reached():
     turn, rise = np.meshgrid(np.arange(10) * 0.2 * np.pi, np.linspace(0.0, np.pi, 5))
     points = np.stack([np.sin(rise) * np.cos(turn), np.sin(rise) * np.sin(turn), np.cos(rise)], axis=-1).reshape(-1, 3)
@@ -101,21 +92,6 @@ def test_points_left_out():
     np.testing.assert_array_equal(core.geodesic_distance(laplacian, [0, 900])[[0, 900]], 0.0)
     with pytest.raises(core.InvalidPointsError, match="All 1 sources are points that the operator left out"):
         core.geodesic_distance(laplacian, [900])
-
-
-def test_duplicates_are_no_way_apart():
-    points = fibonacci_sphere(900)
-    found = core.geodesic_distance(core.build_laplacian(np.concatenate([points, points[:5]])), [0])
-    np.testing.assert_allclose(found[900:], found[:5], atol=1e-12)
-
-
-def test_motion_and_scale_do_not_matter():
-    points = random_sphere(800)
-    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
-    order = np.random.default_rng(1).permutation(len(points))
-    first = core.geodesic_distance(core.build_laplacian(points), order[:2])
-    second = core.geodesic_distance(core.build_laplacian(50.0 * points[order] @ turn), [0, 1])
-    np.testing.assert_allclose(second / 50.0, first[order], rtol=1e-6, atol=1e-9)
 
 
 def test_masks_are_sets_too(operators):
@@ -135,7 +111,7 @@ def test_lengths_serve_many_sources(operators):
         geodesics.distance([])
 
 
-@pytest.mark.parametrize(("sources", "text"), [([], "no sources"), ([5000], "below 4000"), ([0.5], "whole numbers")])
+@pytest.mark.parametrize(("sources", "text"), [([], "no sources"), ([2500], "below 2500"), ([0.5], "whole numbers")])
 def test_bad_sources(operators, sources, text):
     with pytest.raises(core.InvalidPointsError, match=text):
         core.geodesic_distance(operators("even sphere"), sources)

@@ -15,7 +15,7 @@ from core.algebra import solvers
 from core.algebra.hierarchy import approximate_inverse
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
-CLOUDS = ["random sphere", "random torus", "random square", "density jump"]
+CLOUDS = ["another random sphere", "coarse torus", "random square", "density jump"]
 
 
 def silent():
@@ -64,7 +64,7 @@ def test_nothing_fixed(operators, coarse, name):
 
 
 def test_several_right_hand_sides_and_a_start(operators, coarse):
-    matrix, load = fixed_ends(operators("random torus"))
+    matrix, load = fixed_ends(operators("coarse torus"))
     both = np.column_stack([load, np.random.default_rng(0).normal(size=len(load)), 0.0 * load])
     exact = splu(matrix.tocsc()).solve(both)
     for start in (None, np.ones_like(both)):
@@ -75,7 +75,7 @@ def test_several_right_hand_sides_and_a_start(operators, coarse):
 
 def test_components_do_not_mix(operators, coarse):
     """A loose component stays where it started, next to one with fixed points, and next to another one like it."""
-    matrix, load = fixed_ends(operators("random torus"))
+    matrix, load = fixed_ends(operators("coarse torus"))
     loose = operators("coarse torus").stiffness
     whole = sparse.block_diag([matrix, loose, loose], format="csr")
     found = solve_symmetric(whole, np.append(load, np.zeros(2 * loose.shape[0])))
@@ -96,7 +96,7 @@ def test_fields_are_the_same(operators, monkeypatch):
 
 def test_the_number_of_steps_hardly_grows():
     steps = []
-    for count in (2000, 8000, 32000):
+    for count in (2000, 16_000):
         points = random_sphere(count)
         matrix = kernel_matrix(points, 20.0 / np.sqrt(count))  # as wide as the operator's
         load = points[:, 2] - points[:, 2].mean()
@@ -112,14 +112,14 @@ def test_the_number_of_steps_hardly_grows():
 @pytest.mark.parametrize("twins", [0, 500])
 def test_the_inverse_is_symmetric_and_positive(twins):
     """Also where points in pairs next to each other have by far the largest eigenvalues, which are not estimated."""
-    points = random_sphere(3000)
+    points = random_sphere(1500)
     matrix = kernel_matrix(points, 0.15)
     row = np.arange(0, 2 * twins, 2)
     heavy = 1e3 * matrix.diagonal().max() * np.ones(twins)
     pairs = sparse.coo_array((heavy, (row, row + 1)), shape=matrix.shape)
     pairs = pairs + pairs.T
-    matrix = (matrix + sparse.diags_array(pairs.sum(axis=1)) - pairs + sparse.eye_array(3000) * 1e-3).tocsr()
-    x, y = np.random.default_rng(0).normal(size=(2, 3000))
+    matrix = (matrix + sparse.diags_array(pairs.sum(axis=1)) - pairs + sparse.eye_array(1500) * 1e-3).tocsr()
+    x, y = np.random.default_rng(0).normal(size=(2, 1500))
     with ThreadPoolExecutor() as pool:
         inverse = approximate_inverse(matrix, pool, silent)
         one, other = inverse * x, inverse * y
@@ -129,7 +129,7 @@ def test_the_inverse_is_symmetric_and_positive(twins):
 
 
 def test_the_result_does_not_depend_on_cores(operators, coarse, monkeypatch):
-    matrix, load = fixed_ends(operators("random sphere"))
+    matrix, load = fixed_ends(operators("another random sphere"))
     found = []
     for cores in (1, 3):
         monkeypatch.setattr(os, "cpu_count", lambda cores=cores: cores)
@@ -149,7 +149,7 @@ def test_where_coarse_versions_do_not_help(coarse):
 
 
 def test_it_can_be_stopped_at_any_time(operators, coarse):
-    matrix, load = fixed_ends(operators("random sphere"))
+    matrix, load = fixed_ends(operators("another random sphere"))
     seen = []
     solve_symmetric(matrix, load, progress=lambda stage, fraction: seen.append(fraction))
     assert seen == sorted(seen)

@@ -503,15 +503,10 @@ def named(kind, names, values):
 
 XYZ = named("double", "xyz", PLACES)
 RGB = ("red", "green", "blue")
-PURE = BYTES % 2
 VERTICES = {
     "plain": (XYZ, None, {}),
     "bytes": (XYZ | named("uchar", RGB, BYTES), BYTES / 255.0, {}),
     "single": (XYZ | named("float", RGB, (BYTES / 255.0).astype("f4")), BYTES / 255.0, {}),
-    "floats to 255": (XYZ | named("float", RGB, BYTES.astype("f4")), BYTES / 255.0, {}),
-    "floats 0 or 1": (XYZ | named("float", RGB, PURE.astype("f4")), PURE, {}),
-    "16 bits": (XYZ | named("ushort", RGB, BYTES * 257), BYTES / 255.0, {}),
-    "8 in 16 bits": (XYZ | named("ushort", RGB, BYTES), BYTES / 255.0, {}),
     "normals": (XYZ | named("double", ("nx", "ny", "nz"), UNIT), None, {"normal": UNIT}),
     "numbers": (
         XYZ | {("int", "number"): 2**24 + 1 + np.arange(COUNT)},
@@ -707,12 +702,6 @@ def test_fractions_in_bytes_of_a_ply_of_text_stay(tmp_path):
 def test_colors_of_an_obj_with_alpha_are_no_weights(tmp_path):
     (tmp_path / "a.obj").write_text("v 1 2 3 0.5 0.25 1 0.75\nv 4 5 6 1 0 0 1\n")
     assert_allclose(read_points(tmp_path / "a.obj").colors, [[0.5, 0.25, 1.0, 0.75], [1.0, 0.0, 0.0, 1.0]])
-
-
-def test_colors_of_some_vertices_of_an_obj_are_told(tmp_path):
-    (tmp_path / "a.obj").write_text("v 1 2 3\nv 4 5 6 1 0 0\n")
-    (notice,) = read_points(tmp_path / "a.obj").notices
-    assert "left out r, g, b" in notice
 
 
 TURNED = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [500_000, 5_400_000, 300, 1]])

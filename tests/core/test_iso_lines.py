@@ -24,7 +24,7 @@ def grid(count):
 
 @pytest.fixture(scope="module")
 def sphere():
-    laplacian = core.build_laplacian(random_sphere(3000))
+    laplacian = core.build_laplacian(random_sphere(2100))
     mesh = core.mesh_surface(laplacian)
     carrying = core.values_on_mesh(laplacian, mesh.vertices)
     return mesh, carrying.interpolate(laplacian.points[:, 2])[-len(mesh.vertices) :]

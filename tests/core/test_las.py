@@ -111,11 +111,6 @@ def test_what_a_file_is_called_does_not_matter(tmp_path):
     assert_allclose(read_points(tmp_path / "a.las").points, points, rtol=0.0, atol=1e-6)
 
 
-def test_colors_of_the_low_byte_alone(tmp_path):
-    write_las(tmp_path / "a.las", colors=(255, 0, 51))
-    assert_allclose(read_points(tmp_path / "a.las").colors[0], [1.0, 0.0, 0.2, 1.0], atol=1e-6)
-
-
 def test_colors_of_a_scanner_without_a_camera_are_none(tmp_path):
     write_las(tmp_path / "a.las", colors=(0, 0, 0))
     assert read_points(tmp_path / "a.las").colors is None

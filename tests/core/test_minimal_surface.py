@@ -89,17 +89,17 @@ class TestCatenoid:
 class TestFlat:
     @pytest.mark.parametrize("deepest", [0.0, -0.6])
     def test_caps_become_discs(self, deepest):
-        points = fibonacci_sphere(900)
+        points = fibonacci_sphere(600)
         radius = np.sqrt(1.0 - deepest**2)
-        ring = circle(round(53 * radius), radius) + [0.0, 0.0, deepest]
-        points = np.concatenate([ring, points[points[:, 2] > deepest + 0.04]])
+        ring = circle(round(43 * radius), radius) + [0.0, 0.0, deepest]
+        points = np.concatenate([ring, points[points[:, 2] > deepest + 0.05]])
         film = core.minimal_surface(points, np.arange(len(ring)))
         assert film.converged
         assert np.abs(film.points[:, 2] - deepest).max() < 1e-2
         assert film.areas.sum() == pytest.approx(np.pi * radius**2, rel=5e-3)
 
     def test_random_hemisphere(self):
-        film = core.minimal_surface(*cap(hemisphere_random(900), 61))
+        film = core.minimal_surface(*cap(hemisphere_random(600), 50))
         assert film.converged
         assert np.abs(film.points[:, 2]).max() < 1e-2
         assert film.areas.sum() == pytest.approx(np.pi, rel=5e-3)
@@ -117,7 +117,7 @@ class TestFlat:
         assert film.areas.sum() == pytest.approx(1.0, rel=1e-2)
 
     def test_a_band_of_fixed_points(self):
-        points = square_grid(30)
+        points = square_grid(21)
         inset = np.minimum(points, 1.0 - points)[:, :2].min(axis=1)
         points[:, 2] = 3.0 * np.maximum(inset - 0.1, 0.0) ** 2
         film = core.minimal_surface(points, inset < 0.1)
@@ -126,7 +126,7 @@ class TestFlat:
         assert film.areas.sum() == pytest.approx(1.0, rel=5e-3)
 
     def test_pinned_part_of_a_closed_surface(self):
-        points = fibonacci_sphere(1200)
+        points = fibonacci_sphere(600)
         free = points[:, 2] > 0.6
         film = core.minimal_surface(points, ~free, max_steps=3)
         np.testing.assert_array_equal(film.points[~free], points[~free])
@@ -134,7 +134,7 @@ class TestFlat:
         assert np.abs(film.points[free, 2] - 0.6).max() < 0.1
 
     def test_the_boundary_that_was_found(self):
-        points = hemisphere_random(700, 2)
+        points = hemisphere_random(500, 2)
         boundary = core.build_laplacian(points).boundary
         film = core.minimal_surface(points, boundary, max_steps=2)
         assert film.points[:, 2].max() < points[boundary, 2].max() + 1e-2
@@ -150,20 +150,15 @@ def test_helicoid_between_four_corners():
 
 
 class TestInvariance:
-    def test_motion_and_scale(self, coarse):
+    def test_motion_scale_and_order(self, coarse):
         points, fixed, expected = coarse
         turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
-        film = core.minimal_surface(30.0 * points @ turn.T + [5.0, -70.0, 20.0], fixed)
+        order = np.random.default_rng(2).permutation(len(points))
+        film = core.minimal_surface((30.0 * points @ turn.T + [5.0, -70.0, 20.0])[order], np.flatnonzero(fixed[order]))
         assert film.steps == expected.steps
-        moved = 30.0 * expected.points @ turn.T + [5.0, -70.0, 20.0]
+        moved = 30.0 * expected.points[order] @ turn.T + [5.0, -70.0, 20.0]
         np.testing.assert_allclose(film.points, moved, atol=30.0 * 1e-3)
         np.testing.assert_allclose(film.area_history, 900.0 * expected.area_history, rtol=2e-3)
-
-    def test_order(self, coarse):
-        points, fixed, expected = coarse
-        order = np.random.default_rng(2).permutation(len(points))
-        film = core.minimal_surface(points[order], np.flatnonzero(fixed[order]))
-        np.testing.assert_allclose(film.points, expected.points[order], atol=1e-3)
 
     def test_the_same_twice(self, coarse):
         points, fixed, expected = coarse
@@ -242,13 +237,6 @@ class TestEnding:
         assert (film.steps, film.reason) == (1, "cancelled")
         np.testing.assert_array_equal(film.area_history, expected.area_history[:1])
 
-    def test_cancelled_before_the_first_operator(self, coarse):
-        def progress(stage, fraction):
-            raise core.Cancelled
-
-        with pytest.raises(core.Cancelled):
-            core.minimal_surface(*coarse[:2], progress=progress)
-
 
 class TestRefusals:
     @pytest.mark.parametrize("fixed", [[], [0, 1, 2], np.ones(480, dtype=bool)])
@@ -318,7 +306,7 @@ class TestBoundaryCurve:
 
 
 def test_given_distances_hold_beside_corners_only():
-    points = square_grid(30)
+    points = square_grid(21)
     inset = np.sort(np.minimum(points, 1.0 - points)[:, :2], axis=1)
     boundary = inset[:, 0] == 0.0
     both = core.build_laplacian(points, boundary=boundary, boundary_distance=inset[:, 0])

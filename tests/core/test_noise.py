@@ -24,7 +24,7 @@ from core.geometry.sheets import fit_sheets
 from core.options import LaplacianOptions
 from core.paper.normals import tangent_planes
 
-COUNT = 2000
+COUNT = 1500
 LEVEL = np.full(COUNT, 0.3)
 SPACING = np.sqrt(4.0 * np.pi / COUNT)
 CLEAN = {
@@ -73,7 +73,13 @@ def noisy():
 
 @pytest.fixture(scope="module")
 def laplacian(noisy):
-    return core.build_laplacian(noisy.copy())
+    return core.build_laplacian(noisy)
+
+
+@pytest.fixture(scope="module")
+def rough(noisy):
+    """The operator of the points as they are."""
+    return core.build_laplacian(noisy, options=LaplacianOptions(projection="off"))
 
 
 class TestLevel:
@@ -114,9 +120,9 @@ class TestProjection:
             np.testing.assert_allclose(moved, points, atol=1e-9)
 
     def test_a_quadric_hardly_moves_clean_points(self):
-        points = torus_points(3000)
-        spacing = np.sqrt(4.0 * np.pi**2 * 0.4 / 3000)
-        moved = projected(points, np.full(3000, 0.3)) - points
+        points = torus_points(1500)
+        spacing = np.sqrt(4.0 * np.pi**2 * 0.4 / 1500)
+        moved = projected(points, np.full(1500, 0.3)) - points
         assert np.linalg.norm(moved, axis=1).max() < 0.1 * spacing
 
     def test_some_points_go_where_they_go_with_all(self, noisy):
@@ -126,11 +132,9 @@ class TestProjection:
 
 
 class TestOperator:
-    def test_the_callers_points_are_left_alone(self, noisy):
-        given = noisy.copy()
-        result = core.build_laplacian(given)
-        np.testing.assert_array_equal(given, noisy)
-        np.testing.assert_array_equal(result.points, noisy)
+    def test_the_callers_points_are_left_alone(self, noisy, laplacian):
+        np.testing.assert_array_equal(noisy, noisy_sphere(COUNT, 0.5))
+        np.testing.assert_array_equal(laplacian.points, noisy)
 
     def test_a_notice_tells_how_strong_it_is(self, laplacian):
         notices = [notice for notice in laplacian.notices if "Noise" in notice]
@@ -138,29 +142,16 @@ class TestOperator:
         level = float(notices[0].split()[2])
         assert 0.25 < level < 0.55
 
-    def test_the_operators_own_points_are_near_the_surface(self, noisy):
-        cloud = read_cloud(noisy, LaplacianOptions())
-        off = read_cloud(noisy, LaplacianOptions(projection="off"))
-        center = noisy.mean(axis=0)
-        for result, least, most in ((cloud, 0.0, 0.25), (off, 0.4, 0.6)):
-            assert least < off_sphere(result.pairs.points * result.scaled.scale + center) < most
-
-    def test_normals_are_within_a_few_degrees(self, noisy, laplacian):
-        own = degrees_off(laplacian.normals, noisy)
-        assert own < 6.0
-        assert own < 0.5 * degrees_off(core.estimate_normals(noisy, LaplacianOptions(projection="off")), noisy)
-
-    def test_area(self, noisy, laplacian):
-        areas = {
-            projection: core.estimate_areas(noisy, options=LaplacianOptions(projection=projection)).sum()
-            for projection in ("quadric", "off")
-        }
+    def test_its_own_points_normals_and_areas_are_those_of_the_surface(self, noisy, laplacian, rough):
+        assert off_sphere(laplacian.surface_points) < 0.25 < 0.4 < off_sphere(rough.surface_points)
+        assert degrees_off(laplacian.normals, noisy) < min(6.0, 0.5 * degrees_off(rough.normals, noisy))
+        quadric = core.estimate_areas(noisy, options=LaplacianOptions(projection="quadric"))
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
-        assert areas["quadric"] == pytest.approx(4.0 * np.pi, rel=1e-2)
-        assert areas["off"] > 1.15 * 4.0 * np.pi
+        assert quadric.sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
+        assert rough.areas.sum() > 1.15 * 4.0 * np.pi
 
     def test_clean_points_are_taken_as_they_are(self):
-        points = torus_points(1500)
+        points = torus_points(750)
         automatic, off = (core.build_laplacian(points, options=LaplacianOptions(projection=p)) for p in ("auto", "off"))
         np.testing.assert_array_equal(automatic.areas, off.areas)
         np.testing.assert_array_equal(automatic.stiffness.data, off.stiffness.data)
@@ -176,16 +167,15 @@ class TestOperator:
 
     def test_by_planes_that_lie_inside_the_sphere(self):
         plain, plane = (
-            core.paper.build_laplacian(random_sphere(900), denoise=d, areas="uniform") for d in (False, True)
+            core.paper.build_laplacian(random_sphere(600), denoise=d, areas="uniform") for d in (False, True)
         )
         assert plane.areas.sum() < 0.99 * plain.areas.sum()
         assert plane.notices == plain.notices
 
-    @pytest.mark.parametrize("level", [1.0, 2.0, 3.0])
+    @pytest.mark.parametrize("level", [1.0, 3.0])
     def test_noise_beyond_the_spacing_is_smoothed_and_told(self, level):
-        points = random_sphere(COUNT)
-        noise = level * SPACING * np.random.default_rng(1).standard_normal((COUNT, 1))
-        laplacian = core.build_laplacian(points * (1.0 + noise))
+        noise = level * np.sqrt(4.0 * np.pi / 2000) * np.random.default_rng(1).standard_normal((2000, 1))
+        laplacian = core.build_laplacian(random_sphere(2000) * (1.0 + noise))
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=0.15)
         assert any("more than half the spacing" in notice for notice in laplacian.notices)
 
@@ -194,8 +184,8 @@ class TestOperator:
         np.testing.assert_allclose(laplacian.normals, noisy / np.linalg.norm(noisy, axis=1)[:, None], atol=1e-12)
 
     def test_a_noisy_open_surface_keeps_its_boundary(self):
-        points = square_random(1600)
-        points[:, 2] = 0.3 / 40.0 * np.random.default_rng(1).standard_normal(1600)
+        points = square_random(800)
+        points[:, 2] = 0.3 / 40.0 * np.random.default_rng(1).standard_normal(800)
         laplacian = core.build_laplacian(points)
         assert laplacian.areas.sum() == pytest.approx(1.0, rel=5e-2)
         distance = np.minimum(points[:, :2], 1.0 - points[:, :2]).min(axis=1)
@@ -205,7 +195,7 @@ class TestOperator:
 
 def test_rows_of_a_scan_finer_along_than_across_are_no_curves():
     # The 20 neighbours of the measure of noise lie in one row, the 40 of the quadrics in several.
-    y, x = np.mgrid[:25, :175]
+    y, x = np.mgrid[:20, :140]
     z = 0.05 * np.random.default_rng(0).standard_normal(x.size)
     laplacian = core.build_laplacian(np.column_stack([x.ravel() / 7.0, y.ravel(), z]))
-    assert laplacian.areas.sum() == pytest.approx(24.0 * 174.0 / 7.0, rel=0.2)  # some of the noise counts as shape
+    assert laplacian.areas.sum() == pytest.approx(19.0 * 139.0 / 7.0, rel=0.2)  # some of the noise counts as shape

@@ -12,7 +12,7 @@ from core.geometry.orientation import _energies, _least, _near_energies, _patch_
 from tests.core.test_normals import torus_normals
 
 
-def box(count=24):
+def box(count=18):
     """Points of the faces of a cube without its edges, so that no two faces are joined smoothly, and their normals."""
     side = (np.arange(count) + 0.5) / count
     u, v = (grid.ravel() for grid in np.meshgrid(side, side))
@@ -30,7 +30,7 @@ def mixed(normals, seed=0):
 
 @pytest.mark.parametrize("method", ["outside", "winding"])
 def test_torus_and_box_point_outwards(method):
-    points = torus_points(3000)
+    points = torus_points(1500)
     np.testing.assert_allclose(
         core.orient_normals(points, mixed(torus_normals(points)), method=method), torus_normals(points), atol=1e-12
     )
@@ -40,7 +40,7 @@ def test_torus_and_box_point_outwards(method):
 
 def test_winding_joins_parts_that_the_scan_left_apart():
     """Four bands of a tube, no two of which share a neighbour: each alone hardly knows its outside."""
-    angle, height = np.meshgrid(2.0 * np.pi * np.arange(120) / 120, np.linspace(-3.0, 3.0, 100))
+    angle, height = np.meshgrid(2.0 * np.pi * np.arange(80) / 80, np.linspace(-3.0, 3.0, 76))
     angle, height = angle.ravel(), height.ravel()
     normals = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
     points = normals + height[:, None] * [0.0, 0.0, 1.0]
@@ -90,7 +90,7 @@ def test_viewpoint_within_turns_all_inwards_and_one_per_point_outwards():
 
 @pytest.mark.parametrize("distance", [1.5, 3.0, 1000.0])
 def test_the_hidden_side_of_a_closed_surface_does_not_vote(distance):
-    sphere = fibonacci_sphere(1000)
+    sphere = fibonacci_sphere(700)
     seen = core.orient_normals(sphere, mixed(sphere), method="viewpoint", viewpoint=[0.0, distance, 0.0])
     np.testing.assert_allclose(seen, sphere, atol=1e-12)
     half = sphere[:, 1] > 0.2
@@ -107,7 +107,7 @@ def test_viewpoint_of_a_flat_cloud():
 
 
 def test_few_wrong_viewpoints_are_outvoted():
-    sphere = fibonacci_sphere(1000)
+    sphere = fibonacci_sphere(500)
     seen = 3.0 * sphere
     seen[::10] *= -1.0
     np.testing.assert_allclose(

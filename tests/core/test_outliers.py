@@ -20,7 +20,7 @@ from benchmarks.samplings import (
 from core.geometry.nearest import find_nearest
 from core.geometry.outliers import find_outliers
 
-COUNT = 3000
+COUNT = 2000
 SPACING = np.sqrt(4.0 * np.pi / COUNT)
 
 
@@ -103,7 +103,7 @@ def test_what_is_within_the_noise_is_none():
         assert find_outliers(find_nearest(points))[-1] == found
 
 
-@pytest.mark.parametrize("share", [0.01, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("share", [0.01, 0.2])
 def test_a_box_full_of_them_does_not_change_the_area(share):
     surface = random_sphere(COUNT)
     outliers = box_around(surface, share)
@@ -114,7 +114,7 @@ def test_a_box_full_of_them_does_not_change_the_area(share):
     assert np.all(laplacian.component[COUNT:][far] == -1)
 
 
-@pytest.mark.parametrize("share", [0.01, 0.05, 0.1])
+@pytest.mark.parametrize("share", [0.01, 0.1])
 def test_a_layer_of_them_near_the_surface_does_not_change_the_area(share):
     laplacian = core.build_laplacian(np.concatenate([random_sphere(COUNT), layer_around(share)]))
     assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
@@ -122,7 +122,7 @@ def test_a_layer_of_them_near_the_surface_does_not_change_the_area(share):
 
 
 def test_they_do_not_join_components():
-    points = np.concatenate([random_sphere(2000), random_sphere(2000, 1) + [2.6, 0.0, 0.0]])
+    points = np.concatenate([random_sphere(1000), random_sphere(1000, 1) + [2.6, 0.0, 0.0]])
     laplacian = core.build_laplacian(np.concatenate([points, box_around(points, 0.1)]))
     np.testing.assert_array_equal(np.unique(laplacian.component), [-1, 0, 1])
     assert laplacian.areas.sum() == pytest.approx(8.0 * np.pi, rel=1e-2)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.spatial.transform import Rotation
 
 import core
 from benchmarks.samplings import random_sphere, square_random, torus_points
@@ -18,20 +17,20 @@ def shares(found, exact):
 
 @pytest.fixture(scope="module")
 def torus():
-    laplacian = core.build_laplacian(torus_points(6000))
+    laplacian = core.build_laplacian(torus_points(4200))
     return laplacian, core.principal_curvatures(laplacian)
 
 
 @pytest.mark.parametrize("radius", [0.01, 3000.0])
 def test_sphere_is_a_cap(radius):
-    found = core.principal_curvatures(core.build_laplacian(radius * random_sphere(4000)))
+    found = core.principal_curvatures(core.build_laplacian(radius * random_sphere(2000)))
     assert_allclose(np.stack([found.first, found.second]), 1.0 / radius, rtol=0.06)
     assert_allclose(found.curvedness, 1.0 / radius, rtol=0.04)
     assert found.shape_index.min() > 0.97
 
 
 def test_inward_normals_make_a_cup_of_it():
-    points = random_sphere(2000)
+    points = random_sphere(1000)
     found = core.principal_curvatures(core.build_laplacian(points, normals=-points))
     assert found.first.max() < -0.9
     assert found.shape_index.max() < -0.95
@@ -58,7 +57,7 @@ def test_first_direction_of_a_torus_goes_around_its_tube(torus):
     ("bends", "index"), [((2.0, 0.0), 0.5), ((1.0, -1.0), 0.0), ((0.0, -2.0), -0.5), ((0.0, 0.0), 0.0)]
 )
 def test_shape_index_tells_ridge_saddle_valley_and_plane(bends, index):
-    points = square_random(3000) - [0.5, 0.5, 0.0]
+    points = square_random(1500) - [0.5, 0.5, 0.0]
     points[:, 2] = -0.5 * points[:, :2] ** 2 @ bends
     normals = np.column_stack([points[:, :2] * bends, np.ones(len(points))])
     laplacian = core.build_laplacian(points, normals=normals)
@@ -70,17 +69,7 @@ def test_shape_index_tells_ridge_saddle_valley_and_plane(bends, index):
     assert_allclose(found.second[middle].mean(), bends[1], atol=0.1)
 
 
-def test_they_turn_with_the_points_and_shrink_with_their_size(torus):
-    laplacian, found = torus
-    turn = Rotation.from_euler("xyz", [0.3, 1.1, -2.0])
-    turned = core.principal_curvatures(core.build_laplacian(turn.apply(8.0 * laplacian.points)))
-    assert_allclose(8.0 * turned.first, found.first, rtol=1e-7)
-    assert_allclose(8.0 * turned.second, found.second, rtol=1e-7, atol=1e-7)
-    alike = np.abs(np.einsum("ij,ij->i", turned.direction, turn.apply(found.direction)))
-    assert_allclose(alike, 1.0, rtol=1e-7)
-
-
 def test_point_left_out_is_flat():
-    points = np.vstack([random_sphere(1500), [[9.0, 9.0, 9.0]]])
+    points = np.vstack([random_sphere(750), [[9.0, 9.0, 9.0]]])
     found = core.principal_curvatures(core.build_laplacian(points))
     assert found.first[-1] == found.second[-1] == found.curvedness[-1] == found.shape_index[-1] == 0.0

@@ -95,7 +95,7 @@ class TestUnsymmetrizedOperator:
         assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
 
     def test_is_not_symmetric_for_the_areas_where_normals_differ(self):
-        points = random_sphere(600) * [1.0, 0.7, 0.4]
+        points = random_sphere(400) * [1.0, 0.7, 0.4]
         cloud = read_cloud(points, PaperOptions().cloud)
         scaled, pairs = cloud.scaled, cloud.pairs
         laplacian = core.paper.build_laplacian(points)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import fibonacci_sphere, parallel_sheets, random_sphere, sausage
+from benchmarks.samplings import random_sphere, sausage
 
 
 @pytest.fixture(scope="module")
@@ -31,41 +31,11 @@ def test_nothing_grows_from_nothing_or_by_nothing(sphere):
     np.testing.assert_array_equal(np.flatnonzero(core.grow(sphere, [17, 3], 0.0)), [3, 17])
 
 
-def test_place_scale_and_order_do_not_matter(sphere):
-    order = np.random.default_rng(0).permutation(3000)
-    turn = np.array([[0.0, 0.6, 0.8], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6]])
-    moved = core.build_laplacian(50.0 * sphere.points[order] @ turn.T + [7.0, 8.0, 9.0])
-    grown = core.grow(moved, np.flatnonzero(order == 5), 50.0 * 0.7)
-    assert np.mean(grown == core.grow(sphere, [5], 0.7)[order]) > 0.999
-
-
-def test_not_to_a_close_sheet():
-    points, sheet, _ = parallel_sheets(20, 1.5)
-    laplacian = core.build_laplacian(points)
-    grown = core.grow(laplacian, np.flatnonzero(sheet == 0)[:1], np.inf)
-    np.testing.assert_array_equal(grown, sheet == 0)
-
-
 def test_along_a_bent_sausage_and_not_across_the_gap(operators):
     laplacian, along = operators("bent capsule"), sausage(bent=True)[1]
     grown = core.grow(laplacian, along < 0.0, 1.5)
     assert np.all(grown[along < 1.3])
     assert not np.any(grown[along > 1.7])
-
-
-def test_only_within_the_part_and_not_to_points_left_out():
-    lone = [[0.0, 9.0, 0.0], [0.0, -9.0, 0.0]]
-    points = np.concatenate([fibonacci_sphere(600), lone, 2.0 * fibonacci_sphere(900) + [9.0, 0.0, 0.0]])
-    laplacian = core.build_laplacian(points)
-    grown = core.grow(laplacian, [0, 601], np.inf)
-    np.testing.assert_array_equal(grown, np.isin(np.arange(len(points)), [*range(600), 601]))
-
-
-def test_points_at_one_place_grow_together():
-    laplacian = core.build_laplacian(np.repeat(fibonacci_sphere(600), 2, axis=0))
-    grown = core.grow(laplacian, [0], 0.5).reshape(600, 2)
-    np.testing.assert_array_equal(grown[:, 0], grown[:, 1])
-    assert 20 < grown[:, 0].sum() < 60
 
 
 @pytest.mark.parametrize("distance", [-1.0, np.nan, None, "far"])
@@ -98,15 +68,8 @@ class TestOppositeEnds:
         assert sum(found) == 3  # opposite ones
         assert found[0] != found[1]
 
-    def test_neither_place_nor_order_nor_size_of_the_points_counts(self, strip):
-        turn = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
-        order = np.random.default_rng(7).permutation(2000)
-        before = {frozenset(rows) for rows in core.opposite_ends(core.build_laplacian(strip))}
-        moved = core.opposite_ends(core.build_laplacian(30.0 * strip[order] @ turn.T + 5.0))
-        assert {frozenset(order[rows]) for rows in moved} == before
-
     def test_they_lie_on_the_largest_component(self):
-        points = np.concatenate([0.3 * random_sphere(400) + [9.0, 0.0, 0.0], random_sphere(1500)])
+        points = np.concatenate([0.3 * random_sphere(400) + [9.0, 0.0, 0.0], random_sphere(750)])
         for rows in core.opposite_ends(core.build_laplacian(points)):
             assert rows.min() >= 400
 
@@ -141,8 +104,8 @@ class TestFrontPoint:
         return [core.front_point(points, [x, y, 5.0], [0.0, 0.0, -1.0], reach) for x, y in self.RAYS]
 
     def test_on_the_near_side_of_a_sphere(self):
-        points = random_sphere(3000)
-        picked = points[self.picked(points, 2.0 * np.sqrt(4.0 * np.pi / 3000))]
+        points = random_sphere(2100)
+        picked = points[self.picked(points, 2.0 * np.sqrt(4.0 * np.pi / 2100))]
         assert (picked[:, 2] > 0.3).all()
         assert np.linalg.norm(picked[:, :2] - self.RAYS, axis=1).mean() < 0.04
 

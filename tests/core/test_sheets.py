@@ -17,7 +17,7 @@ from benchmarks.samplings import (
 )
 from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
-from core.geometry.sheets import fit_sheets, label_sheets, same_sheet, step_lengths, ways_along
+from core.geometry.sheets import fit_sheets, same_sheet, step_lengths, ways_along
 from core.options import LaplacianOptions
 
 
@@ -90,7 +90,7 @@ class TestFitSheets:
 
     @pytest.mark.parametrize("share", [0.0, 0.02, 1.0])
     def test_where_some_points_moved_it_is_the_same_as_anew(self, share):
-        points = np.concatenate([noisy_sphere(1500, 0.3), noisy_sphere(1500, 0.3) * 1.04])
+        points = np.concatenate([noisy_sphere(750, 0.3), noisy_sphere(750, 0.3) * 1.04])
         rng = np.random.default_rng(1)
         moved = points + 0.01 * rng.normal(size=points.shape) * (rng.random((len(points), 1)) < share)
         anew = fit_sheets(find_nearest(moved))
@@ -102,7 +102,7 @@ class TestFitSheets:
                 found, wanted = (getattr(getattr(sheets, which), name) for sheets in (again, anew))
                 np.testing.assert_allclose(found, wanted, atol=1e-12, err_msg=name)
 
-    @pytest.mark.parametrize("points", [random_sphere(2000), torus_points(2000)], ids=["sphere", "torus"])
+    @pytest.mark.parametrize("points", [random_sphere(1000), torus_points(1000)], ids=["sphere", "torus"])
     def test_a_single_sheet_keeps_all(self, points):
         nearest = find_nearest(points)
         assert np.array_equal(fit_sheets(nearest)[1].weight, nearest.weight)
@@ -156,7 +156,7 @@ class TestPairs:
         for count in (self.through_the_plate(plate, options), self.across_the_arms(capsule, options)):
             assert count > 1000
 
-    @pytest.mark.parametrize("points", [random_sphere(1500), torus_points(4000)], ids=["sphere", "torus"])
+    @pytest.mark.parametrize("points", [random_sphere(750), torus_points(2000)], ids=["sphere", "torus"])
     def test_none_is_left_out_where_no_sheets_are_close(self, points):
         apart = read_cloud(points, LaplacianOptions())
         assert len(apart.pairs.first) == len(read_cloud(points, LaplacianOptions(sheets=False)).pairs.first)
@@ -174,7 +174,7 @@ class TestOrientation:
 
     @pytest.mark.parametrize("radius", [0.25, 0.1, 0.05])
     def test_outward_on_a_thin_capsule(self, radius):
-        points, along = sausage(3000, radius=radius)
+        points, along = sausage(2100, radius=radius)
         axis = np.column_stack([np.clip(along, 0.0, 6.0), 0.0 * along, 0.0 * along])
         normals = core.estimate_normals(points)
         assert np.einsum("ij,ij->i", normals, points - axis).min() > 0.9 * radius
@@ -192,13 +192,6 @@ class TestOrientation:
 
 
 class TestLabels:
-    def test_parallel_sheets_are_two(self):
-        points, sheet, _ = parallel_sheets(30)
-        surface, nearest = fit_sheets(find_nearest(points))[:2]
-        label = label_sheets(nearest, surface.normals, np.zeros(len(points), dtype=int))
-        assert len(np.unique(label)) == 2
-        assert len({(a, b) for a, b in zip(label.tolist(), sheet.tolist(), strict=True)}) == 2
-
     def test_the_sheets_of_components_are_parts_of_their_own(self):
         points, sheet, _ = parallel_sheets(20)
         points = np.concatenate([points, points + [100.0, 0.0, 0.0], grid_points(range(30), range(30), [50.0])])
@@ -211,22 +204,13 @@ class TestLabels:
 
     @pytest.mark.parametrize(
         "points",
-        [closed_plate(30)[0], sausage(bent=True)[0], random_sphere(2000), torus_points(2000, minor=0.2)],
+        [closed_plate(30)[0], sausage(bent=True)[0], random_sphere(1000), torus_points(1000, minor=0.2)],
         ids=["plate", "capsule", "sphere", "torus"],
     )
     def test_what_hangs_together_is_one(self, points):
         laplacian = core.build_laplacian(points)
         assert np.all(laplacian.component == 0)
         assert connected_components(laplacian.stiffness, directed=False)[0] == 1
-
-    def test_parts_are_components_of_the_operator(self):
-        points = parallel_sheets(30)[0]
-        laplacian = core.build_laplacian(points)
-        assert set(np.unique(laplacian.component)) == {0, 1}
-        assert laplacian.stiffness[laplacian.component == 0][:, laplacian.component == 1].count_nonzero() == 0
-        values = laplacian.eigenpairs(3).eigenvalues
-        assert np.all(values[:2] < 1e-9)
-        assert values[2] > 1e-4
 
 
 class TestWhereSheetsMeet:

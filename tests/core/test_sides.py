@@ -47,10 +47,6 @@ class TestNearestSource:
         each = np.array([geodesics.distance([source]) for source in sources])
         assert_allclose(each[label, np.arange(4160)], least, atol=1e-12)
 
-    def test_no_source_reaches_another_component(self):
-        points = np.concatenate([random_sphere(600), random_sphere(600, 1) + [4.0, 0.0, 0.0]])
-        assert_array_equal(core.nearest_source(core.build_laplacian(points), [3]), np.repeat([0, -1], 600))
-
     def test_wrong_arguments(self, square):
         with pytest.raises(core.InvalidPointsError, match="no sources"):
             core.nearest_source(square, [])
@@ -118,17 +114,6 @@ class TestSignedDistance:
         )
         assert_allclose(found, exact, atol=1e-2)
 
-    def test_turned_scaled_and_in_another_order(self, sphere):
-        rng = np.random.default_rng(0)
-        turn, order = np.linalg.qr(rng.standard_normal((3, 3)))[0], rng.permutation(4160)
-        turn *= np.sign(np.linalg.det(turn))
-        other = core.build_laplacian(50.0 * sphere.points[order] @ turn)
-        curve = np.argsort(order)[:100]
-        found = core.signed_distance(other, curve) * up(other)
-        first = core.signed_distance(sphere, np.arange(100)) * up(sphere)
-        assert_allclose(np.abs(found), 50.0 * np.abs(first[order]), rtol=1e-3, atol=1e-6)
-        assert np.mean(np.sign(found) == np.sign(first[order])) > 0.99
-
     @pytest.mark.parametrize(
         ("curve", "message"), [([3], "at least two points"), ([], "at least two points"), ([3, 3], "more than once")]
     )
@@ -141,4 +126,3 @@ class TestSignedDistance:
         laplacian = core.build_laplacian(points)
         with pytest.raises(core.InvalidPointsError, match="on 2 components"):
             core.signed_distance(laplacian, [0, 700])
-        assert np.isinf(core.signed_distance(laplacian, [0, 1])[600:]).all()

@@ -39,14 +39,14 @@ def rms(values):
 @pytest.fixture(scope="module")
 def clouds():
     return {
-        bumpy: (core.build_laplacian(noisy_sphere(4000, bumpy)[0]), noisy_sphere(4000, bumpy)[1])
+        bumpy: (core.build_laplacian(noisy_sphere(3000, bumpy)[0]), noisy_sphere(3000, bumpy)[1])
         for bumpy in (False, True)
     }
 
 
 @pytest.fixture(scope="module")
 def ellipsoid():
-    return core.build_laplacian(fibonacci_sphere(1500) * [1.0, 0.8, 0.6])
+    return core.build_laplacian(fibonacci_sphere(1000) * [1.0, 0.8, 0.6])
 
 
 @pytest.fixture(scope="module")
@@ -84,23 +84,23 @@ def test_area_of_the_result(smoothed):
     assert core.build_laplacian(smoothed("modes", False)).areas.sum() == pytest.approx(4.0 * np.pi, rel=1e-2)
 
 
+def size_of(laplacian, kind):
+    """The area of a surface, or its volume by the divergence theorem."""
+    height = np.einsum("ic,ic->i", laplacian.points, laplacian.normals) / 3.0
+    return laplacian.areas.sum() if kind == "area" else laplacian.areas @ height
+
+
 @pytest.mark.parametrize("keep", ["area", "volume"])
 def test_size_is_kept_where_the_filter_shrinks(clouds, ellipsoid, keep):
     shrinking = core.exponential(0.1)
     for laplacian, tolerance in ((ellipsoid, 4e-3), (clouds[False][0], 1e-2)):
         assert rms(core.smooth_points(laplacian, shrinking)) < 0.9 * rms(laplacian.points)
         kept = core.build_laplacian(core.smooth_points(laplacian, shrinking, keep=keep))
-        sizes = [
-            operator.areas.sum()
-            if keep == "area"
-            else np.sum(operator.areas * np.einsum("ic,ic->i", operator.points, operator.normals)) / 3.0
-            for operator in (laplacian, kept)
-        ]
-        assert sizes[1] == pytest.approx(sizes[0], rel=tolerance)
+        assert size_of(kept, keep) == pytest.approx(size_of(laplacian, keep), rel=tolerance)
 
 
 def test_kept_volume_of_the_sphere_is_its_own():
-    laplacian = core.build_laplacian(fibonacci_sphere(1500))
+    laplacian = core.build_laplacian(fibonacci_sphere(750))
     for keep in ("area", "volume"):
         radius = np.linalg.norm(core.smooth_points(laplacian, core.exponential(0.2), keep=keep), axis=1)
         np.testing.assert_allclose(radius, 1.0, atol=1e-3)
@@ -112,18 +112,11 @@ def test_size_is_kept_under_a_mask(ellipsoid, keep):
     moved = core.smooth_points(ellipsoid, core.exponential(0.05), mask=mask, keep=keep)
     np.testing.assert_array_equal(moved[mask == 0.0], ellipsoid.points[mask == 0.0])
     assert np.abs(moved - ellipsoid.points).max() > 1e-3
-    kept = core.build_laplacian(moved)
-    sizes = [
-        operator.areas.sum()
-        if keep == "area"
-        else np.sum(operator.areas * np.einsum("ic,ic->i", operator.points, operator.normals)) / 3.0
-        for operator in (ellipsoid, kept)
-    ]
-    assert sizes[1] == pytest.approx(sizes[0], rel=3e-3)
+    assert size_of(core.build_laplacian(moved), keep) == pytest.approx(size_of(ellipsoid, keep), rel=3e-3)
 
 
 def test_exponential_shrinks_the_sphere_by_its_factor():
-    laplacian = core.build_laplacian(fibonacci_sphere(1500))
+    laplacian = core.build_laplacian(fibonacci_sphere(750))
     found = core.smooth_points(laplacian, core.exponential(0.1))
     np.testing.assert_allclose(found, np.exp(-0.2) * laplacian.points, atol=2e-3)
     found = core.fair_points(laplacian, 0.1, order=1)
@@ -133,12 +126,12 @@ def test_exponential_shrinks_the_sphere_by_its_factor():
 
 
 def test_few_modes_of_a_sphere_give_the_sphere():
-    laplacian = core.build_laplacian(fibonacci_sphere(1500) + [3.0, 0.0, -2.0])
+    laplacian = core.build_laplacian(fibonacci_sphere(750) + [3.0, 0.0, -2.0])
     np.testing.assert_allclose(core.smooth_points(laplacian, 4), laplacian.points, atol=5e-3)
 
 
 def test_details_are_boosted(clouds):
-    laplacian = core.build_laplacian(noisy_sphere(4000, True, 0.0)[0])
+    laplacian = core.build_laplacian(noisy_sphere(1000, True, 0.0)[0])
     boosted = core.smooth_points(laplacian, core.boost(1.5, 15.0))
     error, height = radial(boosted, False)
     assert 1.35 < height < 1.6
@@ -165,22 +158,13 @@ def test_modes_beyond_those_resolved_serve_a_reconstruction():
 
 def test_strength_and_mask_blend(ellipsoid):
     full = core.smooth_points(ellipsoid, 10) - ellipsoid.points
-    mask = np.linspace(0.0, 1.0, 1500)
+    mask = np.linspace(0.0, 1.0, 1000)
     for strength in (0.5, 2.0, -1.0):
         moved = core.smooth_points(ellipsoid, 10, strength=strength, mask=mask) - ellipsoid.points
         np.testing.assert_allclose(moved, strength * mask[:, None] * full, atol=1e-9)
     faired = core.fair_points(ellipsoid, 0.01, mask=mask > 0.5) - ellipsoid.points
     assert np.all(faired[mask <= 0.5] == 0.0)
     assert np.all(np.any(faired[mask > 0.5] != 0.0, axis=1))
-
-
-@pytest.mark.parametrize("smoother", [core.fair_points, lambda laplacian: core.smooth_points(laplacian, 9)])
-def test_result_moves_turns_and_grows_with_the_points(smoother):
-    points = noisy_sphere(1200, True)[0]
-    found = smoother(core.build_laplacian(points))
-    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
-    other = smoother(core.build_laplacian(20.0 * points @ turn + [4.0, 5.0, 6.0]))
-    np.testing.assert_allclose(other, 20.0 * found @ turn + [4.0, 5.0, 6.0], atol=2e-3)
 
 
 def test_components_keep_their_places_and_lone_points_stay(components):
@@ -213,7 +197,7 @@ def test_constants_alone_are_no_shape(components, count):
 
 class TestBoundary:
     def test_places_on_the_boundary_of_a_disc(self):
-        points, distance = disc_random(2000)
+        points, distance = disc_random(1400)
         laplacian = core.build_laplacian(points)
         places = boundary_places(laplacian)
         near = laplacian.near_boundary
@@ -221,9 +205,9 @@ class TestBoundary:
         np.testing.assert_allclose(moved[near], distance[near], atol=0.03)
         assert np.all(moved[~near] == 0.0)
 
-    @pytest.mark.parametrize("response", [core.exponential(0.05), core.fairing(0.01), 30])
+    @pytest.mark.parametrize("response", [core.exponential(0.05), core.fairing(0.01), 21])
     def test_a_flat_square_stays(self, response):
-        laplacian = core.build_laplacian(square_grid(30))
+        laplacian = core.build_laplacian(square_grid(21))
         moved = core.smooth_points(laplacian, response, dirichlet=True)
         np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
         corner = np.all(np.abs(laplacian.points[:, :2] - 0.5) > 0.2, axis=1)
@@ -231,7 +215,7 @@ class TestBoundary:
         np.testing.assert_allclose(moved[corner], laplacian.points[corner], atol=2e-2)
 
     def test_a_flat_disc_of_random_points_stays(self):
-        laplacian = core.build_laplacian(disc_random(2000)[0])
+        laplacian = core.build_laplacian(disc_random(1000)[0])
         moved = core.fair_points(laplacian, dirichlet=True) - laplacian.points
         assert np.linalg.norm(moved, axis=1).max() < 0.04  # the spacing
         assert rms(np.linalg.norm(moved, axis=1)) < 8e-3
@@ -252,11 +236,11 @@ class TestBoundary:
 
     def test_parts_without_a_boundary_are_not_in_the_way(self):
         ball = 0.5 * fibonacci_sphere(600) + [0.0, 0.0, 4.0]
-        laplacian = core.build_laplacian(np.concatenate([hemisphere_random(1500), ball]))
+        laplacian = core.build_laplacian(np.concatenate([hemisphere_random(750), ball]))
         assert laplacian.boundary.any()
         moved = core.smooth_points(laplacian, core.fairing(1e-3), dirichlet=True)
         assert np.isfinite(moved).all()
-        np.testing.assert_allclose(moved[1500:], ball, atol=5e-3)
+        np.testing.assert_allclose(moved[750:], ball, atol=5e-3)
 
     def test_an_open_surface_has_no_volume(self):
         laplacian = core.build_laplacian(square_grid(20))
@@ -269,7 +253,7 @@ class TestBoundary:
 @pytest.mark.parametrize("signs", [-1.0, "random"])
 def test_normals_that_do_not_point_outwards_enclose_no_volume(ellipsoid, signs):
     if signs == "random":
-        signs = np.random.default_rng(0).choice([-1.0, 1.0], 1500)[:, None]
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], 1000)[:, None]
     laplacian = core.build_laplacian(ellipsoid.points, signs * ellipsoid.normals)
     with pytest.raises(core.PointCloudError, match="point outwards"):
         core.fair_points(laplacian, keep="volume")
@@ -284,10 +268,10 @@ def test_a_size_that_is_lost_cannot_be_kept(ellipsoid):
     ("settings", "words"),
     [
         ({"strength": np.nan}, "strength"),
-        ({"mask": np.zeros(1500)}, "zero at all 1500"),
-        ({"mask": np.full(1500, 2.0)}, "0 to 1"),
-        ({"mask": np.full(1500, np.nan)}, "not finite"),
-        ({"mask": [0, 1, 2]}, "1500 points"),
+        ({"mask": np.zeros(1000)}, "zero at all 1000"),
+        ({"mask": np.full(1000, 2.0)}, "0 to 1"),
+        ({"mask": np.full(1000, np.nan)}, "not finite"),
+        ({"mask": [0, 1, 2]}, "1000 points"),
         ({"keep": "length"}, "Choose one of"),
     ],
 )
@@ -301,13 +285,6 @@ def test_bad_settings(ellipsoid, settings, words):
 def test_responses_that_are_neither_number_nor_function(ellipsoid, response):
     with pytest.raises(core.PointCloudError, match="whole number of modes, or a function"):
         core.smooth_points(ellipsoid, response)
-
-
-def test_duplicates_move_together():
-    points = noisy_sphere(1000, False)[0]
-    laplacian = core.build_laplacian(np.concatenate([points, points[:50]]))
-    for found in (core.fair_points(laplacian, keep="volume"), core.smooth_points(laplacian, 20, keep="area")):
-        np.testing.assert_allclose(found[1000:], found[:50], atol=1e-9)
 
 
 @pytest.mark.parametrize("settings", [{"time": -1.0}, {"time": np.nan}, {"time": 1.0, "order": 4}])
@@ -334,11 +311,11 @@ class TestMode:
     @pytest.mark.parametrize(
         ("mode", "amplitude", "words"),
         [
-            (np.zeros(1500), 1.0, "zero at all 1500"),
-            (np.ones(3), 1.0, "1500 points"),
-            (np.ones((1500, 2)), 1.0, "one real number for each of 1500 points"),
-            (np.full(1500, np.inf), 1.0, "not finite"),
-            (np.ones(1500), np.nan, "finite numbers"),
+            (np.zeros(1000), 1.0, "zero at all 1000"),
+            (np.ones(3), 1.0, "1000 points"),
+            (np.ones((1000, 2)), 1.0, "one real number for each of 1000 points"),
+            (np.full(1000, np.inf), 1.0, "not finite"),
+            (np.ones(1000), np.nan, "finite numbers"),
         ],
     )
     def test_bad_modes(self, ellipsoid, mode, amplitude, words):
@@ -369,7 +346,7 @@ class TestRoughness:
     def test_wider_waves_count_the_less(self):
         heights = {}
         for waves in (4, 16):
-            grid = square_grid(60)
+            grid = square_grid(50)
             grid[:, 2] = 0.005 * np.sin(2.0 * np.pi * waves * grid[:, 0])
             normals = np.tile([0.0, 0.0, 1.0], (len(grid), 1))
             inner = np.abs(grid[:, :2] - 0.5).max(axis=1) < 0.3

@@ -14,7 +14,7 @@ from benchmarks.samplings import (
 
 @pytest.fixture(scope="module")
 def laplacian():
-    return core.build_laplacian(fibonacci_sphere(2000) * [1.0, 0.9, 0.75])
+    return core.build_laplacian(fibonacci_sphere(1000) * [1.0, 0.9, 0.75])
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +51,8 @@ def test_pairs_satisfy_the_equation(laplacian):
 
 
 def test_the_lowest_are_found(laplacian):
-    root = 1.0 / np.sqrt(laplacian.areas)
-    dense = np.linalg.eigvalsh(root[:, None] * laplacian.stiffness.toarray() * root)
-    np.testing.assert_allclose(laplacian.eigenpairs(20, raw=True).eigenvalues, dense[:20], rtol=1e-8, atol=1e-9)
+    exact = all_eigenvalues(laplacian)[:20]
+    np.testing.assert_allclose(laplacian.eigenpairs(20, raw=True).eigenvalues, exact, rtol=1e-8, atol=1e-9)
 
 
 def test_ascending_from_the_constant(spectrum):
@@ -67,8 +66,8 @@ def two_spheres():
 
 def cube():
     rng = np.random.default_rng(0)
-    points, face = rng.random((2500, 3)), rng.integers(0, 6, 2500)
-    points[np.arange(2500), face % 3] = face // 3
+    points, face = rng.random((1500, 3)), rng.integers(0, 6, 1500)
+    points[np.arange(1500), face % 3] = face // 3
     return points
 
 
@@ -77,7 +76,7 @@ def bar():
 
 
 @pytest.mark.parametrize(
-    ("points", "components"), [(random_sphere(2000), 1), (two_spheres(), 2), (cube(), 1), (bar(), 1)]
+    ("points", "components"), [(random_sphere(1000), 1), (two_spheres(), 2), (cube(), 1), (bar(), 1)]
 )
 def test_no_mode_but_the_constant_of_each_component_is_zero_and_none_lives_on_few_points(points, components):
     laplacian = core.build_laplacian(points)
@@ -102,39 +101,22 @@ def test_correction_raises_the_eigenvalues_of_the_same_vectors(laplacian, spectr
     assert np.all(raw.eigenvalues[1:] < spectrum.eigenvalues[1:])
 
 
-@pytest.fixture(scope="module", params=["icosahedral", "cubic"])
-def symmetric_sphere(request):
-    """Operator of a sphere with the symmetry of its points, and all of its eigenvalues."""
-    laplacian = core.build_laplacian(
-        icosahedral_sphere(8) if request.param == "icosahedral" else marching_cubes_sphere(16)
-    )
-    root = 1.0 / np.sqrt(laplacian.areas)
-    return laplacian, np.linalg.eigvalsh(root[:, None] * laplacian.stiffness.toarray() * root)
-
-
-@pytest.mark.parametrize("count", [5, 12, 33, 60])
-def test_no_copy_of_a_multiple_eigenvalue_is_missed(symmetric_sphere, count):
-    laplacian, dense = symmetric_sphere
-    np.testing.assert_allclose(laplacian.eigenpairs(count, raw=True).eigenvalues, dense[:count], rtol=1e-8, atol=1e-9)
-
-
 def test_a_kernel_that_is_far_too_wide_still_has_its_spectrum():
     # Weyl's estimate is far below these eigenvalues, so the solver's first cut is too low.
     laplacian = core.paper.build_laplacian(fibonacci_sphere(500))
     assert any("too wide" in notice for notice in laplacian.notices)
-    root = 1.0 / np.sqrt(laplacian.areas)
-    dense = np.linalg.eigvalsh(root[:, None] * laplacian.stiffness.toarray() * root)
-    np.testing.assert_allclose(laplacian.eigenpairs(4).eigenvalues, dense[:4], rtol=1e-8, atol=1e-9)
+    exact = all_eigenvalues(laplacian)[:4]
+    np.testing.assert_allclose(laplacian.eigenpairs(4).eigenvalues, exact, rtol=1e-8, atol=1e-9)
 
 
 def test_the_paper_setting_is_raw():
-    laplacian = core.paper.build_laplacian(fibonacci_sphere(3000))
+    laplacian = core.paper.build_laplacian(fibonacci_sphere(1000), neighbors=30)
     assert laplacian.notices == []
     np.testing.assert_array_equal(laplacian.eigenpairs(4).eigenvalues, laplacian.eigenpairs(4, raw=True).eigenvalues)
 
 
 def test_order_of_the_points_does_not_matter(laplacian, spectrum):
-    order = np.random.default_rng(0).permutation(2000)
+    order = np.random.default_rng(0).permutation(1000)
     moved = core.build_laplacian(laplacian.points[order]).eigenpairs(20)
     np.testing.assert_allclose(moved.eigenvalues[1:], spectrum.eigenvalues[1:], rtol=1e-6)
     # A single mode of an ellipsoid with three different axes, up to sign.
@@ -143,17 +125,17 @@ def test_order_of_the_points_does_not_matter(laplacian, spectrum):
 
 
 def test_unresolved_modes_are_refused_with_the_number_that_is_resolved():
-    laplacian = core.build_laplacian(fibonacci_sphere(600) * [1.0, 0.9, 0.75])
-    with pytest.raises(core.UnresolvedModesError, match="on 600 points") as caught:
-        laplacian.eigenpairs(180)
+    laplacian = core.build_laplacian(fibonacci_sphere(400) * [1.0, 0.9, 0.75])
+    with pytest.raises(core.UnresolvedModesError, match="on 400 points") as caught:
+        laplacian.eigenpairs(130)
     resolved = caught.value.resolved
-    assert 15 < resolved < 180
+    assert 15 < resolved < 130
     assert f"at most {resolved}" in str(caught.value)
     assert len(laplacian.eigenpairs(resolved).eigenvalues) == resolved
-    assert len(laplacian.eigenpairs(180, raw=True).eigenvalues) == 180
+    assert len(laplacian.eigenpairs(130, raw=True).eigenvalues) == 130
 
 
-@pytest.mark.parametrize("count", [0, -3, 2.5, 1999])
+@pytest.mark.parametrize("count", [0, -3, 2.5, 999])
 def test_impossible_counts(laplacian, count):
     with pytest.raises(core.TooFewPointsError, match="modes were asked for"):
         laplacian.eigenpairs(count)
@@ -168,7 +150,7 @@ def test_progress_is_reported(laplacian):
 
 def test_a_small_dense_part_beside_a_large_one():
     # The largest eigenvalue is a thousand times that of an even cloud: a polynomial of low degree tells nothing apart.
-    sphere = fibonacci_sphere(1200)
+    sphere = fibonacci_sphere(600)
     laplacian = core.build_laplacian(np.concatenate([sphere, 0.03 * sphere + [3.0, 0.0, 0.0]]))
     eigenvalues = laplacian.eigenpairs(21).eigenvalues
     exact = np.append(0.0, sphere_eigenvalues(20))  # those of the small one lie far above
@@ -188,19 +170,20 @@ def islands(count):
 
 
 def torus_grid():
-    """A torus with 60 by 24 points in rows, all of whose eigenvalues but a few come twice or more often."""
-    u, v = np.meshgrid(2.0 * np.pi * np.arange(60) / 60, 2.0 * np.pi * np.arange(24) / 24)
+    """A torus with 54 by 20 points in rows, all of whose eigenvalues but a few come twice or more often."""
+    u, v = np.meshgrid(2.0 * np.pi * np.arange(54) / 54, 2.0 * np.pi * np.arange(20) / 20)
     ring = 1.0 + 0.4 * np.cos(v)
     return np.stack([ring * np.cos(u), ring * np.sin(u), 0.4 * np.sin(v)], axis=-1).reshape(-1, 3)
 
 
 CLOUDS = {
-    "islands": lambda: islands(250),
-    "twins": lambda: np.concatenate([fibonacci_sphere(900), fibonacci_sphere(900) + [3.0, 0.0, 0.0]]),
+    "islands": lambda: islands(130),
+    "twins": lambda: np.concatenate([fibonacci_sphere(520), fibonacci_sphere(520) + [3.0, 0.0, 0.0]]),
     "torus grid": torus_grid,
-    "cubic": lambda: marching_cubes_sphere(22),
-    "random": lambda: random_sphere(1800),
-    "disc": lambda: disc_random(1500)[0],
+    "cubic": lambda: marching_cubes_sphere(18),
+    "icosahedral": lambda: icosahedral_sphere(11),
+    "random": lambda: random_sphere(1040),
+    "disc": lambda: disc_random(1040)[0],
 }
 
 
@@ -237,7 +220,7 @@ def test_residuals_fall_to_the_tolerance(laplacian, tolerance):
 
 
 def test_the_solver_says_where_it_ends(laplacian):
-    with pytest.raises(core.SolverError, match="of 20 modes on 2000 points"):
+    with pytest.raises(core.SolverError, match="of 20 modes on 1000 points"):
         laplacian.eigenpairs(20, tolerance=1e-17)
 
 
@@ -250,7 +233,7 @@ def test_it_can_be_cancelled_at_any_report(laplacian):
     calls = []
     laplacian.eigenpairs(5, progress=lambda stage, fraction: calls.append(fraction))
     assert calls == sorted(calls)
-    assert len(calls) > 50
+    assert len(calls) > 20
 
     for last in (0, 10, len(calls) // 2, len(calls) - 1):
         left = iter(range(last))

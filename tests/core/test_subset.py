@@ -166,16 +166,6 @@ def test_normals_of_another_number_are_refused(sphere, subset):
         core.Prolongation(sphere, subset, sphere)
 
 
-def test_work_can_be_cancelled(sphere, subset):
-    def stop():
-        raise core.Cancelled
-
-    with pytest.raises(core.Cancelled):
-        core.blue_noise_subset(sphere, 3000, progress=stop)
-    with pytest.raises(core.Cancelled):
-        core.Prolongation(sphere, subset, sphere[subset], progress=stop)
-
-
 def test_a_subset_of_one_gives_its_value_to_all(sphere):
     single = core.Prolongation(sphere[:50], [7], sphere[7:8])
     np.testing.assert_array_equal(single.interpolate([3.0]), np.full(50, 3.0, dtype=np.float32))

@@ -41,12 +41,12 @@ def torus_facts(points, minor=0.4):
 @pytest.mark.parametrize("sphere", [fibonacci_sphere, random_sphere])
 @pytest.mark.parametrize("radius", [1.0, 50.0])
 def test_sphere(sphere, radius):
-    points = sphere(4000)
+    points = sphere(2000)
     surface = fit(radius * points)
     assert degrees_off(surface.normals, points).max() < 0.1
     np.testing.assert_allclose(surface.gaussian_curvature, 1.0 / radius**2, rtol=0.06)
     np.testing.assert_allclose(largest_curvature(surface), 1.0 / radius, rtol=0.06)
-    assert surface.misfit.max() < 2e-3 * radius * np.sqrt(4.0 * np.pi / 4000)
+    assert surface.misfit.max() < 2e-3 * radius * np.sqrt(4.0 * np.pi / 2000)
     assert np.linalg.norm(surface.height, axis=1).max() < 3e-4 * radius
 
 
@@ -71,7 +71,7 @@ def test_cylinder():
 
 
 def test_plane():
-    surface = fit(square_random(1000))
+    surface = fit(square_random(500))
     np.testing.assert_allclose(np.abs(surface.normals[:, 2]), 1.0, atol=1e-12)
     for values in (surface.gaussian_curvature, surface.shape_operator, surface.misfit, surface.height):
         np.testing.assert_allclose(values, 0.0, atol=1e-9)
@@ -91,8 +91,8 @@ def test_a_quadric_is_met_exactly():
 
 
 def test_some_rows_only():
-    points = torus_points(1500)
-    nearest, rows = find_nearest(points), np.arange(0, 1500, 7)
+    points = torus_points(750)
+    nearest, rows = find_nearest(points), np.arange(0, 750, 7)
     every = fit(points)
     some = fit_quadrics(points, nearest.index[rows], nearest.weight[rows], rows)
     np.testing.assert_allclose(some.gaussian_curvature, every.gaussian_curvature[rows], rtol=1e-9)
@@ -100,8 +100,8 @@ def test_some_rows_only():
 
 
 def test_height_leads_to_the_quadric():
-    points = fibonacci_sphere(3000)
-    spacing = np.sqrt(4.0 * np.pi / 3000)
+    points = fibonacci_sphere(1500)
+    spacing = np.sqrt(4.0 * np.pi / 1500)
     moved = points.copy()
     moved[::50] *= 1.0 + 0.5 * spacing
     surface = fit(moved)
@@ -117,13 +117,6 @@ def test_frames_are_orthonormal():
 
 
 class TestGaussianCurvature:
-    @pytest.mark.parametrize("scale", [1e-2, 30.0])
-    def test_scales_as_one_over_area(self, scale):
-        points = torus_points(1200)
-        before = core.build_laplacian(points).gaussian_curvature
-        scaled = core.build_laplacian(scale * points).gaussian_curvature
-        np.testing.assert_allclose(scaled * scale**2, before, rtol=1e-6, atol=1e-6 * np.abs(before).max())
-
     def test_total_curvature_of_closed_surfaces(self):
         for points, expected in ((random_sphere(1500), 4.0 * np.pi), (torus_points(3000), 0.0)):
             laplacian = core.build_laplacian(points)

@@ -7,7 +7,7 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import splu
 
 import core
-from benchmarks.samplings import open_cylinder, random_sphere, square_grid, square_random, torus_points
+from benchmarks.samplings import open_cylinder, random_sphere, square_grid, square_random
 from core.algebra import TwoGrid
 from core.applications.geodesics import Geodesics
 from core.operator import connection_laplacian, tangent_frames
@@ -20,7 +20,7 @@ def connection(laplacian):
 
 @pytest.fixture(scope="module")
 def sphere():
-    return core.build_laplacian(random_sphere(4000))
+    return core.build_laplacian(random_sphere(2000))
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_it_is_hermitian_and_positive_with_the_pairs_of_the_stiffness(sphere):
     assert abs(matrix - matrix.conj().T).max() == 0.0
     rng = np.random.default_rng(0)
     for _ in range(5):
-        x = rng.standard_normal(4000) + 1j * rng.standard_normal(4000)
+        x = rng.standard_normal(2000) + 1j * rng.standard_normal(2000)
         assert (x.conj() @ (matrix @ x)).real > 0.0
     assert abs(abs(matrix) - abs(sphere.stiffness)).max() < 1e-12
 
@@ -78,11 +78,11 @@ def test_on_a_plane_it_is_the_stiffness(square):
 
 
 def test_another_choice_of_frames_is_a_change_of_basis(sphere):
-    turn = np.exp(1j * np.random.default_rng(0).uniform(0.0, 6.0, 4000))
+    turn = np.exp(1j * np.random.default_rng(0).uniform(0.0, 6.0, 2000))
     frames = tangent_frames(sphere.normals)
     turned = connection_laplacian(sphere.stiffness, sphere.normals, turn.conj()[:, None] * frames)
     # A frame turned back makes the numbers of vectors turn ahead, and the matrix with them.
-    values = np.random.default_rng(1).standard_normal(4000) + 0j
+    values = np.random.default_rng(1).standard_normal(2000) + 0j
     assert_allclose(turned @ (turn.conj() * values), turn.conj() * (connection(sphere) @ values), atol=1e-10)
 
 
@@ -151,7 +151,7 @@ class TestTransport:
         assert np.abs(np.einsum("ij,ij->i", found, sphere.normals)).max() < 1e-9
 
     def test_around_a_cylinder(self):
-        points = open_cylinder()
+        points = open_cylinder()[::2]
         laplacian = core.build_laplacian(points)
         axis = np.argmin(np.abs(laplacian.normals).mean(axis=0))
         found = core.transport(laplacian, [len(points) // 2], np.eye(3)[axis])
@@ -164,22 +164,6 @@ class TestTransport:
         near = np.linalg.norm(square.points[:, None] - square.points[[left, right]], axis=2)
         assert found[near[:, 0] < 0.5 * near[:, 1], 0].min() > 0.95
         assert found[near[:, 1] < 0.5 * near[:, 0], 1].min() > 0.95
-
-    def test_turned_scaled_and_in_another_order(self):
-        points, rng = torus_points(2000), np.random.default_rng(0)
-        turn, order = np.linalg.qr(rng.standard_normal((3, 3)))[0], rng.permutation(2000)
-        turn *= np.sign(np.linalg.det(turn))
-        first = core.transport(core.build_laplacian(points), order[:2], [[0.0, 0.1, 0.9], [1.0, 0.3, 0.0]])
-        second = core.transport(
-            core.build_laplacian(50.0 * points[order] @ turn), [0, 1], [[0.0, 0.1, 0.9], [1.0, 0.3, 0.0]] @ turn
-        )
-        cosine = np.einsum("ij,ij->i", first[order] @ turn, second)
-        assert np.quantile(cosine, 0.02) > 0.999  # but where the directions of both cancel
-
-    def test_nothing_comes_to_other_components(self):
-        points = np.concatenate([random_sphere(600), random_sphere(600, 1) + [4.0, 0.0, 0.0]])
-        found = core.transport(core.build_laplacian(points), [0], [0.3, 0.5, 0.9])
-        assert_allclose(np.linalg.norm(found, axis=1), np.repeat([1.0, 0.0], 600))
 
     @pytest.mark.parametrize(
         ("sources", "directions", "message"),
@@ -198,7 +182,7 @@ class TestTransport:
 
 
 class TestLogarithmicMap:
-    @pytest.mark.parametrize(("sample", "most"), [(square_random, 0.02), (lambda count: square_grid(45), 0.05)])
+    @pytest.mark.parametrize(("sample", "most"), [(square_random, 0.02), (lambda count: square_grid(32), 0.05)])
     def test_on_a_plane_differences_of_coordinates(self, sample, most):
         laplacian = core.build_laplacian(sample(2000))
         source = np.argmin(np.linalg.norm(laplacian.points - laplacian.points.mean(axis=0), axis=1))
@@ -217,7 +201,7 @@ class TestLogarithmicMap:
         assert_allclose(found[7], 0.0)
 
     def test_a_cylinder_unrolls(self):
-        around, height = np.random.default_rng(0).uniform((0.0, 0.0), (2.0 * np.pi, 3.0), (4000, 2)).T
+        around, height = np.random.default_rng(0).uniform((0.0, 0.0), (2.0 * np.pi, 3.0), (3000, 2)).T
         points = np.column_stack([np.cos(around), np.sin(around), height])
         laplacian = core.build_laplacian(points)
         source = np.argmin(np.hypot(around - np.pi, height - 1.5))
@@ -243,24 +227,10 @@ class TestLogarithmicMap:
         monkeypatch.setattr(Geodesics, "__init__", lambda *_, **__: pytest.fail("lengths were made again"))
         assert_array_equal(carried.logarithmic_map(1234), given)
 
-    def test_it_can_be_cancelled_at_each_report(self):
+    def test_stages_are_reported(self):
         laplacian, reports = core.build_laplacian(random_sphere(600)), []
         core.logarithmic_map(laplacian, 7, progress=lambda stage, fraction: reports.append(stage))
         assert {"Equations", "Factors", "Directions", "Lengths", "Distance", "Map"} == set(reports)
-        for stage in set(reports):
-
-            def stop(now, fraction, stage=stage):
-                if now == stage:
-                    raise core.Cancelled
-
-            with pytest.raises(core.Cancelled):
-                core.logarithmic_map(laplacian, 7, progress=stop)
-
-    def test_other_components_have_no_place(self):
-        points = np.concatenate([random_sphere(600), random_sphere(600, 1) + [4.0, 0.0, 0.0]])
-        found = core.logarithmic_map(core.build_laplacian(points), 0)
-        assert np.isfinite(found[:600]).all()
-        assert np.isnan(found[600:]).all()
 
     def test_wrong_source(self, square):
         with pytest.raises(core.InvalidPointsError, match="whole numbers below"):
