@@ -6,6 +6,7 @@ import os
 import shutil
 import tempfile
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import pytest
 
@@ -52,6 +53,24 @@ def new_file():
     kept = dict(cache._kept)
     bpy.ops.wm.read_homefile(use_empty=True)  # which gives the memory back
     cache._kept.update(kept)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def known_operators(installed):
+    """Build the narrow operators, by which tools solve on a cloud, only once for each operator that is kept."""
+    known = WeakKeyDictionary()
+    deformation = importlib.import_module(f"{MODULE}.core.applications.deformation")
+    narrow_laplacian = deformation.narrow_laplacian
+
+    def narrow(laplacian, *settings, progress=None):
+        results = known.setdefault(laplacian, {})
+        if settings not in results:
+            results[settings] = narrow_laplacian(laplacian, *settings, progress=progress)
+        return results[settings]
+
+    deformation.narrow_laplacian = narrow
+    yield
+    deformation.narrow_laplacian = narrow_laplacian
 
 
 @pytest.fixture(autouse=True)
