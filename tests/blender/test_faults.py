@@ -110,13 +110,21 @@ def forget(module):
     return lambda: (cache.clear(), live._followers.clear())
 
 
+@pytest.fixture(scope="module")
+def known():
+    """What making the objects of these tests has computed."""
+    return {}
+
+
 @pytest.fixture
-def fresh(forget):
-    """Function that starts from an empty file, with nothing computed."""
+def fresh(forget, cache, known):
+    """Function that makes something in an empty file, and forgets what was computed."""
 
     def start(make):
         bpy.ops.wm.read_homefile(use_empty=True)
+        cache._kept.update(known)
         made = make()
+        known.update(cache._kept)
         forget()
         return made
 
