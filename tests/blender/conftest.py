@@ -73,6 +73,29 @@ def known_operators(installed):
     deformation.narrow_laplacian = narrow_laplacian
 
 
+@pytest.fixture(scope="session", autouse=True)
+def known_nodes(installed, tmp_path_factory):
+    """Take the nodes of the display, once they are made, from a file; return the function that makes them."""
+    import bpy
+
+    nodes, path = importlib.import_module(f"{MODULE}.ui.nodes"), tmp_path_factory.mktemp("nodes") / "display.blend"
+    make = nodes._new_display
+
+    def take():
+        if not path.exists():
+            group = make()
+            bpy.data.libraries.write(str(path), {group})
+            return group
+        with bpy.data.libraries.load(str(path)) as (found, wanted):
+            wanted.node_groups = found.node_groups
+        bpy.data.libraries.remove(bpy.data.libraries[path.name])
+        return wanted.node_groups[0]
+
+    nodes._new_display = take
+    yield make
+    nodes._new_display = make
+
+
 @pytest.fixture(autouse=True)
 def empty_scene(installed):
     """Start every test from an empty scene."""

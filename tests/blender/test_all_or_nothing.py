@@ -54,6 +54,12 @@ class Calls:
         sys.settrace(None)
 
 
+@pytest.fixture(autouse=True)
+def made_nodes(module, known_nodes, monkeypatch):
+    """Make the nodes of the display where it is shown, for that may fail, too."""
+    monkeypatch.setattr(module("ui.nodes"), "_new_display", known_nodes)
+
+
 def scene():
     """All that the objects hold."""
     return {obj.name: everything(obj) for obj in bpy.data.objects}
