@@ -43,16 +43,37 @@ def archive():
 
 
 def new_file():
-    """Start from an empty scene; what was computed is still known, for many tests use the same clouds.
+    """Start from an empty scene."""
+    import bpy
 
-    Tests of the computation itself empty the cache.
+    bpy.ops.wm.read_homefile(use_empty=True)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def known_results(installed):
+    """Keep what was computed when another file is opened, for many tests use the same clouds.
+
+    Tests of the computation itself empty the cache, by its fixture; that another file does so is tried in test_cache.py.
     """
     import bpy
 
-    cache = importlib.import_module(f"{MODULE}.operators.running.cache")
-    kept = dict(cache._kept)
-    bpy.ops.wm.read_homefile(use_empty=True)  # which gives the memory back
-    cache._kept.update(kept)
+    cache, kept = importlib.import_module(f"{MODULE}.operators.running.cache"), {}
+
+    @bpy.app.handlers.persistent
+    def keep(*_):
+        kept.update(cache._kept)
+
+    @bpy.app.handlers.persistent
+    def take(*_):
+        cache._kept.update(kept)
+        kept.clear()
+
+    handlers = bpy.app.handlers
+    handlers.load_pre.insert(0, keep)
+    handlers.load_post.insert(0, take)
+    yield keep
+    handlers.load_pre.remove(keep)
+    handlers.load_post.remove(take)
 
 
 @pytest.fixture(scope="session", autouse=True)

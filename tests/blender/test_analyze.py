@@ -117,7 +117,7 @@ def test_settings_reach_core(core):
 
 
 def test_settings_of_the_paper_reach_core(core):
-    obj = add_object(sphere_points())
+    obj = add_object(sphere_points(300))
     settings = {"laplacian": "PAPER", "neighbors": 60, "normals": "PCA", "areas": "UNIFORM", "denoise": True}
     for name, value in settings.items():
         setattr(obj.meshfree, name, value)

@@ -61,7 +61,7 @@ def add_ready(points, name="Cloud"):
 
 def wave():
     """Points of a rectangle with a boundary, bent a little, about the origin."""
-    points, _ = grid_points()
+    points, _ = grid_points(28, 21)
     points = points - points.mean(axis=0)
     points[:, 2] = 0.1 * np.sin(2.0 * points[:, 0])
     return points

@@ -207,9 +207,11 @@ def test_settings(core, run, tmp_path):
     options = core.LaplacianOptions(neighbors=60, bandwidth="global")
     spectrum = core.build_laplacian(POINTS, options=options).eigenpairs(3)
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
-    code, lines = run("analyze", tmp_path / "in.xyz", "--modes", 3, "--laplacian", "paper", "--neighbors", 60)
+    few = sphere_points(300)
+    np.save(tmp_path / "few.npy", few)
+    code, lines = run("analyze", tmp_path / "few.npy", "--modes", 3, "--laplacian", "paper", "--neighbors", 60)
     assert code == 0
-    spectrum = core.paper.build_laplacian(POINTS, neighbors=60).eigenpairs(3)
+    spectrum = core.paper.build_laplacian(few, neighbors=60).eigenpairs(3)
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
 
 
@@ -481,7 +483,7 @@ class TestNothingBreaks:
     @pytest.mark.parametrize("verb", ["analyze", "smooth"])
     @pytest.mark.parametrize("fault", [BrokenPipeError("nobody listens"), KeyboardInterrupt()])
     def test_a_fault_in_the_progress_leaves_the_output(
-        self, extension, run, tmp_path, monkeypatch, suffix, verb, fault
+        self, extension, cache, run, tmp_path, monkeypatch, suffix, verb, fault
     ):
         stages = importlib.import_module(f"{extension.__name__}.operators.running.stages")
 

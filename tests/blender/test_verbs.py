@@ -134,7 +134,7 @@ class TestCompare:
         assert_allclose(table.attributes["lb_deviation"], 0.1, atol=3e-3)
         assert (table.attributes["lb_compared"] == 1).all()
 
-    def test_the_reference_is_analyzed_once_for_all(self, extension, core, run, tmp_path, monkeypatch):  # noqa: F811
+    def test_the_reference_is_analyzed_once_for_all(self, extension, core, cache, run, tmp_path, monkeypatch):  # noqa: F811
         build, built = core.build_laplacian, []
 
         def counted(points, **settings):
