@@ -53,7 +53,7 @@ def new_file():
 def known_results(installed):
     """Keep what was computed when another file is opened, for many tests use the same clouds.
 
-    Tests of the computation itself empty the cache, by its fixture; that another file does so is tried in test_cache.py.
+    Tests of the computation itself empty the cache, by its fixture; test_cache.py tries that another file does so.
     """
     import bpy
 

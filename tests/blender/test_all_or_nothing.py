@@ -106,7 +106,7 @@ def fail_everywhere(extension, make, name, every=2, **settings):
 
 def handled():
     """A sphere whose ends are handle and anchor, with results of other settings, and a shape key."""
-    points = sphere_points(400)
+    points = sphere_points(250)
     obj = add_object(points)
     for name, members in {"Handle": points[:, 2] > 0.9, "Anchor": points[:, 2] < -0.9}.items():
         add_group(obj, name, members)
@@ -161,7 +161,7 @@ def colored():
 def compared():
     """Two selected spheres of other sizes, the first one active."""
     obj = handled()
-    other = add_object(1.1 * sphere_points(300, seed=3), "Other")
+    other = add_object(1.1 * sphere_points(200, seed=3), "Other")
     bpy.context.view_layer.objects.active = obj
     for each in (obj, other):
         each.select_set(True)
@@ -343,7 +343,7 @@ def test_colors_stay_if_showing_others_fails(extension, make):
 
 def partly_selected():
     obj = handled()
-    obj.data.vertices.foreach_set("select", [index < 50 for index in range(400)])
+    obj.data.vertices.foreach_set("select", [index < 50 for index in range(250)])
     return obj
 
 

@@ -1007,23 +1007,6 @@ class TestMemory:
         bpy.ops.wm.read_homefile(use_empty=True)
         assert not live._followers
 
-    def test_switching_off_leaves_no_handler(self, extension, strip):
-        name = extension.__name__
-        bind()
-
-        def handlers():
-            lists = [getattr(bpy.app.handlers, event) for event in dir(bpy.app.handlers)]
-            return [item for each in lists if isinstance(each, list) for item in each if name in item.__module__]
-
-        count = len(handlers())
-        assert count >= 7
-        bpy.ops.preferences.addon_disable(module=name)
-        try:
-            assert not handlers()
-        finally:
-            bpy.ops.preferences.addon_enable(module=name)
-        assert len(handlers()) == count
-
 
 class TestBadInput:
     """What cannot be bound stays as it is."""

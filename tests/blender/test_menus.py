@@ -4,7 +4,6 @@ import importlib
 from types import SimpleNamespace
 
 import bpy
-import pytest
 
 from tests.blender.clouds import add_object, sphere_points
 
@@ -88,24 +87,3 @@ class TestRightClick:
         bpy.context.view_layer.objects.active = light
         menu = right_click(extension, "VIEW3D_MT_object_context_menu")
         assert (menu.operators, menu.menus) == (set(), [])
-
-
-IN_MENUS = (
-    "VIEW3D_MT_object",
-    "VIEW3D_MT_edit_mesh",
-    "VIEW3D_MT_object_context_menu",
-    "VIEW3D_MT_edit_mesh_context_menu",
-)
-
-
-@pytest.mark.parametrize("name", IN_MENUS)
-def test_nothing_is_left_behind(extension, name):
-    def ours():
-        return [draw for draw in getattr(bpy.types, name)._dyn_ui_initialize() if "meshfree" in draw.__module__]
-
-    module = extension.__name__
-    assert len(ours()) == 1
-    bpy.ops.preferences.addon_disable(module=module)
-    assert ours() == []
-    bpy.ops.preferences.addon_enable(module=module)
-    assert len(ours()) == 1
