@@ -18,17 +18,7 @@ from numpy.linalg import LinAlgError
 from tests.blender.clouds import add_group, add_object, differences, everything, sphere_points
 from tests.blender.conftest import MODULE
 from tests.blender.splats import add_splats, bar_splats
-from tests.blender.test_all_or_nothing import (
-    bound,
-    by_default,
-    colored,
-    film,
-    handled,
-    keyed,
-    scene,
-    shared,
-    unhandled,
-)
+from tests.blender.test_all_or_nothing import bound, by_default, colored, film, handled, keyed, scene, shared, unhandled
 
 COUNT = int(os.environ.get("MESHFREE_FAULTS", "25"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))

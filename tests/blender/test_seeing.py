@@ -222,11 +222,7 @@ def test_numbers_of_vectors(display, obj, tmp_path, part, index):
     obj.meshfree.component = part
     number = 5.0 if index is None else vectors[0, index]
     assert (display.shown_values(obj) == number).all()
-    (
-        red,
-        _,
-        blue,
-    ) = median_color(tmp_path / "way.png")
+    (red, _, blue) = median_color(tmp_path / "way.png")
     assert np.sign(red - blue) == np.sign(number) or (number == 0.0 and abs(red - blue) < 0.1)
 
 

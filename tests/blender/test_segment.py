@@ -45,11 +45,7 @@ def test_separating_keeps_every_point_and_what_it_holds(dumbbell):
     dumbbell.location = (1.0, 2.0, 3.0)
     bpy.ops.meshfree.analyze()
     bpy.ops.meshfree.segment(parts=3)
-    labels, points, areas = (
-        attribute(dumbbell, "lb_segment"),
-        local_points(dumbbell),
-        attribute(dumbbell, "lb_area"),
-    )
+    labels, points, areas = (attribute(dumbbell, "lb_segment"), local_points(dumbbell), attribute(dumbbell, "lb_area"))
     add_group(dumbbell, "Right", points[:, 0] > 0.0)
     bpy.ops.meshfree.separate_by_segment()
     for number, name in enumerate(["Cloud", "Cloud Segment 1", "Cloud Segment 2"]):

@@ -51,10 +51,7 @@ def test_default_limit_is_50(obj):
 def test_fewer_modes_remove_the_surplus(obj):
     bpy.ops.meshfree.spectrum(count=6)
     bpy.ops.meshfree.spectrum(count=2)
-    assert [name for name in result_names(obj) if "eigenvector" in name] == [
-        "lb_eigenvector_001",
-        "lb_eigenvector_002",
-    ]
+    assert [name for name in result_names(obj) if "eigenvector" in name] == ["lb_eigenvector_001", "lb_eigenvector_002"]
     assert len(obj["lb_eigenvalues"]) == 2
 
 

@@ -25,10 +25,7 @@ TASKS = {
     "deform_bind": "bpy.context.object.name == 'Cloud Handle'",
 }
 # By what the search finds: the attribute, and what it is at a point where the surface faces the viewer.
-PICKED = [
-    ("Unwrap Around Point", "lb_uv", [0.5, 0.5]),
-    ("Extend Direction", "lb_direction", [0.0, 0.0, -1.0]),
-]
+PICKED = [("Unwrap Around Point", "lb_uv", [0.5, 0.5]), ("Extend Direction", "lb_direction", [0.0, 0.0, -1.0])]
 SELECTED = """
 import bmesh
 [vertex.index for vertex in bmesh.from_edit_mesh(bpy.context.object.data).verts if vertex.select]
