@@ -42,6 +42,11 @@ def archive():
     return path
 
 
+def part(name):
+    """Return a module of the installed extension."""
+    return importlib.import_module(f"{MODULE}.{name}")
+
+
 def new_file():
     """Start from an empty scene."""
     import bpy
@@ -57,7 +62,7 @@ def known_results(installed):
     """
     import bpy
 
-    cache, kept = importlib.import_module(f"{MODULE}.operators.running.cache"), {}
+    cache, kept = part("operators.running.cache"), {}
 
     @bpy.app.handlers.persistent
     def keep(*_):
@@ -80,7 +85,7 @@ def known_results(installed):
 def known_operators(installed):
     """Build the narrow operators, by which tools solve on a cloud, only once for each operator that is kept."""
     known = WeakKeyDictionary()
-    deformation = importlib.import_module(f"{MODULE}.core.applications.deformation")
+    deformation = part("core.applications.deformation")
     narrow_laplacian = deformation.narrow_laplacian
 
     def narrow(laplacian, *settings, progress=None):
@@ -99,7 +104,7 @@ def known_nodes(installed, tmp_path_factory):
     """Take the nodes of the display, once they are made, from a file; return the function that makes them."""
     import bpy
 
-    nodes, path = importlib.import_module(f"{MODULE}.ui.nodes"), tmp_path_factory.mktemp("nodes") / "display.blend"
+    nodes, path = part("ui.nodes"), tmp_path_factory.mktemp("nodes") / "display.blend"
     make = nodes._new_display
 
     def take():
@@ -132,39 +137,32 @@ def extension(installed):
     return importlib.import_module(MODULE)
 
 
-@pytest.fixture
-def module(extension):
-    """Get a module of the extension by its name."""
-    return lambda name: importlib.import_module(f"{extension.__name__}.{name}")
+def _module(name):
+    """Make a fixture of a module of the extension."""
+    return pytest.fixture(lambda installed: part(name))
+
+
+core = _module("core")
+binding = _module("operators.deform.binding")
+live = _module("operators.deform.live")
+modifiers = _module("operators.objects.modifiers")
+reading = _module("operators.objects.reading")
+result = _module("operators.objects.result")
+stages = _module("operators.running.stages")
+colormaps = _module("ui.colormaps")
+display = _module("ui.display")
+legends = _module("ui.legend")
+overlay = _module("ui.overlay")
+ticks = _module("ui.ticks")
+units = _module("ui.units")
+counting = _module("operators.objects.counting")
+command = _module("operators.files.command")
+options = _module("operators.objects.options")
 
 
 @pytest.fixture
-def core(module):
-    """The installed extension's package of mathematics."""
-    return module("core")
-
-
-@pytest.fixture
-def modifiers(module):
-    """The module that sets inputs of the extension's own modifiers."""
-    return module("operators.objects.modifiers")
-
-
-@pytest.fixture
-def display(module):
-    """The module of colors on points."""
-    return module("ui.display")
-
-
-@pytest.fixture
-def overlay(module):
-    """The module that draws over the view."""
-    return module("ui.overlay")
-
-
-@pytest.fixture
-def cache(module):
+def cache(installed):
     """The module that keeps what was computed, emptied."""
-    cache = module("operators.running.cache")
+    cache = part("operators.running.cache")
     cache.clear()
     return cache

@@ -1,6 +1,5 @@
 """What fails while results are written leaves everything as it was, wherever it fails."""
 
-import importlib
 import inspect
 import os
 import sys
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_group, add_object, differences, everything, grid_points, sphere_points
-from tests.blender.conftest import MODULE, new_file
+from tests.blender.conftest import new_file, part
 from tests.blender.operators import applications
 from tests.blender.splats import add_splats, bar_splats
 
@@ -55,9 +54,9 @@ class Calls:
 
 
 @pytest.fixture(autouse=True)
-def made_nodes(module, known_nodes, monkeypatch):
+def made_nodes(known_nodes, monkeypatch):
     """Make the nodes of the display where it is shown, for that may fail, too."""
-    monkeypatch.setattr(module("ui.nodes"), "_new_display", known_nodes)
+    monkeypatch.setattr(part("ui.nodes"), "_new_display", known_nodes)
 
 
 def scene():
@@ -247,7 +246,7 @@ def test_parts_stay_one_object_if_separating_fails(extension):
     assert len(bpy.data.objects) == 3
 
 
-def test_what_was_active_and_selected_stays_so_if_a_tool_fails_after_it_chose_what_it_made(module, monkeypatch):
+def test_what_was_active_and_selected_stays_so_if_a_tool_fails_after_it_chose_what_it_made(monkeypatch):
     obj = compared()
     before = scene()
 
@@ -256,20 +255,20 @@ def test_what_was_active_and_selected_stays_so_if_a_tool_fails_after_it_chose_wh
         assert not obj.select_get()
         raise MemoryError("injected")
 
-    monkeypatch.setattr(module("operators.tools.mesh"), "hide", fail)
+    monkeypatch.setattr(part("operators.tools.mesh"), "hide", fail)
     with pytest.raises(RuntimeError, match="The memory is used up"):
         bpy.ops.meshfree.mesh_surface()
     assert bpy.context.object == obj
     assert not differences(scene(), before)
 
 
-def test_place_and_lock_are_put_back(module):
+def test_place_and_lock_are_put_back():
     obj = handled()
     bpy.context.view_layer.update()
     before = scene()
 
     def move_and_fail():
-        with module("operators.objects.all_or_nothing").all_or_nothing([obj]):
+        with part("operators.objects.all_or_nothing").all_or_nothing([obj]):
             obj.location = 1.0, 2.0, 3.0
             bpy.context.scene.render.use_lock_interface = True
             raise MemoryError("injected")
@@ -318,7 +317,7 @@ def test_nothing_is_left_of_a_sequence_whose_import_fails(extension, tmp_path):
 
 
 def two_of_splats():
-    splats = bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1)
+    splats = bar_splats(part("core"), degree=1)
     for name in ("First", "Second"):
         add_splats(splats, name).rotation_euler.x = 0.4
     for obj in bpy.data.objects:

@@ -229,11 +229,7 @@ class TestStale:
         return obj
 
     @pytest.fixture
-    def is_stale(self, extension, obj):
-        from importlib import import_module
-
-        result = import_module(f"{extension.__name__}.operators.objects.result")
-
+    def is_stale(self, result, obj):
         def after_update():
             bpy.context.view_layer.update()
             return result.is_stale(obj)

@@ -1,7 +1,6 @@
 """Deformation: bound once, the points follow their handles by themselves, in this file and when it is opened again."""
 
 import functools
-import importlib
 import os
 import re
 import subprocess
@@ -16,17 +15,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.blender.clouds import add_group, add_object, attribute, everything, grid_points, local_points
-from tests.blender.conftest import MODULE
+from tests.blender.conftest import part
+from tests.blender.operators import refused
 from tests.blender.test_panel import draw
 from tests.blender.test_smooth import key_points, shown_points
 
 HEIGHTS = (0.0, 0.5, 1.5, -1.0)  # of the animated handle at frames 1 to 4
-
-
-@pytest.fixture
-def live(extension):
-    """The module that lets bound objects follow."""
-    return importlib.import_module(f"{extension.__name__}.operators.deform.live")
 
 
 def threads(live):
@@ -37,11 +31,6 @@ def threads(live):
 def is_settled(obj):
     """Whether what a bound object shows is exact."""
     return bool(obj.data["lb_pose"][0])
-
-
-@pytest.fixture
-def binding(extension):
-    return importlib.import_module(f"{extension.__name__}.operators.deform.binding")
 
 
 @pytest.fixture
@@ -89,7 +78,7 @@ def move_points(obj, chosen, shift):
 
 def curves_of(obj):
     """Return the F-curves of an object."""
-    return importlib.import_module(f"{MODULE}.operators.objects.animation").curves(obj)
+    return part("operators.objects.animation").curves(obj)
 
 
 def displacement(obj):
@@ -244,8 +233,7 @@ class TestFollowing:
         bpy.context.view_layer.update()
         assert_allclose(displacement(strip), moved, atol=1e-5)
 
-    def test_the_display_comes_after_it_and_shows_lengths(self, extension, strip):
-        display = importlib.import_module(f"{extension.__name__}.ui.display")
+    def test_the_display_comes_after_it_and_shows_lengths(self, display, strip):
         lift(bind(), 1.0)
         bpy.ops.meshfree.colormap(attribute="lb_displacement")
         assert [item.name for item in strip.modifiers] == ["Mesh-Free Deform", "Mesh-Free Display"]
@@ -544,11 +532,11 @@ class TestBake:
         assert_allclose(shown_points(strip), shown, atol=1e-5)
 
     @pytest.fixture
-    def stepped(self, extension, strip):
+    def stepped(self, strip):
         """A bake in steps, as a window takes them, at frame 3."""
         animate(bind())
         bpy.context.scene.frame_set(3)
-        bake = importlib.import_module(f"{extension.__name__}.operators.deform.bake")
+        bake = part("operators.deform.bake")
         operator = SimpleNamespace(first=1, last=4, bl_label="Bake", _kept=bake._Kept(bpy.context.scene, strip))
         operator._frames = lambda progress: bake.MESHFREE_OT_deform_bake._frames(operator, progress)
         return operator, bake
@@ -617,10 +605,8 @@ class TestBake:
 
     def test_frames_in_the_wrong_order(self, strip):
         bind()
-        before = everything(strip)
-        with pytest.raises(RuntimeError, match="The last frame, 2, comes before the first one, 5"):
+        with refused(strip, "The last frame, 2, comes before the first one, 5"):
             bpy.ops.meshfree.deform_bake(first=5, last=2)
-        assert everything(strip) == before
 
 
 class TestTakingOver:
@@ -718,10 +704,8 @@ class TestTakingOver:
 
     def test_a_shape_key_of_handles_moved_themselves(self, strip):
         bind(add_empties=False)
-        before = everything(strip)
-        with pytest.raises(RuntimeError, match="Add Empties"):
+        with refused(strip, "Add Empties"):
             bpy.ops.meshfree.deform_to_shape_key()
-        assert everything(strip) == before
 
     @pytest.mark.parametrize("add_empties", [True, False])
     def test_reset(self, strip, add_empties):
@@ -1016,39 +1000,29 @@ class TestBadInput:
     )
     def test_without_handles(self, strip, group, text):
         strip.meshfree.deform.handles = group
-        before = everything(strip)
-        with pytest.raises(RuntimeError, match=text):
+        with refused(strip, text):
             bpy.ops.meshfree.deform_bind()
-        assert everything(strip) == before
 
     def test_points_in_both_groups(self, strip):
         strip.meshfree.deform.anchors = "Handle"
-        before = everything(strip)
-        with pytest.raises(RuntimeError, match="handles and anchors|both"):
+        with refused(strip, "handles and anchors|both"):
             bpy.ops.meshfree.deform_bind()
-        assert everything(strip) == before
 
     def test_points_in_two_handles(self, strip):
         add_group(strip, "Handle.001", [719, 718])
-        before = everything(strip)
-        with pytest.raises(RuntimeError, match="2 points.*more than one of the groups Handle, Handle.001"):
+        with refused(strip, "2 points.*more than one of the groups Handle, Handle.001"):
             bpy.ops.meshfree.deform_bind()
-        assert everything(strip) == before
 
     def test_handles_without_empties_on_shape_keys(self, strip):
         strip.shape_key_add(name="Basis")
         strip.meshfree.deform.add_empties = False
-        before = everything(strip)
-        with pytest.raises(RuntimeError, match="36 handles.*Turn on Add Empties"):
+        with refused(strip, "36 handles.*Turn on Add Empties"):
             bpy.ops.meshfree.deform_bind()
-        assert everything(strip) == before
 
     @pytest.mark.parametrize("name", ["update", "apply", "reset", "to_shape_key", "unbind", "bake", "free"])
     def test_what_is_not_bound(self, strip, name):
-        before = everything(strip)
-        with pytest.raises(RuntimeError, match="not bound.*Bind it"):
+        with refused(strip, "not bound.*Bind it"):
             getattr(bpy.ops.meshfree, f"deform_{name}")()
-        assert everything(strip) == before
 
 
 class TestAddHandle:
@@ -1269,31 +1243,23 @@ class TestAtOnce:
         assert sum(obj.type == "EMPTY" for obj in bpy.data.objects) == 1
 
     def test_without_it_handles_are_chosen_by_nobody(self, pole):
-        before = everything(pole)
-        with pytest.raises(RuntimeError, match="no vertex group named"):
+        with refused(pole, "no vertex group named"):
             bpy.ops.meshfree.deform_bind()
-        assert everything(pole) == before
 
     def test_anchors_all_over_leave_no_handle(self, pole):
         add_group(pole, "Anchor", np.ones(720, dtype=bool))
-        before = everything(pole)
-        with pytest.raises(RuntimeError, match="Error"):
+        with refused(pole, "Error"):
             bpy.ops.meshfree.deform_bind(at_once=True)
-        assert everything(pole) == before
 
     def test_clouds_of_a_few_points(self):
         obj = add_object(np.eye(4)[:, :3])
-        before = everything(obj)
-        with pytest.raises(RuntimeError, match="Error"):
+        with refused(obj, "Error"):
             bpy.ops.meshfree.deform_bind(at_once=True)
-        assert everything(obj) == before
 
     def test_names_that_attributes_have(self, pole):
         pole.data.attributes.new("Anchor", "FLOAT", "POINT")
-        before = everything(pole)
-        with pytest.raises(RuntimeError, match='has an attribute named "Anchor"'):
+        with refused(pole, 'has an attribute named "Anchor"'):
             bpy.ops.meshfree.deform_bind(at_once=True)
-        assert everything(pole) == before
         assert bpy.context.object == pole
 
     def test_one_undo_takes_it_back(self, pole):

@@ -4,7 +4,6 @@ MESHFREE_FAULTS in the environment says how many of each kind are tried, from th
 names its own.
 """
 
-import importlib
 import os
 import threading
 from dataclasses import replace
@@ -16,7 +15,7 @@ import pytest
 from numpy.linalg import LinAlgError
 
 from tests.blender.clouds import add_group, add_object, differences, everything, sphere_points
-from tests.blender.conftest import MODULE
+from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats
 from tests.blender.test_all_or_nothing import bound, by_default, colored, film, handled, keyed, scene, shared, unhandled
 
@@ -46,7 +45,7 @@ def with_keyframes(obj):
 
 def splats(size=1.0):
     """A bar of splats with groups of handles and anchors."""
-    bar = bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1)
+    bar = bar_splats(part("core"), degree=1)
     obj = add_splats(replace(bar, positions=np.float32(size) * bar.positions))
     height = own_positions(obj)[:, 2]
     for name, chosen in (("Handle", height > 9.0), ("Anchor", height < 1.0)):
@@ -104,9 +103,9 @@ def runs():
 
 
 @pytest.fixture
-def forget(module):
+def forget():
     """Function that forgets all that was computed."""
-    cache, live = module("operators.running.cache"), module("operators.deform.live")
+    cache, live = part("operators.running.cache"), part("operators.deform.live")
     return lambda: (cache.clear(), live._followers.clear())
 
 
@@ -138,9 +137,8 @@ def fresh(forget, cache, known):
 
 
 @pytest.fixture
-def reports(extension, monkeypatch):
+def reports(stages, monkeypatch):
     """Let the report of progress of a number, counted from 0, raise an error; return how many there were."""
-    stages = importlib.import_module(f"{extension.__name__}.operators.running.stages")
     told = stages.Stages.__call__
 
     def arm(number=-1, error=None):
@@ -237,9 +235,9 @@ class Pause:
 
 
 @pytest.fixture
-def attended(extension, monkeypatch):
+def attended(monkeypatch):
     """Function that starts an operator as a window does, outside of its loop of events, and gives what tells of it."""
-    jobs = importlib.import_module(f"{extension.__name__}.operators.running.job")
+    jobs = part("operators.running.job")
     started = []
 
     def start(name, settings, number):

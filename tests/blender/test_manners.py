@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.conftest import part
 
 OWNERS = ("Object", "Scene", "Mesh", "PointCloud", "WindowManager", "WorkSpace", "Screen", "Material", "Collection")
 IN_MENUS = (
@@ -83,7 +84,7 @@ def callbacks(monkeypatch):
     return kept
 
 
-def test_enable_disable_enable(extension, callbacks, module):
+def test_enable_disable_enable(extension, callbacks):
     name = extension.__name__
     before = registered()
     assert "MESHFREE_OT_analyze" in before["types"]
@@ -102,9 +103,9 @@ def test_enable_disable_enable(extension, callbacks, module):
         obj = add_object(sphere_points())
         bpy.ops.meshfree.analyze(modes=2)
         bpy.ops.meshfree.smooth()
-        options = module("operators.objects.options").laplacian_options(obj.meshfree)
-        points = module("operators.objects.reading").read_points(bpy.context, obj).points
-        kept = weakref.ref(module("operators.running.cache").build(points, options, None, lambda *_: None).laplacian)
+        options = part("operators.objects.options").laplacian_options(obj.meshfree)
+        points = part("operators.objects.reading").read_points(bpy.context, obj).points
+        kept = weakref.ref(part("operators.running.cache").build(points, options, None, lambda *_: None).laplacian)
         assert kept() is not None
         bpy.ops.meshfree.deform_bind(at_once=True)
         bpy.ops.preferences.addon_disable(module=name)

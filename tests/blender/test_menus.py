@@ -1,11 +1,11 @@
 """The menus, which make the search (F3) find all operators."""
 
-import importlib
 from types import SimpleNamespace
 
 import bpy
 
 from tests.blender.clouds import add_object, sphere_points
+from tests.blender.conftest import part
 
 # They have the name of a group, a menu of their own, or the place of a click.
 NOT_IN_MENUS = {"select_group", "apply_preset", "add_preset", "select_point"}
@@ -31,8 +31,8 @@ class Menu:
         pass
 
 
-def module_of(extension):
-    return importlib.import_module(f"{extension.__name__}.ui.menus")
+def module_of():
+    return part("ui.menus")
 
 
 def test_menus_hold_every_operator(extension):

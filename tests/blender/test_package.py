@@ -1,7 +1,6 @@
 """The zip: its content, its manifest, the bundled wheels, and that nothing stays behind when it is switched off."""
 
 import html
-import importlib
 import json
 import posixpath
 import re
@@ -17,6 +16,7 @@ import pytest
 
 import manual_pages
 import package
+from tests.blender.conftest import part
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_the_manual_holds_all_words_of_its_pages(packed):
 
 
 def test_the_preferences_open_the_manual(extension):
-    opened = importlib.import_module(f"{extension.__name__}.ui.preferences").MANUAL
+    opened = part("ui.preferences").MANUAL
     assert opened.is_file()
     assert opened.name == manual_pages.START
     texts = []

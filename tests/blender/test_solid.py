@@ -1,12 +1,11 @@
 """Colors of results in viewports in Solid, which know no materials: what the display gives to the color attribute."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender.clouds import CORNERS, add_object, attribute, sphere_points
+from tests.blender.conftest import part
 
 SOLID = ".lb_color"
 
@@ -42,8 +41,8 @@ def show(obj, **settings):
     bpy.ops.meshfree.colormap(attribute="height")
 
 
-def ramp(extension, values, name="VIRIDIS"):
-    colors = np.array(importlib.import_module(f"{extension.__name__}.ui.colormaps").colors(name))
+def ramp(values, name="VIRIDIS"):
+    colors = np.array(part("ui.colormaps").colors(name))
     place = np.clip(0.5 * values + 0.5, 0.0, 1.0) * (len(colors) - 1)
     return np.stack([np.interp(place, range(len(colors)), column) for column in colors.T], axis=1)
 
@@ -88,9 +87,9 @@ def test_colors_that_change_in_edit_mode_are_there_after_it(shown, extension):
 
 
 @pytest.mark.parametrize("settings", [{"iso_lines": 5}, {"outside": "HIDE"}], ids=str)
-def test_what_solid_cannot_show_is_left_to_materials(shown, settings, extension):
+def test_what_solid_cannot_show_is_left_to_materials(shown, settings):
     show(shown, **settings)
-    assert not importlib.import_module(f"{extension.__name__}.ui.display").is_in_solid(shown)
+    assert not part("ui.display").is_in_solid(shown)
 
 
 @pytest.mark.parametrize("editor", ["VIEW_3D", "PROPERTIES"])
