@@ -996,27 +996,24 @@ class TestBadInput:
     """What cannot be bound stays as it is."""
 
     @pytest.mark.parametrize(
-        ("group", "text"), [("Nowhere", 'no vertex group named "Nowhere"'), ("", "no Handles chosen.*Edit Mode")]
+        ("settings", "text"),
+        [
+            ({"handles": "Nowhere"}, 'no vertex group named "Nowhere"'),
+            ({"handles": ""}, "no Handles chosen.*Edit Mode"),
+            ({"anchors": "Handle"}, "handles and anchors|both"),
+            ({"handles": "Handle", "add_empties": False}, "36 handles.*Turn on Add Empties"),
+        ],
     )
-    def test_without_handles(self, strip, group, text):
-        strip.meshfree.deform.handles = group
+    def test_settings_that_do_not_fit(self, strip, settings, text):
+        strip.shape_key_add(name="Basis")  # which empties alone can bend
+        for name, value in settings.items():
+            setattr(strip.meshfree.deform, name, value)
         with refused(strip, text):
-            bpy.ops.meshfree.deform_bind()
-
-    def test_points_in_both_groups(self, strip):
-        strip.meshfree.deform.anchors = "Handle"
-        with refused(strip, "handles and anchors|both"):
             bpy.ops.meshfree.deform_bind()
 
     def test_points_in_two_handles(self, strip):
         add_group(strip, "Handle.001", [719, 718])
         with refused(strip, "2 points.*more than one of the groups Handle, Handle.001"):
-            bpy.ops.meshfree.deform_bind()
-
-    def test_handles_without_empties_on_shape_keys(self, strip):
-        strip.shape_key_add(name="Basis")
-        strip.meshfree.deform.add_empties = False
-        with refused(strip, "36 handles.*Turn on Add Empties"):
             bpy.ops.meshfree.deform_bind()
 
     @pytest.mark.parametrize("name", ["update", "apply", "reset", "to_shape_key", "unbind", "bake", "free"])
@@ -1179,6 +1176,12 @@ class TestPanel:
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
+def keep_four(obj):
+    """Leave four points of an object."""
+    obj.data.clear_geometry()
+    obj.data.from_pydata(np.eye(4)[:, :3].tolist(), [], [])
+
+
 class TestAtOnce:
     """One click chooses the handles, where there are none, and binds them."""
 
@@ -1242,24 +1245,20 @@ class TestAtOnce:
         assert {name: self.members(pole, name).tolist() for name in before} == before
         assert sum(obj.type == "EMPTY" for obj in bpy.data.objects) == 1
 
-    def test_without_it_handles_are_chosen_by_nobody(self, pole):
-        with refused(pole, "no vertex group named"):
-            bpy.ops.meshfree.deform_bind()
-
-    def test_anchors_all_over_leave_no_handle(self, pole):
-        add_group(pole, "Anchor", np.ones(720, dtype=bool))
-        with refused(pole, "Error"):
-            bpy.ops.meshfree.deform_bind(at_once=True)
-
-    def test_clouds_of_a_few_points(self):
-        obj = add_object(np.eye(4)[:, :3])
-        with refused(obj, "Error"):
-            bpy.ops.meshfree.deform_bind(at_once=True)
-
-    def test_names_that_attributes_have(self, pole):
-        pole.data.attributes.new("Anchor", "FLOAT", "POINT")
-        with refused(pole, 'has an attribute named "Anchor"'):
-            bpy.ops.meshfree.deform_bind(at_once=True)
+    @pytest.mark.parametrize(
+        ("change", "at_once", "text"),
+        [
+            (lambda obj: None, False, "no vertex group named"),
+            (lambda obj: add_group(obj, "Anchor", np.ones(720, dtype=bool)), True, "Error"),
+            (keep_four, True, "Error"),
+            (lambda obj: obj.data.attributes.new("Anchor", "FLOAT", "POINT"), True, 'an attribute named "Anchor"'),
+        ],
+        ids=["not at once", "anchors all over", "a few points", "a name that an attribute has"],
+    )
+    def test_what_cannot_be_bound(self, pole, change, at_once, text):
+        change(pole)
+        with refused(pole, text):
+            bpy.ops.meshfree.deform_bind(at_once=at_once)
         assert bpy.context.object == pole
 
     def test_one_undo_takes_it_back(self, pole):

@@ -238,16 +238,13 @@ def test_a_frame_that_shares_its_mesh_gets_its_own_by_choice(folder):
     assert "lb_area" not in twin.data.attributes
 
 
-def test_a_mode_that_is_not_computed_cannot_be_shown(folder):
-    run_import(folder)
-    with pytest.raises(RuntimeError, match="Mode 3 is to be shown of 2"):
-        bpy.ops.meshfree.analyze_sequence(modes=2, shown_mode=3)
-
-
-def test_without_a_sequence_the_button_says_so():
+def test_what_is_no_sequence_or_no_mode_of_it(folder):
     add_object(sphere_points(300))
     with pytest.raises(RuntimeError, match="No sequence is active"):
         bpy.ops.meshfree.analyze_sequence()
+    run_import(folder)
+    with pytest.raises(RuntimeError, match="Mode 3 is to be shown of 2"):
+        bpy.ops.meshfree.analyze_sequence(modes=2, shown_mode=3)
 
 
 def test_undo_takes_import_and_analysis_back(folder):

@@ -182,12 +182,6 @@ def test_nothing_selected(obj):
     assert len(obj.vertex_groups) == 0
 
 
-def test_an_attribute_of_that_name(obj):
-    obj.data.attributes.new("Handle", "FLOAT", "POINT")
-    with pytest.raises(RuntimeError, match='attribute named "Handle".*share'):
-        bpy.ops.meshfree.group_from_selection(role="HANDLE")
-
-
 class TestSelectPoint:
     """What a click does: the point in front, though others behind it are nearer to the mouse."""
 
@@ -292,6 +286,7 @@ def test_several_objects_in_edit_mode(obj, fails):
     ("settings", "text"),
     [
         ({"role": "HANDLE"}, '"Handle" of "Cloud" is locked. Unlock it'),
+        ({"role": "ANCHOR"}, 'attribute named "Anchor".*share'),
         ({"role": "FIXED", "action": "REMOVE"}, 'no vertex group named "Fixed" to remove points from'),
         ({"role": "FIXED", "front_only": True, "direction": (0.0, 0.0, 1.0)}, "face away.*Turn off Front Only"),
     ],
@@ -299,6 +294,7 @@ def test_several_objects_in_edit_mode(obj, fails):
 def test_groups_that_cannot_be_changed(obj, settings, text):
     bpy.ops.meshfree.group_from_selection(role="HANDLE")
     obj.vertex_groups["Handle"].lock_weight = True
+    obj.data.attributes.new("Anchor", "FLOAT", "POINT")
     with refused(obj, text):
         bpy.ops.meshfree.group_from_selection(**settings)
 
