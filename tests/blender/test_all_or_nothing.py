@@ -329,13 +329,7 @@ def test_splats_stay_if_joining_fails(extension):
     assert fail_everywhere(extension, two_of_splats, "join_splats", every=1) > 10
 
 
-def shown():
-    obj = handled()
-    bpy.ops.meshfree.colormap()
-    return obj
-
-
-@pytest.mark.parametrize("make", [handled, shown])
+@pytest.mark.parametrize("make", [handled, colored])
 def test_colors_stay_if_showing_others_fails(extension, make):
     assert fail_everywhere(extension, make, "colormap", every=4, attribute="lb_area", color_map="MAGMA") > 2
 

@@ -108,6 +108,7 @@ def test_a_second_run_finds_no_discs_anew(cache, calls, name):
     assert np.abs(attribute(bpy.context.object, "lb_disc") - before).max() > 1e-3
 
 
+@pytest.mark.any_blender
 def test_what_changes_results_is_computed(cache, calls):
     add_ready(wave())
     bpy.ops.meshfree.geodesic_distance()
@@ -134,6 +135,7 @@ def test_lengths_are_made_once_for_all_that_is_measured_along_the_surface(cache,
     assert bpy.ops.meshfree.unwrap() == {"FINISHED"}
 
 
+@pytest.mark.any_blender
 def test_kept_results_are_those_of_a_first_run(cache):
     def places(strength, **settings):
         bpy.ops.object.select_all(action="DESELECT")  # one object at a time
@@ -164,6 +166,7 @@ def test_a_field_between_other_values_is_solved_once(cache, calls, core):
     assert calls == []
 
 
+@pytest.mark.any_blender
 def test_a_film_that_was_stopped_is_not_kept(cache, core):
     minimal = part("operators.tools.minimal")
     points = wave()

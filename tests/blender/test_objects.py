@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_group, add_object, attribute, everything, grid_points, local_points, sphere_points
 from tests.blender.conftest import part
+from tests.blender.test_deform import lift
 from tests.blender.test_display import display_points
 from tests.blender.test_panel import draw
 
@@ -43,11 +44,6 @@ def choose(*objects):
 
 def empty_of(obj):
     return obj.meshfree.deform.handle_items[0].empty
-
-
-def lift(empty, height):
-    empty.location.z += height
-    bpy.context.view_layer.update()
 
 
 def displacement(obj):
@@ -405,13 +401,13 @@ class TestOrdinaryEdits:
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.separate(type="SELECTED")
         bpy.ops.object.mode_set(mode="OBJECT")
-        part = bpy.data.objects["Cloud.001"]
+        separated = bpy.data.objects["Cloud.001"]
         assert part("operators.objects.result").is_stale(cloud)
-        assert part("operators.objects.result").is_stale(part)
-        for obj in (cloud, part):
+        assert part("operators.objects.result").is_stale(separated)
+        for obj in (cloud, separated):
             choose(obj)
             assert bpy.ops.meshfree.analyze() == {"FINISHED"}
-        assert cloud.meshfree.total_area + part.meshfree.total_area < 25.0
+        assert cloud.meshfree.total_area + separated.meshfree.total_area < 25.0
 
     def test_a_copied_display_modifier_shows_its_own_object(self, display, cloud):
         bpy.ops.meshfree.analyze()

@@ -5,17 +5,13 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import attribute, everything, local_points, result_names
-from tests.blender.test_application import SETTINGS, add_ready, wave
+from tests.blender.test_application import SETTINGS, add_ready, run, wave
 from tests.blender.test_display import display_points
 from tests.blender.test_smooth import rough_sphere
 
 pytestmark = pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
 
 MOVING = ("smooth", "mode_shape", "minimal_surface")
-
-
-def run(name, *arguments, **settings):
-    return getattr(bpy.ops.meshfree, name)(*arguments, **settings)
 
 
 def add_pointcloud(points, name="Points"):

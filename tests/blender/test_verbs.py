@@ -109,6 +109,7 @@ class TestMesh:
         assert outwards(middles, rows["normal"]).all()
 
 
+@pytest.mark.any_blender
 class TestCompare:
     def test_clouds_in_a_national_grid_that_are_shifted_by_different_amounts(self, run, read, tmp_path):  # noqa: F811
         origin = part("core.files").choose_origin
@@ -163,7 +164,6 @@ class TestCompare:
         assert code == 1
         assert "with --reference-object: Plan, Scan" in line["error"]
 
-    @pytest.mark.any_blender
     def test_what_is_far_away_is_not_compared(self, run, tmp_path):  # noqa: F811
         write(tmp_path / "plan.csv", POINTS)
         both = np.vstack([sphere_points(1100), sphere_points(1000, seed=1) + (9.0, 0.0, 0.0)])
@@ -202,6 +202,7 @@ class TestCompare:
         assert plan.read_bytes() == before
 
 
+@pytest.mark.any_blender
 class TestOrient:
     @pytest.mark.parametrize("flip", [False, True])
     @pytest.mark.parametrize("height", [5.0, -5.0])
@@ -275,6 +276,7 @@ class TestOrient:
         assert 'no object "Nobody"' in line["error"]
 
 
+@pytest.mark.any_blender
 class TestSources:
     def test_distance_from_places_in_a_national_grid(self, run, read, tmp_path):  # noqa: F811
         points = np.vstack([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], sphere_points(3000)])
