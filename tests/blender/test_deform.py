@@ -400,26 +400,25 @@ class TestFrames:
         bind()
         assert bpy.context.scene.render.use_lock_interface
 
-    def another_process(self, tmp_path, enabled, installed, code):
-        """Open the file in another Blender, with the extension or without it, and run some lines there."""
+    def another_process(self, tmp_path, enabled, installed, *codes):
+        """Open the file in another Blender, with the extension or without it; return the points of each code."""
         script = textwrap.dedent(f"""
-            import sys
             import bpy, numpy as np
+            name = "bl_ext.user_default.meshfree_laplacian"
             if {enabled}:
-                bpy.ops.preferences.addon_enable(module="bl_ext.user_default.meshfree_laplacian")
-            bpy.ops.wm.open_mainfile(filepath={str(tmp_path / "strip.blend")!r})
-            obj = bpy.data.objects["Cloud"]
+                bpy.ops.preferences.addon_enable(module=name)
             def shown():
                 mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
                 points = np.empty((len(mesh.vertices), 3), np.float32)
                 mesh.vertices.foreach_get("co", points.reshape(-1))
                 return points
-            points = []
+            found = []
         """)
-        script += textwrap.dedent(code)
-        script += f"\nnp.save({str(tmp_path / 'shown.npy')!r}, points)\n"
-        script += "import addon_utils\n"
-        script += f"if {enabled}: bpy.ops.preferences.addon_disable(module='bl_ext.user_default.meshfree_laplacian')\n"
+        for code in codes:
+            script += f"bpy.ops.wm.open_mainfile(filepath={str(tmp_path / 'strip.blend')!r})\n"
+            script += f"obj, points = bpy.data.objects['Cloud'], []\n{textwrap.dedent(code)}\nfound.append(points)\n"
+        script += f"np.save({str(tmp_path / 'shown.npy')!r}, found)\n"
+        script += f"if {enabled}: bpy.ops.preferences.addon_disable(module=name)\n"
         folder = installed if enabled else tmp_path / "nobody"
         environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder)}
         command = [sys.executable, "-c", script]
@@ -469,18 +468,16 @@ class TestFrames:
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "strip.blend"))
         return np.array(frames)
 
-    @pytest.mark.parametrize("code", [FRAMES, RENDERED], ids=["frames", "render"])
-    def test_an_opened_file_binds_by_itself(self, saved, tmp_path, installed, code):
-        assert_allclose(self.another_process(tmp_path, True, installed, code), saved, atol=2e-5)
+    def test_an_opened_file_binds_by_itself(self, saved, tmp_path, installed):
+        for found in self.another_process(tmp_path, True, installed, self.RENDERED, self.FRAMES):
+            assert_allclose(found, saved, atol=2e-5)
 
-    def test_a_file_without_the_extension_shows_the_last_state(self, saved, tmp_path, installed):
-        shown = self.another_process(tmp_path, False, installed, "points = [shown()]")
+    def test_without_the_extension_a_file_shows_the_last_state_and_a_bake_plays(self, saved, tmp_path, installed):
+        (shown,) = self.another_process(tmp_path, False, installed, "points = [shown()]")
         assert_allclose(shown[0], saved[-1], atol=1e-5)
-
-    def test_a_bake_plays_without_the_extension(self, saved, tmp_path, installed):
         assert bpy.ops.meshfree.deform_bake() == {"FINISHED"}
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "strip.blend"))
-        shown = self.another_process(tmp_path, False, installed, self.FRAMES)
+        (shown,) = self.another_process(tmp_path, False, installed, self.FRAMES)
         assert_allclose(shown, saved, atol=1e-5)
 
 
