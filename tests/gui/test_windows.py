@@ -87,7 +87,7 @@ def opened(gui):
     """An animated file right after it was opened, whose factors take some seconds."""
     gui.python(PART + "path = bpy.app.tempdir + 'opened.blend'")
     if not gui.python("os.path.exists(path)"):  # else a test before has made it
-        add_sphere(gui, 20000, 0.005)
+        add_sphere(gui, 12000, 0.005)
         gui.python(BOUND + ANIMATED)
         gui.python("bpy.ops.wm.save_as_mainfile(filepath=path)")
         gui.new_file()
