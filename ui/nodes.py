@@ -55,6 +55,11 @@ def display_group():
     for group in bpy.data.node_groups:
         if DISPLAY_TAG in group and group.library is None and is_intact(group) and has_input(group, SOLID_NAME):
             return group
+    return _new_display()
+
+
+def _new_display():
+    """Make that group."""
     group = new_group("Mesh-Free Display", DISPLAY_TAG, _INPUTS)
     tree = TreeBuilder(group)
     given = tree.node("NodeGroupInput").outputs

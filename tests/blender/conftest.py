@@ -6,6 +6,7 @@ import os
 import shutil
 import tempfile
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import pytest
 
@@ -41,17 +42,84 @@ def archive():
     return path
 
 
-def new_file():
-    """Start from an empty scene; what was computed is still known, for many tests use the same clouds.
+def part(name):
+    """Return a module of the installed extension."""
+    return importlib.import_module(f"{MODULE}.{name}")
 
-    Tests of the computation itself empty the cache.
+
+def new_file():
+    """Start from an empty scene."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_empty=True)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def known_results(installed):
+    """Keep what was computed when another file is opened, for many tests use the same clouds.
+
+    Tests of the computation itself empty the cache, by its fixture; test_cache.py tries that another file does so.
     """
     import bpy
 
-    cache = importlib.import_module(f"{MODULE}.operators.running.cache")
-    kept = dict(cache._kept)
-    bpy.ops.wm.read_homefile(use_empty=True)  # which gives the memory back
-    cache._kept.update(kept)
+    cache, kept = part("operators.running.cache"), {}
+
+    @bpy.app.handlers.persistent
+    def keep(*_):
+        kept.update(cache._kept)
+
+    @bpy.app.handlers.persistent
+    def take(*_):
+        cache._kept.update(kept)
+        kept.clear()
+
+    handlers = bpy.app.handlers
+    handlers.load_pre.insert(0, keep)
+    handlers.load_post.insert(0, take)
+    yield keep
+    handlers.load_pre.remove(keep)
+    handlers.load_post.remove(take)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def known_operators(installed):
+    """Build the narrow operators, by which tools solve on a cloud, only once for each operator that is kept."""
+    known = WeakKeyDictionary()
+    deformation = part("core.applications.deformation")
+    narrow_laplacian = deformation.narrow_laplacian
+
+    def narrow(laplacian, *settings, progress=None):
+        results = known.setdefault(laplacian, {})
+        if settings not in results:
+            results[settings] = narrow_laplacian(laplacian, *settings, progress=progress)
+        return results[settings]
+
+    deformation.narrow_laplacian = narrow
+    yield
+    deformation.narrow_laplacian = narrow_laplacian
+
+
+@pytest.fixture(scope="session", autouse=True)
+def known_nodes(installed, tmp_path_factory):
+    """Take the nodes of the display, once they are made, from a file; return the function that makes them."""
+    import bpy
+
+    nodes, path = part("ui.nodes"), tmp_path_factory.mktemp("nodes") / "display.blend"
+    make = nodes._new_display
+
+    def take():
+        if not path.exists():
+            group = make()
+            bpy.data.libraries.write(str(path), {group})
+            return group
+        with bpy.data.libraries.load(str(path)) as (found, wanted):
+            wanted.node_groups = found.node_groups
+        bpy.data.libraries.remove(bpy.data.libraries[path.name])
+        return wanted.node_groups[0]
+
+    nodes._new_display = take
+    yield make
+    nodes._new_display = make
 
 
 @pytest.fixture(autouse=True)
@@ -69,39 +137,32 @@ def extension(installed):
     return importlib.import_module(MODULE)
 
 
-@pytest.fixture
-def module(extension):
-    """Get a module of the extension by its name."""
-    return lambda name: importlib.import_module(f"{extension.__name__}.{name}")
+def _module(name):
+    """Make a fixture of a module of the extension."""
+    return pytest.fixture(lambda installed: part(name))
+
+
+core = _module("core")
+binding = _module("operators.deform.binding")
+live = _module("operators.deform.live")
+modifiers = _module("operators.objects.modifiers")
+reading = _module("operators.objects.reading")
+result = _module("operators.objects.result")
+stages = _module("operators.running.stages")
+colormaps = _module("ui.colormaps")
+display = _module("ui.display")
+legends = _module("ui.legend")
+overlay = _module("ui.overlay")
+ticks = _module("ui.ticks")
+units = _module("ui.units")
+counting = _module("operators.objects.counting")
+command = _module("operators.files.command")
+options = _module("operators.objects.options")
 
 
 @pytest.fixture
-def core(module):
-    """The installed extension's package of mathematics."""
-    return module("core")
-
-
-@pytest.fixture
-def modifiers(module):
-    """The module that sets inputs of the extension's own modifiers."""
-    return module("operators.objects.modifiers")
-
-
-@pytest.fixture
-def display(module):
-    """The module of colors on points."""
-    return module("ui.display")
-
-
-@pytest.fixture
-def overlay(module):
-    """The module that draws over the view."""
-    return module("ui.overlay")
-
-
-@pytest.fixture
-def cache(module):
+def cache(installed):
     """The module that keeps what was computed, emptied."""
-    cache = module("operators.running.cache")
+    cache = part("operators.running.cache")
     cache.clear()
     return cache

@@ -2,8 +2,12 @@
 
 import ast
 import importlib
+from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
+from tests.blender.clouds import everything
 from tests.blender.conftest import MODULE
 
 ROOT = Path(__file__).parents[2]
@@ -33,3 +37,12 @@ def applications():
     """Operators, by name, of the tools that apply the Laplacian: they read all, compute, and only then write."""
     base = importlib.import_module(f"{MODULE}.operators.running.application").ApplicationOperator
     return {name: tool.operator for name, tool in tools().items() if issubclass(tool.operator, base)}
+
+
+@contextmanager
+def refused(obj, text):
+    """Expect that an operator is refused with a text, by a pattern, and that an object holds what it held."""
+    before = everything(obj)
+    with pytest.raises(RuntimeError, match=text):
+        yield
+    assert everything(obj) == before

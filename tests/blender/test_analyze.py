@@ -117,7 +117,7 @@ def test_settings_reach_core(core):
 
 
 def test_settings_of_the_paper_reach_core(core):
-    obj = add_object(sphere_points())
+    obj = add_object(sphere_points(300))
     settings = {"laplacian": "PAPER", "neighbors": 60, "normals": "PCA", "areas": "UNIFORM", "denoise": True}
     for name, value in settings.items():
         setattr(obj.meshfree, name, value)
@@ -229,11 +229,7 @@ class TestStale:
         return obj
 
     @pytest.fixture
-    def is_stale(self, extension, obj):
-        from importlib import import_module
-
-        result = import_module(f"{extension.__name__}.operators.objects.result")
-
+    def is_stale(self, result, obj):
         def after_update():
             bpy.context.view_layer.update()
             return result.is_stale(obj)

@@ -1,12 +1,11 @@
 """What all operators that apply the Laplacian have in common: safe on bad input, one undo step, several objects."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender.clouds import add_group, add_object, attribute, everything, grid_points, local_points
+from tests.blender.operators import refused
 from tests.blender.test_bad_input import CLOUDS
 from tests.blender.test_smooth import rough_sphere, shown_points
 
@@ -61,7 +60,7 @@ def add_ready(points, name="Cloud"):
 
 def wave():
     """Points of a rectangle with a boundary, bent a little, about the origin."""
-    points, _ = grid_points()
+    points, _ = grid_points(28, 21)
     points = points - points.mean(axis=0)
     points[:, 2] = 0.1 * np.sin(2.0 * points[:, 0])
     return points
@@ -71,10 +70,8 @@ def wave():
 @pytest.mark.parametrize(("cloud", "text"), CLOUDS.values(), ids=CLOUDS.keys())
 def test_points_without_an_answer(name, cloud, text):
     obj = add_ready(cloud(rough_sphere(1000)))
-    before = everything(obj)
-    with pytest.raises(RuntimeError, match='(?s)Error: .*"Cloud"'):
+    with refused(obj, '(?s)Error: .*"Cloud"'):
         run(name, **SETTINGS[name])
-    assert everything(obj) == before
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -140,8 +137,7 @@ def test_meshes_that_are_left_out_are_named_and_others_are_not(capfd):
     assert '"Empty"' not in shown
 
 
-def test_results_are_shown_on_every_object(extension):
-    display = importlib.import_module(f"{extension.__name__}.ui.display")
+def test_results_are_shown_on_every_object(display):
     objects = [add_ready(rough_sphere(), name) for name in "AB"]
     bpy.ops.meshfree.geodesic_distance()
     assert [display.shown_attribute(obj) for obj in objects] == ["lb_distance"] * 2
@@ -161,10 +157,8 @@ def test_a_mesh_in_two_scales_holds_one_result_only():
     other = linked_duplicate(obj, "Other")
     assert bpy.ops.meshfree.geodesic_distance(show=False) == {"FINISHED"}
     other.scale = (1.0, 1.0, 2.0)
-    before = everything(obj)
-    with pytest.raises(RuntimeError, match="shares its mesh with.*Make Single User"):
+    with refused(obj, "shares its mesh with.*Make Single User"):
         bpy.ops.meshfree.geodesic_distance()
-    assert everything(obj) == before
     obj.meshfree.make_single_user = True
     assert bpy.ops.meshfree.geodesic_distance() == {"FINISHED"}
     assert obj.data != other.data
@@ -218,7 +212,5 @@ class TestShapeKeys:
     )
     def test_keys_that_would_hide_a_new_one(self, obj, prepare, text):
         prepare(obj)
-        before = everything(obj)
-        with pytest.raises(RuntimeError, match=text):
+        with refused(obj, text):
             bpy.ops.meshfree.smooth()
-        assert everything(obj) == before

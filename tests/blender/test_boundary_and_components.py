@@ -1,18 +1,11 @@
 """Where the surface ends, the vertex group that names its boundary, components, and points that lie alone."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_group, add_object, attribute, grid_points, local_points, sphere_points
-
-
-@pytest.fixture
-def result(extension):
-    return importlib.import_module(f"{extension.__name__}.operators.objects.result")
 
 
 def sheet():
@@ -112,8 +105,7 @@ class TestChangesOfTheGroup:
         assert "lb_eigenvalues" not in obj
         assert (attribute(obj, "lb_boundary") == np.array(in_group(obj, "Part"))).all()
 
-    def test_panel_looks_at_members_only_now_and_then(self, extension, obj, result, monkeypatch):
-        counting = importlib.import_module(f"{extension.__name__}.operators.objects.counting")
+    def test_panel_looks_at_members_only_now_and_then(self, counting, obj, result, monkeypatch):
         monkeypatch.setattr(counting, "_PATIENCE", 1e9)
         assert not result.is_stale(obj)
         obj.vertex_groups["Boundary"].add([500], 1.0, "REPLACE")

@@ -1,6 +1,5 @@
 """Results that are kept: what is only shown in another way is not computed again, and memory has a bound."""
 
-import importlib
 from threading import Thread
 
 import bpy
@@ -9,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.conftest import part
 from tests.blender.test_application import add_ready, run, wave
 from tests.blender.test_smooth import shown_points
 
@@ -63,7 +63,7 @@ COSTLY = {  # where each is called from
 
 
 @pytest.fixture
-def calls(extension, monkeypatch):
+def calls(installed, monkeypatch):
     """Names of the costly functions that were called."""
     called = []
 
@@ -72,7 +72,7 @@ def calls(extension, monkeypatch):
         monkeypatch.setattr(module, name, lambda *args, **rest: called.append(name) or function(*args, **rest))
 
     for path, names in COSTLY.items():
-        module = importlib.import_module(f"{extension.__name__}.{path}")
+        module = part(path)
         for name in names:
             count(module, name)
     return called
@@ -108,6 +108,7 @@ def test_a_second_run_finds_no_discs_anew(cache, calls, name):
     assert np.abs(attribute(bpy.context.object, "lb_disc") - before).max() > 1e-3
 
 
+@pytest.mark.any_blender
 def test_what_changes_results_is_computed(cache, calls):
     add_ready(wave())
     bpy.ops.meshfree.geodesic_distance()
@@ -125,15 +126,16 @@ def test_what_changes_results_is_computed(cache, calls):
     assert "build_laplacian" in calls
 
 
-def test_lengths_are_made_once_for_all_that_is_measured_along_the_surface(cache, extension, monkeypatch):
+def test_lengths_are_made_once_for_all_that_is_measured_along_the_surface(cache, monkeypatch):
     add_ready(wave())
     bpy.ops.meshfree.geodesic_distance()
-    module = importlib.import_module(f"{extension.__name__}.core.applications.geodesics")
+    module = part("core.applications.geodesics")
     monkeypatch.setattr(module, "_lengths_of_pairs", lambda *_: pytest.fail("made again"))
     assert bpy.ops.meshfree.nearest_source() == {"FINISHED"}
     assert bpy.ops.meshfree.unwrap() == {"FINISHED"}
 
 
+@pytest.mark.any_blender
 def test_kept_results_are_those_of_a_first_run(cache):
     def places(strength, **settings):
         bpy.ops.object.select_all(action="DESELECT")  # one object at a time
@@ -164,8 +166,9 @@ def test_a_field_between_other_values_is_solved_once(cache, calls, core):
     assert calls == []
 
 
+@pytest.mark.any_blender
 def test_a_film_that_was_stopped_is_not_kept(cache, core):
-    minimal = importlib.import_module(cache.__name__.replace("running.cache", "tools.minimal"))
+    minimal = part("operators.tools.minimal")
     points = wave()
     boundary = core.build_laplacian(points).boundary
 
@@ -174,11 +177,11 @@ def test_a_film_that_was_stopped_is_not_kept(cache, core):
             raise core.Cancelled
 
     with pytest.raises(core.Cancelled):
-        minimal._shrink(points, boundary, 0.0, 4, options(cache), stop_later)
+        minimal._shrink(points, boundary, 0.0, 4, options(), stop_later)
 
 
 def test_modes_of_another_boundary_are_others(cache):
-    built = cache.build(wave(), options(cache), None, silent)
+    built = cache.build(wave(), options(), None, silent)
     free = cache.lowest_modes(built.laplacian, 6, silent)
     fixed = cache.lowest_modes(built.laplacian, 6, silent, dirichlet=True, raw=True)
     assert free.eigenvalues[0] < 1e-6 < fixed.eigenvalues[0]
@@ -190,8 +193,8 @@ def silent(stage, fraction):
     pass
 
 
-def options(cache):
-    return importlib.import_module(cache.__name__.replace("running.cache", "objects.options")).DEFAULTS
+def options():
+    return part("operators.objects.options").DEFAULTS
 
 
 class TestMemory:
@@ -224,7 +227,7 @@ class TestMemory:
         assert len(cache._kept) == 1
 
     def test_an_operator_is_kept_before_what_it_computed(self, cache, monkeypatch):
-        laplacian = cache.build(sphere_points(500), options(cache), None, lambda stage, fraction: None).laplacian
+        laplacian = cache.build(sphere_points(500), options(), None, lambda stage, fraction: None).laplacian
         before = list(cache._kept)
         monkeypatch.setattr(cache, "LIMIT", sum(size for _, size in cache._kept.values()) + 1000)
         made = []
@@ -234,11 +237,13 @@ class TestMemory:
         assert set(before) < set(cache._kept)
         assert len(cache._kept) == len(before) + 1
 
-    def test_another_file_gives_it_back(self, cache):
+    def test_another_file_gives_it_back(self, cache, known_results):
+        bpy.app.handlers.load_pre.remove(known_results)
         add_object(sphere_points(300))
         bpy.ops.meshfree.analyze()
         assert len(cache._kept) > 0
         bpy.ops.wm.read_homefile(use_empty=True)
+        bpy.app.handlers.load_pre.insert(0, known_results)
         assert len(cache._kept) == 0
 
     def test_threads_share_it(self, cache, monkeypatch):

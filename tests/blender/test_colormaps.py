@@ -1,27 +1,11 @@
 """Colour maps, their ranges, the numbers on axes and their units: what needs no object."""
 
-import importlib
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 CONTINUOUS = ("VIRIDIS", "MAGMA", "COOL_WARM", "CYCLIC")
-
-
-@pytest.fixture
-def colormaps(extension):
-    return importlib.import_module(f"{extension.__name__}.ui.colormaps")
-
-
-@pytest.fixture
-def ticks(extension):
-    return importlib.import_module(f"{extension.__name__}.ui.ticks")
-
-
-@pytest.fixture
-def units(extension):
-    return importlib.import_module(f"{extension.__name__}.ui.units")
 
 
 def lightness(colors):

@@ -1,6 +1,5 @@
 """The command line, by the function that Blender calls with its arguments."""
 
-import importlib
 import json
 
 import bpy
@@ -9,14 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_group, add_object, attribute, grid_points, sphere_points
+from tests.blender.conftest import part
 
 POINTS = sphere_points()
 
 
 @pytest.fixture
-def run(extension, capfd):
+def run(command, capfd):
     """Run the command line; return the exit code and the JSON lines."""
-    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
 
     def run(*arguments):
         code = command.run([str(argument) for argument in arguments])
@@ -122,8 +121,8 @@ def test_ply_output_holds_the_points_and_attributes(run, tmp_path):
 
 @pytest.mark.any_blender
 @pytest.mark.parametrize("suffix", ["ply", "xyz", "csv"])
-def test_points_far_from_the_origin_are_written_where_they_were(extension, run, tmp_path, suffix):
-    read_points = importlib.import_module(f"{extension.__name__}.core.files").read_points
+def test_points_far_from_the_origin_are_written_where_they_were(run, tmp_path, suffix):
+    read_points = part("core.files").read_points
     far = np.array([400_000.0, 5_000_000.0, 100.0])
     np.save(tmp_path / "in.npy", POINTS + far)
     for verb in ("analyze", "segment"):
@@ -207,9 +206,11 @@ def test_settings(core, run, tmp_path):
     options = core.LaplacianOptions(neighbors=60, bandwidth="global")
     spectrum = core.build_laplacian(POINTS, options=options).eigenpairs(3)
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
-    code, lines = run("analyze", tmp_path / "in.xyz", "--modes", 3, "--laplacian", "paper", "--neighbors", 60)
+    few = sphere_points(300)
+    np.save(tmp_path / "few.npy", few)
+    code, lines = run("analyze", tmp_path / "few.npy", "--modes", 3, "--laplacian", "paper", "--neighbors", 60)
     assert code == 0
-    spectrum = core.paper.build_laplacian(POINTS, neighbors=60).eigenpairs(3)
+    spectrum = core.paper.build_laplacian(few, neighbors=60).eigenpairs(3)
     assert lines[0]["eigenvalues"][1:] == pytest.approx(spectrum.eigenvalues[1:].tolist(), rel=1e-3)
 
 
@@ -282,11 +283,11 @@ def test_bad_text(run, tmp_path, text, error):
     assert error in lines[0]["error"]
 
 
-def test_columns_of_text_that_are_given(extension, run, tmp_path):
+def test_columns_of_text_that_are_given(run, tmp_path):
     write_text(" ", extra=1)(tmp_path / "a.xyz")
     code, lines = run("analyze", tmp_path / "a.xyz", "--out", tmp_path / "b.ply", "--columns", "y x z heat")
     assert (code, lines[0]["points"], lines[0]["notices"]) == (0, 1000, [])
-    table = importlib.import_module(f"{extension.__name__}.core.files").read_points(tmp_path / "b.ply")
+    table = part("core.files").read_points(tmp_path / "b.ply")
     assert_allclose(table.points, POINTS[:, [1, 0, 2]], atol=1e-6)
     assert "heat" in table.attributes
     code, lines = run("analyze", tmp_path / "a.xyz", "--columns", "x y z")
@@ -338,8 +339,7 @@ def test_wrong_usage_has_exit_code_2(run, capfd, arguments):
     assert run(*arguments) == (2, [])
 
 
-def test_help(extension, capfd):
-    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
+def test_help(command, capfd):
     assert command.run(["analyze", "--help"]) == 0
     shown = capfd.readouterr().out
     for text in (
@@ -480,11 +480,7 @@ class TestNothingBreaks:
     @pytest.mark.parametrize("suffix", ["ply", "xyz", "csv", "npz", "blend"])
     @pytest.mark.parametrize("verb", ["analyze", "smooth"])
     @pytest.mark.parametrize("fault", [BrokenPipeError("nobody listens"), KeyboardInterrupt()])
-    def test_a_fault_in_the_progress_leaves_the_output(
-        self, extension, run, tmp_path, monkeypatch, suffix, verb, fault
-    ):
-        stages = importlib.import_module(f"{extension.__name__}.operators.running.stages")
-
+    def test_a_fault_leaves_the_output(self, stages, cache, run, tmp_path, monkeypatch, suffix, verb, fault):
         def fail(*_):
             raise fault
 

@@ -6,6 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_object, attribute, everything, grid_points, sphere_points
+from tests.blender.operators import refused
 from tests.blender.test_panel import draw
 
 NAMES = {"lb_deviation", "lb_compared"}
@@ -78,18 +79,14 @@ def test_one_undo_step(spheres):
 def test_surfaces_too_far_apart_leave_all_as_it_was(spheres):
     plan, scan = spheres
     plan.location.x = 10.0
-    before = everything(scan)
-    with pytest.raises(RuntimeError, match='No point of "Scan" has the surface of "Plan" above or below it'):
+    with refused(scan, 'No point of "Scan" has the surface of "Plan" above or below it'):
         bpy.ops.meshfree.compare(greatest=0.5)
-    assert everything(scan) == before
 
 
 def test_other_cloud_without_an_answer_is_named():
     _, scan = add_pair(np.random.default_rng(0).random((5, 3)), sphere_points(800))
-    before = everything(scan)
-    with pytest.raises(RuntimeError, match='"Plan"'):
+    with refused(scan, '"Plan"'):
         bpy.ops.meshfree.compare()
-    assert everything(scan) == before
 
 
 def test_needs_one_other_cloud(spheres):

@@ -1,14 +1,12 @@
 """Whole numbers, times and degrees keep their digits on the way from a file through Blender to a file."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from tests.blender.clouds import add_object, attribute, sphere_points
-from tests.blender.conftest import MODULE
+from tests.blender.conftest import part
 from tests.core import e57_files
 
 COUNT = 400
@@ -25,7 +23,7 @@ HASH = RANDOM.integers(0, 2**63 - 1, COUNT)
 
 
 def files():
-    return importlib.import_module(f"{MODULE}.core.files")
+    return part("core.files")
 
 
 def write_ply(path, columns):

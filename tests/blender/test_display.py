@@ -1,12 +1,11 @@
 """Colours on points: the modifier, the material, the range, and the legend for renders."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender.clouds import FACES, add_object, attribute, grid_points, sphere_points
+from tests.blender.conftest import part
 
 
 @pytest.fixture
@@ -320,8 +319,8 @@ def test_titles(display, name, title):
 @pytest.mark.parametrize(
     ("name", "texts"), [("lb_area", None), ("lb_normal", 7), ("lb_boundary", 3), ("lb_component", 2)]
 )
-def test_legend_lies_inside_the_picture_and_is_made_once(extension, display, obj, kind, name, texts):
-    legend = importlib.import_module(f"{extension.__name__}.ui.legend")
+def test_legend_lies_inside_the_picture_and_is_made_once(display, obj, kind, name, texts):
+    legend = part("ui.legend")
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
@@ -345,9 +344,9 @@ def test_legend_lies_inside_the_picture_and_is_made_once(extension, display, obj
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector
 
-    for part in parts:
-        for corner in part.bound_box:
-            x, y, depth = world_to_camera_view(scene, camera, part.matrix_world @ Vector(corner))
+    for obj in parts:
+        for corner in obj.bound_box:
+            x, y, depth = world_to_camera_view(scene, camera, obj.matrix_world @ Vector(corner))
             assert 0.6 < x < 1.0
             assert 0.1 < y < 0.9
             assert camera.data.clip_start < depth

@@ -4,7 +4,6 @@ MESHFREE_FAULTS in the environment says how many of each kind are tried, from th
 names its own.
 """
 
-import importlib
 import os
 import threading
 from dataclasses import replace
@@ -16,9 +15,9 @@ import pytest
 from numpy.linalg import LinAlgError
 
 from tests.blender.clouds import add_group, add_object, differences, everything, sphere_points
-from tests.blender.conftest import MODULE
+from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats
-from tests.blender.test_all_or_nothing import bound, by_default, colored, film, handled, keyed, shared, undo, unhandled
+from tests.blender.test_all_or_nothing import bound, by_default, colored, film, handled, keyed, scene, shared, unhandled
 
 COUNT = int(os.environ.get("MESHFREE_FAULTS", "25"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))
@@ -46,7 +45,7 @@ def with_keyframes(obj):
 
 def splats(size=1.0):
     """A bar of splats with groups of handles and anchors."""
-    bar = bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1)
+    bar = bar_splats(part("core"), degree=1)
     obj = add_splats(replace(bar, positions=np.float32(size) * bar.positions))
     height = own_positions(obj)[:, 2]
     for name, chosen in (("Handle", height > 9.0), ("Anchor", height < 1.0)):
@@ -104,19 +103,33 @@ def runs():
 
 
 @pytest.fixture
-def forget(module):
+def forget():
     """Function that forgets all that was computed."""
-    cache, live = module("operators.running.cache"), module("operators.deform.live")
+    cache, live = part("operators.running.cache"), part("operators.deform.live")
     return lambda: (cache.clear(), live._followers.clear())
 
 
+@pytest.fixture(scope="module")
+def known():
+    """What making the objects of these tests has computed."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def ended():
+    """What runs that nothing disturbed have led to, by what they were."""
+    return {}
+
+
 @pytest.fixture
-def fresh(forget):
-    """Function that starts from an empty file, with nothing computed."""
+def fresh(forget, cache, known):
+    """Function that makes something in an empty file, and forgets what was computed."""
 
     def start(make):
         bpy.ops.wm.read_homefile(use_empty=True)
+        cache._kept.update(known)
         made = make()
+        known.update(cache._kept)
         forget()
         return made
 
@@ -124,9 +137,8 @@ def fresh(forget):
 
 
 @pytest.fixture
-def reports(extension, monkeypatch):
+def reports(stages, monkeypatch):
     """Let the report of progress of a number, counted from 0, raise an error; return how many there were."""
-    stages = importlib.import_module(f"{extension.__name__}.operators.running.stages")
     told = stages.Stages.__call__
 
     def arm(number=-1, error=None):
@@ -144,30 +156,36 @@ def reports(extension, monkeypatch):
     return arm
 
 
-def scene():
-    """All that the objects hold."""
-    return {obj.name: everything(obj) for obj in bpy.data.objects}
+@pytest.fixture
+def undisturbed(fresh, reports, ended):
+    """Function that gives the scene after a run that nothing disturbs, the name of its object, and its reports."""
+
+    def find(run):
+        make, name, settings = run
+        key = make, name, str(settings)
+        if key not in ended:
+            obj, seen = fresh(make).name, reports()
+            getattr(bpy.ops.meshfree, name)(**settings)
+            ended[key] = scene(), obj, len(seen)
+        return ended[key]
+
+    return find
 
 
 @pytest.mark.any_blender
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + COUNT))
-def test_fault_while_computing_changes_nothing(fresh, forget, reports, core, seed):
+def test_fault_while_computing_changes_nothing(fresh, undisturbed, reports, core, seed):
     rng = np.random.default_rng(seed)
     tried = runs()
     make, name, settings = tried[seed % len(tried)]
     kind = list(FAULTS)[rng.integers(len(FAULTS))]
-    fresh(make)
-    bpy.ops.ed.undo_push(message="Made")
-    seen = reports()
-    getattr(bpy.ops.meshfree, name)(**settings)
-    undisturbed, count = scene(), len(seen)
+    expected, _, count = undisturbed(tried[seed % len(tried)])
     assert count > 0
 
-    undo()
-    forget()
+    fresh(make)
     before, threads = scene(), threading.active_count()
     error = core.Cancelled("injected") if kind == "Cancelled" else kind("injected")
-    seen = reports(int(rng.integers(count)), error)
+    reports(int(rng.integers(count)), error)
     try:
         with pytest.raises((RuntimeError, KeyboardInterrupt)) as told:
             getattr(bpy.ops.meshfree, name)(**settings)
@@ -179,7 +197,7 @@ def test_fault_while_computing_changes_nothing(fresh, forget, reports, core, see
     assert threading.active_count() <= threads
 
     getattr(bpy.ops.meshfree, name)(**settings)
-    assert not differences(scene(), undisturbed)
+    assert not differences(scene(), expected)
 
 
 class Context:
@@ -217,9 +235,9 @@ class Pause:
 
 
 @pytest.fixture
-def attended(extension, monkeypatch):
+def attended(monkeypatch):
     """Function that starts an operator as a window does, outside of its loop of events, and gives what tells of it."""
-    jobs = importlib.import_module(f"{extension.__name__}.operators.running.job")
+    jobs = part("operators.running.job")
     started = []
 
     def start(name, settings, number):
@@ -293,15 +311,13 @@ HARMLESS = [rename, save_elsewhere, move]
 
 
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + COUNT))
-def test_change_while_computing_beside_the_window(fresh, reports, attended, tmp_path, seed):
+def test_change_while_computing_beside_the_window(fresh, undisturbed, reports, attended, tmp_path, seed):
     rng = np.random.default_rng(seed)
     tried = [run for run in runs() if run[1] not in UNATTENDED]
     make, name, settings = tried[seed % len(tried)]
     change = [*ENDING, *HARMLESS][rng.integers(len(ENDING) + len(HARMLESS))]
-    obj, seen = fresh(make), reports()
-    getattr(bpy.ops.meshfree, name)(**settings)
-    undisturbed, count = everything(obj)["attributes"], len(seen)  # Bind makes an empty the active one
-
+    records, known, count = undisturbed(tried[seed % len(tried)])
+    expected = records[known]["attributes"]
     obj, threads = fresh(make), threading.active_count()
     reports()
     run = attended(name, settings, int(rng.integers(count)))
@@ -318,8 +334,8 @@ def test_change_while_computing_beside_the_window(fresh, reports, attended, tmp_
         found = everything(obj)["attributes"]
         if change is move:  # the display makes discs for one orientation, and may leave them to the next run
             drawn = {"lb_disc", ".lb_slope", ".lb_slope_of", ".lb_color", ".lb_tilt"} - found.keys()
-            undisturbed = {name: kept for name, kept in undisturbed.items() if name not in drawn}
-        assert found == undisturbed
+            expected = {name: kept for name, kept in expected.items() if name not in drawn}
+        assert found == expected
     else:
         assert result == {"CANCELLED"}, run.reports
         assert len(run.reports) == 1
@@ -329,4 +345,4 @@ def test_change_while_computing_beside_the_window(fresh, reports, attended, tmp_
         assert not differences(after, before)
     obj = fresh(make)
     assert getattr(bpy.ops.meshfree, name)(**settings) == {"FINISHED"}
-    assert everything(obj)["attributes"].items() >= undisturbed.items()
+    assert everything(obj)["attributes"].items() >= expected.items()

@@ -1,6 +1,5 @@
 """Import and export of point files: coordinates of any size, attributes, colors, undo, errors, and the menus."""
 
-import importlib
 import types
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.blender.clouds import add_object, attribute, everything, local_points, sphere_points
-from tests.blender.conftest import MODULE
+from tests.blender.conftest import part
 from tests.core import e57_files
 
 FAR = np.array([446_123.0, 4_000_456.0, 78.0])
@@ -19,11 +18,11 @@ STEP = np.spacing(np.float32(100.0))  # of single precision at the size of the s
 
 
 def read_file(path):
-    return importlib.import_module(f"{MODULE}.core.files").read_points(path)
+    return part("core.files").read_points(path)
 
 
 def write_file(path, points, attributes=None):
-    files = importlib.import_module(f"{MODULE}.core.files")
+    files = part("core.files")
     files.write_points(path, files.PointTable(points, attributes or {}))
 
 
@@ -287,8 +286,8 @@ class TestColumns:
             bpy.ops.meshfree.import_points(filepath=str(tmp_path / name), columns=columns)
         assert everywhere() == before
 
-    def test_are_asked_for_where_text_is_chosen(self, extension):
-        importing = importlib.import_module(f"{MODULE}.operators.files.importing")
+    def test_are_asked_for_where_text_is_chosen(self):
+        importing = part("operators.files.importing")
         asks = importing.MESHFREE_OT_import_points.asks.fget
         chosen = types.SimpleNamespace(sequence=False)
         for names, text in (
@@ -342,7 +341,7 @@ def test_up_axis(tmp_path):
 
 def selected_points(obj):
     """Which points an object has selected, as the tools of the extension and Edit Mode take them."""
-    return importlib.import_module(f"{MODULE}.operators.tools.select").selection(obj)
+    return part("operators.tools.select").selection(obj)
 
 
 @pytest.mark.parametrize("kind", ["MESH", "POINTCLOUD"] if bpy.app.version >= (4, 5, 0) else ["MESH"])

@@ -1,13 +1,12 @@
 """Numbered files as one object that changes by frame: in the viewport, in renders, after saving, and analyzed."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_object, attribute, everything, sphere_points
+from tests.blender.conftest import part
 
 COUNTS = (300, 260, 340)
 RANGE = ("color_map", "range_mode", "range_low", "range_high")
@@ -190,9 +189,8 @@ def test_a_frame_that_cannot_be_analyzed_leaves_all_as_they_were(folder):
         assert item.meshfree.fingerprint == ""
 
 
-def test_stopped_at_the_last_frame_nothing_is_written(folder, extension, core, monkeypatch):
+def test_stopped_at_the_last_frame_nothing_is_written(stages, folder, core, monkeypatch):
     run_import(folder)
-    stages = importlib.import_module(f"{extension.__name__}.operators.running.stages")
     told, seen = stages.Stages.__call__, []
 
     def tell(self, stage, fraction):
@@ -210,9 +208,9 @@ def test_stopped_at_the_last_frame_nothing_is_written(folder, extension, core, m
     assert {item.name: everything(item) for item in bpy.data.objects} == before
 
 
-def test_what_fails_at_the_last_frame_leaves_none_written(folder, extension, monkeypatch):
+def test_what_fails_at_the_last_frame_leaves_none_written(folder, monkeypatch):
     run_import(folder)
-    tool = importlib.import_module(f"{extension.__name__}.operators.tools.sequence")
+    tool = part("operators.tools.sequence")
     write = tool.write_result
 
     def fail_late(obj, *more):
@@ -240,16 +238,13 @@ def test_a_frame_that_shares_its_mesh_gets_its_own_by_choice(folder):
     assert "lb_area" not in twin.data.attributes
 
 
-def test_a_mode_that_is_not_computed_cannot_be_shown(folder):
-    run_import(folder)
-    with pytest.raises(RuntimeError, match="Mode 3 is to be shown of 2"):
-        bpy.ops.meshfree.analyze_sequence(modes=2, shown_mode=3)
-
-
-def test_without_a_sequence_the_button_says_so(extension):
+def test_what_is_no_sequence_or_no_mode_of_it(folder):
     add_object(sphere_points(300))
     with pytest.raises(RuntimeError, match="No sequence is active"):
         bpy.ops.meshfree.analyze_sequence()
+    run_import(folder)
+    with pytest.raises(RuntimeError, match="Mode 3 is to be shown of 2"):
+        bpy.ops.meshfree.analyze_sequence(modes=2, shown_mode=3)
 
 
 def test_undo_takes_import_and_analysis_back(folder):

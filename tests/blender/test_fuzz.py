@@ -5,7 +5,6 @@ Seeds go through all pairs of an operator and an object in turn, with other sett
 are pairs try all.
 """
 
-import importlib
 import itertools
 import os
 import tempfile
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_group, add_object, everything, grid_points, sphere_points
-from tests.blender.conftest import MODULE
+from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats
 
 CASES = int(os.environ.get("MESHFREE_CASES", "150"))
@@ -236,7 +235,7 @@ def of_splats(*names):
     """Selected objects of splats, the last one active."""
 
     def made():
-        objects = [add_splats(bar_splats(importlib.import_module(f"{MODULE}.core"), degree=1), name) for name in names]
+        objects = [add_splats(bar_splats(part("core"), degree=1), name) for name in names]
         for obj in objects:
             obj.select_set(True)
         objects[0].rotation_euler.x = 0.4

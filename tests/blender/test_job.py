@@ -1,6 +1,5 @@
 """Long work beside the window: its result, its errors, and all that ends it. The window itself is in tests/gui."""
 
-import importlib
 from threading import Event
 from types import SimpleNamespace
 
@@ -9,18 +8,14 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_object, everything, sphere_points
+from tests.blender.conftest import part
 
 
 @pytest.fixture
-def jobs(extension):
-    module = importlib.import_module(f"{extension.__name__}.operators.running.job")
+def jobs():
+    module = part("operators.running.job")
     yield module
     assert module.running() is None
-
-
-@pytest.fixture
-def stages(extension):
-    return importlib.import_module(f"{extension.__name__}.operators.running.stages")
 
 
 class Work:
@@ -374,8 +369,8 @@ def test_disabling_the_extension_ends_it(operator, jobs, obj):
     assert not any(handler.__module__ == jobs.__name__ for handler in handlers)
 
 
-def test_growing_a_selection_in_edit_mode(operator, extension, obj):
-    selecting = importlib.import_module(f"{extension.__name__}.operators.tools.select")
+def test_growing_a_selection_in_edit_mode(operator, obj):
+    selecting = part("operators.tools.select")
     obj.data.vertices.foreach_set("select", np.arange(200) < 3)
     obj.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")
@@ -401,8 +396,8 @@ def test_growing_a_selection_in_edit_mode(operator, extension, obj):
     assert 3 < sum(vertex.select for vertex in obj.data.vertices) < 50
 
 
-def test_several_objects_are_computed_one_after_the_other(extension):
-    application = importlib.import_module(f"{extension.__name__}.operators.running.application")
+def test_several_objects_are_computed_one_after_the_other():
+    application = part("operators.running.application")
     told = []
     plans = [(name, lambda progress, name=name: progress(name, 0.5) or name) for name in "AB"]
     assert application.compute_all(plans, lambda *progress: told.append(progress)) == ["A", "B"]

@@ -1,7 +1,5 @@
 """Objects of Gaussian splats joined as they are seen: by Join Splats and Export Splats; what Blender's Join leaves."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
@@ -9,6 +7,7 @@ from mathutils import Euler, Matrix
 
 from tests import splat_files
 from tests.blender.clouds import everything
+from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats, splats_of
 from tests.blender.test_splat_files import exported, far_columns, imported
 from tests.blender.test_splats import close, turned
@@ -39,7 +38,7 @@ def pair(core, matrix=PLACED, degrees=(3, 3)):
     return *objects, *splats
 
 
-def part(splats, rows):
+def some_of(splats, rows):
     names = "positions", "scales", "rotations", "opacities", "colors", "harmonics"
     return splats.__class__(**{name: getattr(splats, name)[rows] for name in names})
 
@@ -54,8 +53,8 @@ class TestJoin:
         assert bpy.ops.meshfree.join_splats() == {"FINISHED"}
         assert list(bpy.data.objects) == [one]
         found = splats_of(core, one.data)
-        close(part(found, slice(len(splats))), splats)
-        close(part(found, slice(len(splats), None)), seen(seen(splats, matrix), first.inverted()))
+        close(some_of(found, slice(len(splats))), splats)
+        close(some_of(found, slice(len(splats), None)), seen(seen(splats, matrix), first.inverted()))
 
     @pytest.mark.parametrize("degrees", [(0, 3), (2, 1), (4, 0)])
     def test_missing_harmonics_are_zeros(self, core, degrees):
@@ -91,7 +90,7 @@ class TestJoin:
         select(one, *copies)
         assert bpy.ops.meshfree.join_splats() == {"FINISHED"}
         found = splats_of(core, one.data)
-        close(part(found, slice(-960, None)), seen(bar_splats(core), PLACED))
+        close(some_of(found, slice(-960, None)), seen(bar_splats(core), PLACED))
         assert len(found) == 3 * 960
         assert (bpy.data.pointclouds if one.type == "POINTCLOUD" else bpy.data.meshes).keys() == [one.data.name]
 
@@ -178,8 +177,8 @@ class TestExport:
         one.matrix_world = FIRST
         bpy.context.view_layer.update()
         found = exported(core, tmp_path / "both.ply")
-        close(part(found, slice(len(splats))), seen(splats, FIRST))
-        close(part(found, slice(len(splats), None)), seen(splats, PLACED))
+        close(some_of(found, slice(len(splats))), seen(splats, FIRST))
+        close(some_of(found, slice(len(splats), None)), seen(splats, PLACED))
 
     def test_the_active_one_alone_where_that_is_chosen(self, core, tmp_path):
         _, _, splats, _ = pair(core)
@@ -216,8 +215,8 @@ def bar_files(core, tmp_path):
 
 class TestBlendersOwnJoin:
     @pytest.fixture
-    def told(self, extension, tmp_path, capfd):
-        splats = importlib.import_module(f"{extension.__name__}.operators.objects.splats")
+    def told(self, tmp_path, capfd):
+        splats = part("operators.objects.splats")
 
         def told():
             obj = bpy.context.object

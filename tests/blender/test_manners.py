@@ -1,17 +1,27 @@
 """Switched off, the extension leaves nothing behind; files that it made are good without it, and keep its settings."""
 
+import gc
 import json
 import subprocess
 import sys
 import threading
+import weakref
 
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender.clouds import add_object, attribute, sphere_points
+from tests.blender.conftest import part
 
 OWNERS = ("Object", "Scene", "Mesh", "PointCloud", "WindowManager", "WorkSpace", "Screen", "Material", "Collection")
+IN_MENUS = (
+    "TOPBAR_MT_file_import",
+    "VIEW3D_MT_object",
+    "VIEW3D_MT_edit_mesh",
+    "VIEW3D_MT_object_context_menu",
+    "VIEW3D_MT_edit_mesh_context_menu",
+)
 
 
 def registered():
@@ -78,7 +88,9 @@ def test_enable_disable_enable(extension, callbacks):
     name = extension.__name__
     before = registered()
     assert "MESHFREE_OT_analyze" in before["types"]
-    assert any(name in entry for entry in before["entries of menus"]["TOPBAR_MT_file_import"])
+    assert len([item for item in before["handlers"] if name in item]) >= 7
+    for menu in IN_MENUS:
+        assert len([item for item in before["entries of menus"][menu] if name in item]) == 1, menu
     threads = threading.active_count()
     try:
         bpy.ops.preferences.addon_disable(module=name)
@@ -88,10 +100,17 @@ def test_enable_disable_enable(extension, callbacks):
         assert not [item for owner in OWNERS for item in off[f"properties of {owner}"] if "meshfree" in item]
         bpy.ops.preferences.addon_enable(module=name)
         assert registered() == before
-        add_object(sphere_points())
+        obj = add_object(sphere_points())
         bpy.ops.meshfree.analyze(modes=2)
         bpy.ops.meshfree.smooth()
+        options = part("operators.objects.options").laplacian_options(obj.meshfree)
+        points = part("operators.objects.reading").read_points(bpy.context, obj).points
+        kept = weakref.ref(part("operators.running.cache").build(points, options, None, lambda *_: None).laplacian)
+        assert kept() is not None
+        bpy.ops.meshfree.deform_bind(at_once=True)
         bpy.ops.preferences.addon_disable(module=name)
+        gc.collect()
+        assert kept() is None
         assert registered() == off
         assert callbacks["draw"] == {}
         assert [function for function in callbacks["timers"] if bpy.app.timers.is_registered(function)] == []
@@ -112,26 +131,6 @@ def test_the_callbacks_are_really_watched(callbacks):
     bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
     bpy.app.timers.unregister(draw)
     assert callbacks["draw"] == {}
-
-
-def test_memory_is_given_back(extension):
-    import gc
-    import weakref
-    from importlib import import_module
-
-    cache = import_module(f"{extension.__name__}.operators.running.cache")
-    obj = add_object(sphere_points())
-    bpy.ops.meshfree.analyze(show=False)
-    options = import_module(f"{extension.__name__}.operators.objects.options").laplacian_options(obj.meshfree)
-    reading = import_module(f"{extension.__name__}.operators.objects.reading").read_points(bpy.context, obj)
-    kept = weakref.ref(cache.build(reading.points, options, None, lambda *_: None).laplacian)
-    assert kept() is not None
-    bpy.ops.preferences.addon_disable(module=extension.__name__)
-    try:
-        gc.collect()
-        assert kept() is None
-    finally:
-        bpy.ops.preferences.addon_enable(module=extension.__name__)
 
 
 WITHOUT = """

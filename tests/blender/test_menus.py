@@ -1,12 +1,11 @@
 """The menus, which make the search (F3) find all operators."""
 
-import importlib
 from types import SimpleNamespace
 
 import bpy
-import pytest
 
 from tests.blender.clouds import add_object, sphere_points
+from tests.blender.conftest import part
 
 # They have the name of a group, a menu of their own, or the place of a click.
 NOT_IN_MENUS = {"select_group", "apply_preset", "add_preset", "select_point"}
@@ -32,24 +31,20 @@ class Menu:
         pass
 
 
-def module_of(extension):
-    return importlib.import_module(f"{extension.__name__}.ui.menus")
-
-
-def test_menus_hold_every_operator(extension):
+def test_menus_hold_every_operator():
     add_object(sphere_points())
     menu = Menu()
-    for _, draw in module_of(extension).entries():
+    for _, draw in part("ui.menus").entries():
         draw(menu, bpy.context)
     for name in menu.menus:
         getattr(bpy.types, name).draw(menu, bpy.context)
     assert menu.operators == {f"meshfree.{name}" for name in set(dir(bpy.ops.meshfree)) - NOT_IN_MENUS}
 
 
-def right_click(extension, name):
+def right_click(name):
     """Return what the menu that a right click opens has of ours."""
     menu = Menu()
-    draw = next(draw for kind, draw in module_of(extension).entries() if kind.__name__ == name)
+    draw = next(draw for kind, draw in part("ui.menus").entries() if kind.__name__ == name)
     draw(menu, bpy.context)
     return menu
 
@@ -57,55 +52,34 @@ def right_click(extension, name):
 class TestRightClick:
     """The menus of a right click hold what is done most, and the menu of all."""
 
-    def test_on_a_cloud(self, extension):
+    def test_on_a_cloud(self):
         add_object(sphere_points())
-        menu = right_click(extension, "VIEW3D_MT_object_context_menu")
+        menu = right_click("VIEW3D_MT_object_context_menu")
         most = {"analyze", "smooth", "segment", "principal_curvatures", "deform_bind"}
         assert menu.operators == {f"meshfree.{name}" for name in most}
         assert menu.menus == ["MESHFREE_MT_object"]
 
-    def test_on_the_points_of_a_cloud(self, extension):
+    def test_on_the_points_of_a_cloud(self):
         add_object(sphere_points())
         bpy.ops.object.mode_set(mode="EDIT")
-        menu = right_click(extension, "VIEW3D_MT_edit_mesh_context_menu")
+        menu = right_click("VIEW3D_MT_edit_mesh_context_menu")
         bpy.ops.object.mode_set(mode="OBJECT")
         most = {"select_grow", "select_component", "select_front", "group_from_selection"}
         assert menu.operators == {f"meshfree.{name}" for name in most}
         assert menu.menus == ["MESHFREE_MT_points"]
 
-    def test_on_a_mesh_with_faces_there_is_the_menu_alone(self, extension):
+    def test_on_a_mesh_with_faces_there_is_the_menu_alone(self):
         add_object(sphere_points(), faces=[(0, 1, 2)])
         for name, all_tools in (
             ("VIEW3D_MT_object_context_menu", "MESHFREE_MT_object"),
             ("VIEW3D_MT_edit_mesh_context_menu", "MESHFREE_MT_points"),
         ):
-            menu = right_click(extension, name)
+            menu = right_click(name)
             assert (menu.operators, menu.menus) == (set(), [all_tools])
 
-    def test_on_other_objects_there_is_nothing(self, extension):
+    def test_on_other_objects_there_is_nothing(self):
         light = bpy.data.objects.new("Light", bpy.data.lights.new("Light", "SUN"))
         bpy.context.scene.collection.objects.link(light)
         bpy.context.view_layer.objects.active = light
-        menu = right_click(extension, "VIEW3D_MT_object_context_menu")
+        menu = right_click("VIEW3D_MT_object_context_menu")
         assert (menu.operators, menu.menus) == (set(), [])
-
-
-IN_MENUS = (
-    "VIEW3D_MT_object",
-    "VIEW3D_MT_edit_mesh",
-    "VIEW3D_MT_object_context_menu",
-    "VIEW3D_MT_edit_mesh_context_menu",
-)
-
-
-@pytest.mark.parametrize("name", IN_MENUS)
-def test_nothing_is_left_behind(extension, name):
-    def ours():
-        return [draw for draw in getattr(bpy.types, name)._dyn_ui_initialize() if "meshfree" in draw.__module__]
-
-    module = extension.__name__
-    assert len(ours()) == 1
-    bpy.ops.preferences.addon_disable(module=module)
-    assert ours() == []
-    bpy.ops.preferences.addon_enable(module=module)
-    assert len(ours()) == 1

@@ -1,6 +1,5 @@
 """What tools and imports tell stays with the object and in the panel, until it is dismissed or renewed."""
 
-import importlib
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_object, grid_points, sphere_points
+from tests.blender.conftest import part
 from tests.blender.test_panel import Layout, draw
 
 ROOT = Path(__file__).parents[2]
@@ -182,8 +182,7 @@ def test_a_sequence_keeps_what_was_told_of_its_frames(tmp_path):
     assert {text.split(":")[0] for text in told} == {"wave_1", "wave_2"}
 
 
-def test_the_command_line_keeps_notices_in_the_file_it_writes(extension, tmp_path):
-    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
+def test_the_command_line_keeps_notices_in_the_file_it_writes(command, tmp_path):
     points = np.vstack([sphere_points(), [[0.0, 0.0, 50.0]]])
     np.savetxt(tmp_path / "a.xyz", points)
     for verb in ("analyze", "roughness"):
@@ -196,9 +195,9 @@ def test_the_command_line_keeps_notices_in_the_file_it_writes(extension, tmp_pat
         assert told or verb == "roughness"
 
 
-def test_a_change_meanwhile_is_told_on_the_object_too(extension):
+def test_a_change_meanwhile_is_told_on_the_object_too():
     """The operator of the job is not asked for: all of them complete alike."""
-    running = importlib.import_module(f"{extension.__name__}.operators.running.job")
+    running = part("operators.running.job")
     obj = add_object(sphere_points())
     snapshot = running.Snapshot(bpy.context, obj)
     obj.data.vertices[0].co.x += 1.0
@@ -230,7 +229,7 @@ class Narrow:
         return getattr(bpy.context, name)
 
 
-def test_texts_are_wrapped_by_the_width_of_the_region(extension):
+def test_texts_are_wrapped_by_the_width_of_the_region():
     import blf
 
     obj = add_object(grid_points()[0])
@@ -246,8 +245,8 @@ def test_texts_are_wrapped_by_the_width_of_the_region(extension):
     assert len(lines[180]) > len(lines[260]) > len(lines[600])
 
 
-def test_a_number_stays_with_its_unit(extension):
-    wrapping = importlib.import_module(f"{extension.__name__}.ui.wrapping")
+def test_a_number_stays_with_its_unit():
+    wrapping = part("ui.wrapping")
     text = "Scan: 2.01 cm from Plan on average, 95 % within 1.5 mm, 12.6 m² of 13 miles at most (0.07 %)."
     lines = wrapping.wrapped(text, 1, len)
     assert {"2.01 cm", "95 %", "1.5 mm,", "12.6 m²", "13", "miles", "(0.07 %)."} <= set(lines)

@@ -6,6 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_group, add_object, attribute, everything, grid_points, local_points, sphere_points
+from tests.blender.conftest import part
+from tests.blender.test_deform import lift
 from tests.blender.test_display import display_points
 from tests.blender.test_panel import draw
 
@@ -44,11 +46,6 @@ def empty_of(obj):
     return obj.meshfree.deform.handle_items[0].empty
 
 
-def lift(empty, height):
-    empty.location.z += height
-    bpy.context.view_layer.update()
-
-
 def displacement(obj):
     return attribute(obj, "lb_displacement")
 
@@ -63,14 +60,14 @@ def duplicate(*objects, linked=False):
 class TestCopiesOfBoundObjects:
     """A copy stays as it is, with handles of its own on demand, and never moves what belongs to its original."""
 
-    def test_a_copy_keeps_its_shape_wherever_it_is_moved(self, bound, module):
+    def test_a_copy_keeps_its_shape_wherever_it_is_moved(self, bound):
         before = displacement(bound)
         copy = duplicate(bound)
         copy.location.y += 3.0
         lift(empty_of(bound), 0.5)
         assert_allclose(displacement(copy), before, atol=1e-6)
         assert displacement(bound)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
-        reason = module("operators.deform.binding").stale_reason
+        reason = part("operators.deform.binding").stale_reason
         assert reason(bound) == ""
         assert 'has no handles of its own, "Cloud" has them' in reason(copy)
         assert any(text.startswith("Copy. It has no handles") for text in draw())
@@ -88,13 +85,13 @@ class TestCopiesOfBoundObjects:
         assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
         assert_allclose(displacement(bound), before, atol=1e-4)
 
-    def test_a_copy_together_with_its_handle_works_on_its_own(self, bound, module):
+    def test_a_copy_together_with_its_handle_works_on_its_own(self, bound):
         before = displacement(bound)
         copy = duplicate(bound, empty_of(bound))
         lift(empty_of(copy), 0.5)
         assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
         assert_allclose(displacement(bound), before)
-        assert [module("operators.deform.binding").stale_reason(obj) for obj in (bound, copy)] == ["", ""]
+        assert [part("operators.deform.binding").stale_reason(obj) for obj in (bound, copy)] == ["", ""]
 
     @pytest.mark.parametrize("name", ["reset", "unbind"])
     def test_nothing_is_taken_from_the_original(self, bound, name):
@@ -119,26 +116,26 @@ class TestCopiesOfBoundObjects:
         bpy.ops.meshfree.deform_unbind()
         assert not [obj for obj in bpy.data.objects if obj.type == "EMPTY"]
 
-    def test_a_linked_copy_shows_what_the_original_shows(self, bound, module):
+    def test_a_linked_copy_shows_what_the_original_shows(self, bound):
         copy = duplicate(bound, linked=True)
         lift(empty_of(bound), 0.5)
         assert displacement(copy)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
-        reason = module("operators.deform.binding").stale_reason
+        reason = part("operators.deform.binding").stale_reason
         assert reason(bound) == ""
         assert 'shares its mesh with "Cloud", whose handles move both' in reason(copy)
 
-    def test_the_handle_leads_to_the_original(self, bound, module):
+    def test_the_handle_leads_to_the_original(self, bound):
         copy = duplicate(bound)
         copy.name = "A"  # before the other in the scene's order, or not
-        assert module("operators.deform.binding").handled_object(empty_of(bound), bpy.context.scene) == bound
+        assert part("operators.deform.binding").handled_object(empty_of(bound), bpy.context.scene) == bound
 
-    def test_appended_to_another_file_it_follows(self, bound, tmp_path, module):
+    def test_appended_to_another_file_it_follows(self, bound, tmp_path):
         path = str(tmp_path / "bound.blend")
         bpy.ops.wm.save_as_mainfile(filepath=path)
         bpy.ops.wm.read_homefile(use_empty=True)
         bpy.ops.wm.append(filepath=f"{path}/Object/Cloud", directory=f"{path}/Object/", filename="Cloud")
         appended = bpy.data.objects["Cloud"]
-        assert module("operators.deform.binding").stale_reason(appended) == ""
+        assert part("operators.deform.binding").stale_reason(appended) == ""
         lift(empty_of(appended), 0.5)
         assert displacement(appended)[:, 2].max() == pytest.approx(1.5, abs=5e-3)
 
@@ -164,9 +161,9 @@ class TestGroupColors:
             add_group(cloud, role, np.arange(75 * number, 75 * number + 50))
         return cloud
 
-    def colors(self, module, obj):
+    def colors(self, obj):
         """Colours of the groups in the material, by name."""
-        nodes = module("ui.display").find_material(obj).node_tree.nodes
+        nodes = part("ui.display").find_material(obj).node_tree.nodes
         found = {}
         for node in nodes:
             if node.type == "ATTRIBUTE" and node.name.startswith("Group "):
@@ -175,30 +172,30 @@ class TestGroupColors:
                 found[node.attribute_name] = tuple(mixed.inputs["Color2"].default_value)
         return found
 
-    def test_without_an_analysis(self, grouped, module):
+    def test_without_an_analysis(self, grouped):
         grouped.meshfree.show_groups = True
         ((count, names, radii, _),) = display_points(grouped)
         assert count == 600
         assert names >= set(ROLES)  # which the material reads
         assert radii.max() == pytest.approx(1.1 * grouped.meshfree.spacing)
-        colors = self.colors(module, grouped)
+        colors = self.colors(grouped)
         assert set(colors) == set(ROLES)
         assert len(set(colors.values())) == 8
-        assert module("ui.display").shown_attribute(grouped) == ""
+        assert part("ui.display").shown_attribute(grouped) == ""
         grouped.meshfree.show_groups = False
         assert not grouped.modifiers
         assert not bpy.data.materials
 
-    def test_on_a_surface_without_an_analysis(self, grouped, module):
+    def test_on_a_surface_without_an_analysis(self, grouped):
         bpy.ops.meshfree.show_surface()
         grouped.meshfree.show_groups = True
-        assert set(self.colors(module, grouped)) == set(ROLES)
+        assert set(self.colors(grouped)) == set(ROLES)
         grouped.meshfree.show_groups = False
         assert len(grouped.modifiers) == 1  # which shows the surface
-        assert module("ui.display").find_material(grouped) is None
+        assert part("ui.display").find_material(grouped) is None
         assert not bpy.data.materials
 
-    def test_without_points(self, module, capfd):
+    def test_without_points(self, capfd):
         obj = add_object([])
         obj.meshfree.show_groups = True
         assert len(obj.modifiers) == 1
@@ -207,25 +204,25 @@ class TestGroupColors:
         assert not obj.modifiers
         assert "Traceback" not in capfd.readouterr().err  # Blender goes on when a setting's own function fails
 
-    def test_over_what_is_on_show(self, grouped, module):
+    def test_over_what_is_on_show(self, grouped):
         bpy.ops.meshfree.analyze()
         grouped.meshfree.show_groups = True
         for name in ("lb_area", "lb_normal", "lb_boundary"):
             bpy.ops.meshfree.colormap(attribute=name)
-            assert module("ui.display").shown_attribute(grouped) == name
-            assert set(self.colors(module, grouped)) == set(ROLES)
+            assert part("ui.display").shown_attribute(grouped) == name
+            assert set(self.colors(grouped)) == set(ROLES)
         grouped.meshfree.outside = "HIDE"
-        assert set(self.colors(module, grouped)) == set(ROLES)
+        assert set(self.colors(grouped)) == set(ROLES)
         grouped.meshfree.show_groups = False
-        assert module("ui.display").shown_attribute(grouped) == "lb_boundary"
-        assert self.colors(module, grouped) == {}
+        assert part("ui.display").shown_attribute(grouped) == "lb_boundary"
+        assert self.colors(grouped) == {}
 
-    def test_plain_points_become_colored_by_an_analysis(self, grouped, module):
+    def test_plain_points_become_colored_by_an_analysis(self, grouped):
         grouped.meshfree.show_groups = True
         bpy.ops.meshfree.analyze()
-        assert module("ui.display").shown_attribute(grouped) == "lb_mean_curvature"
+        assert part("ui.display").shown_attribute(grouped) == "lb_mean_curvature"
         assert len(grouped.modifiers) == 1
-        assert set(self.colors(module, grouped)) == set(ROLES)
+        assert set(self.colors(grouped)) == set(ROLES)
 
     def test_the_picture(self, grouped, tmp_path):
         scene = bpy.context.scene
@@ -258,23 +255,23 @@ class TestGroupColors:
         assert blue > green > red
         assert np.ptp(middle(slice(22, 26))) < 0.02
 
-    def test_more_handles_and_other_names(self, grouped, module):
+    def test_more_handles_and_other_names(self, grouped):
         for name in ("Handle.001", "Edge", "Stay"):
             add_group(grouped, name, np.arange(5))
         grouped.meshfree.boundary_group, grouped.meshfree.deform.anchors = "Edge", "Stay"
         grouped.meshfree.show_groups = True
-        colors = self.colors(module, grouped)
+        colors = self.colors(grouped)
         assert colors["Handle.001"] == colors["Handle"]
         assert colors["Edge"] == colors["Boundary"]
         assert colors["Stay"] == colors["Anchor"]
 
-    def test_a_handle_that_is_added_gets_its_color(self, grouped, module):
+    def test_a_handle_that_is_added_gets_its_color(self, grouped):
         grouped.meshfree.show_groups = True
         grouped.data.vertices.foreach_set("select", np.arange(600) > 590)
         bpy.ops.meshfree.handle_add()
-        assert "Handle.001" in self.colors(module, grouped)
+        assert "Handle.001" in self.colors(grouped)
 
-    def test_in_edit_mode(self, grouped, module):
+    def test_in_edit_mode(self, grouped):
         bpy.ops.object.mode_set(mode="EDIT")
         grouped.meshfree.show_groups = True
         assert grouped.meshfree.spacing > 0.05
@@ -290,12 +287,12 @@ class TestGroupColors:
         weights = np.array([value.value for value in points.attributes["Handle"].data])
         assert_allclose(places[weights > 0.0, 2], 1.0, atol=1e-4)
 
-    def test_a_material_of_the_user_is_left_alone(self, grouped, module, modifiers):
+    def test_a_material_of_the_user_is_left_alone(self, grouped, modifiers):
         bpy.ops.meshfree.analyze()
         own = bpy.data.materials.new("Own")
-        modifiers.set_input(module("ui.display").find_display(grouped), "Material", own)
+        modifiers.set_input(part("ui.display").find_display(grouped), "Material", own)
         grouped.meshfree.show_groups = True
-        assert modifiers.get_input(module("ui.display").find_display(grouped), "Material") == own
+        assert modifiers.get_input(part("ui.display").find_display(grouped), "Material") == own
 
     @pytest.mark.parametrize("shown", [False, True])
     def test_the_panel(self, grouped, shown):
@@ -308,12 +305,11 @@ class TestGroupColors:
 class TestSeveral:
     """Several selected objects of all kinds in one go."""
 
-    def test_all_that_share_a_mesh_show_it(self, cloud, module):
+    def test_all_that_share_a_mesh_show_it(self, display, cloud):
         copy = duplicate(cloud, linked=True)
         copy.location.x += 5.0
         choose(cloud, copy)
         bpy.ops.meshfree.analyze()
-        display = module("ui.display")
         assert [display.shown_attribute(obj) for obj in (cloud, copy)] == ["lb_mean_curvature"] * 2
         assert copy.meshfree.total_area == cloud.meshfree.total_area
 
@@ -371,26 +367,26 @@ class TestOrdinaryEdits:
     """Blender's own edits leave results that are right, or say that they are stale."""
 
     @pytest.mark.parametrize("scale", [(2, 2, 2), (1, 2, 3), (-1, 1, 1)])
-    def test_apply_scale(self, cloud, module, scale):
+    def test_apply_scale(self, cloud, scale):
         cloud.scale = scale
         bpy.ops.meshfree.analyze()
         area, normals = cloud.meshfree.total_area, attribute(cloud, "lb_normal")
         outward = np.einsum("ij,ij->i", normals, local_points(cloud))
         bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
-        assert module("operators.objects.result").is_stale(cloud)
+        assert part("operators.objects.result").is_stale(cloud)
         bpy.ops.meshfree.analyze()
         assert cloud.meshfree.total_area == pytest.approx(area, rel=1e-4)
         again = np.einsum("ij,ij->i", attribute(cloud, "lb_normal"), local_points(cloud))
         assert (outward > 0.0).all() == (again > 0.0).all()
 
-    def test_join(self, cloud, module):
+    def test_join(self, cloud):
         bpy.ops.meshfree.analyze(modes=3)
         other = add_object(sphere_points(500) + (5.0, 0.0, 0.0), "Other")
         choose(other)
         bpy.ops.meshfree.analyze(modes=5)
         choose(cloud, other)
         bpy.ops.object.join()
-        assert module("operators.objects.result").is_stale(cloud)
+        assert part("operators.objects.result").is_stale(cloud)
         bpy.ops.meshfree.analyze()
         assert cloud.meshfree.component_count == 2
         assert "lb_eigenvalues" not in cloud
@@ -399,28 +395,27 @@ class TestOrdinaryEdits:
         ((count, *_),) = display_points(cloud)
         assert count == 1100
 
-    def test_separate(self, cloud, module):
+    def test_separate(self, cloud):
         bpy.ops.meshfree.analyze(modes=3)
         cloud.data.vertices.foreach_set("select", local_points(cloud)[:, 2] > 0.0)
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.separate(type="SELECTED")
         bpy.ops.object.mode_set(mode="OBJECT")
-        part = bpy.data.objects["Cloud.001"]
-        assert module("operators.objects.result").is_stale(cloud)
-        assert module("operators.objects.result").is_stale(part)
-        for obj in (cloud, part):
+        separated = bpy.data.objects["Cloud.001"]
+        assert part("operators.objects.result").is_stale(cloud)
+        assert part("operators.objects.result").is_stale(separated)
+        for obj in (cloud, separated):
             choose(obj)
             assert bpy.ops.meshfree.analyze() == {"FINISHED"}
-        assert cloud.meshfree.total_area + part.meshfree.total_area < 25.0
+        assert cloud.meshfree.total_area + separated.meshfree.total_area < 25.0
 
-    def test_a_copied_display_modifier_shows_its_own_object(self, cloud, module):
+    def test_a_copied_display_modifier_shows_its_own_object(self, display, cloud):
         bpy.ops.meshfree.analyze()
         other = add_object(sphere_points(500), "Other")
         choose(cloud, other)
         bpy.ops.object.make_links_data(type="MODIFIERS")
         choose(other)
         bpy.ops.meshfree.analyze()
-        display = module("ui.display")
         assert display.find_material(other) != display.find_material(cloud)
         assert len(other.modifiers) == 1
 
@@ -434,8 +429,7 @@ class TestOrdinaryEdits:
         assert cloud.meshfree.total_area == pytest.approx(area, rel=0.05)
 
 
-def test_counts_of_large_groups_come_by_and_by(cloud, module, monkeypatch):
-    counting = module("operators.objects.counting")
+def test_counts_of_large_groups_come_by_and_by(counting, cloud, monkeypatch):
     add_group(cloud, "Handle", np.arange(30))
     registered = []
 
@@ -460,7 +454,7 @@ def test_counts_of_large_groups_come_by_and_by(cloud, module, monkeypatch):
     monkeypatch.setattr(counting, "_STEP", 0.0001)
     cloud.meshfree.boundary_group = "Handle"
     assert counting.members(cloud, "Handle", glance=True) is None
-    assert not module("operators.objects.reading").fingerprint(cloud, glance=True)
+    assert not part("operators.objects.reading").fingerprint(cloud, glance=True)
     exact = counting.members(cloud, "Handle")
     counting.renew_counts(cloud)
     add_group(cloud, "Anchor", np.arange(7))
@@ -486,8 +480,8 @@ class TestConverting:
         bpy.ops.meshfree.colormap(attribute="lb_eigenvector_002")
         return cloud
 
-    def test_there_and_back(self, ready, module):
-        display, result = module("ui.display"), module("operators.objects.result")
+    def test_there_and_back(self, ready):
+        display, result = part("ui.display"), part("operators.objects.result")
         ready.meshfree.point_shape = "DOTS"
         material, values = display.find_material(ready), attribute(ready, "lb_eigenvector_002")
         eigenvalues, points = list(ready["lb_eigenvalues"]), local_points(ready)
@@ -504,10 +498,10 @@ class TestConverting:
             assert material.users == 1
             ((count, *_),) = display_points(obj)
             assert count == 600
-            weights = module("operators.objects.groups").group_weights
+            weights = part("operators.objects.groups").group_weights
             assert_allclose(weights(obj, "Handle"), np.arange(600) < 50)
             assert_allclose(weights(obj, "Anchor"), 0.5 * ((np.arange(600) >= 50) & (np.arange(600) < 80)))
-            assert (module("operators.tools.select").selection(obj) == (np.arange(600) < 20)).all()
+            assert (part("operators.tools.select").selection(obj) == (np.arange(600) < 20)).all()
 
     def test_what_is_refused(self, bound):
         before = everything(bound)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import CORNERS, FACES, add_object, attribute, sphere_points
+from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats
 from tests.blender.test_panel import draw
 
@@ -13,8 +14,8 @@ POINT_CLOUDS = pytest.mark.skipif(bpy.app.version < (4, 5), reason="meshes becom
 
 
 @pytest.fixture
-def shown(module):
-    return module("ui.display").shown_attribute
+def shown():
+    return part("ui.display").shown_attribute
 
 
 def evenly(count):
@@ -105,8 +106,8 @@ class TestImport:
         assert shown(obj) == "Color"
         assert looks(RED, tmp_path)
 
-    def test_dots_above_the_limit(self, imported, tmp_path, module, monkeypatch):
-        monkeypatch.setattr(module("operators.files.importing"), "_QUICK", 799)
+    def test_dots_above_the_limit(self, imported, tmp_path, monkeypatch):
+        monkeypatch.setattr(part("operators.files.importing"), "_QUICK", 799)
         obj = imported()
         assert "lb_disc" not in obj.data.attributes
         assert obj.meshfree.spacing == pytest.approx(np.sqrt(4.0 * np.pi / 800), rel=0.1)
@@ -122,17 +123,17 @@ class TestImport:
         assert imported(kind="POINTCLOUD", surface=surface).type == "POINTCLOUD"
         assert looks(RED, tmp_path)
 
-    def test_points_without_colors_have_no_material(self, tmp_path, module):
+    def test_points_without_colors_have_no_material(self, tmp_path):
         np.savetxt(tmp_path / "plain.xyz", evenly(800))
         bpy.ops.meshfree.import_points(filepath=str(tmp_path / "plain.xyz"))
-        assert module("ui.display").find_material(bpy.context.object) is None
+        assert part("ui.display").find_material(bpy.context.object) is None
         assert not bpy.data.materials
 
     def test_colors_that_are_left_out(self, imported, shown):
         obj = imported(attributes=False)
         assert shown(obj) == ""
 
-    def test_frames_of_a_sequence_share_a_material(self, tmp_path, module, shown):
+    def test_frames_of_a_sequence_share_a_material(self, tmp_path, shown):
         for number, color in enumerate((RED, GREEN, BLUE), 1):
             save(tmp_path / f"wave_{number}.xyz", evenly(800), color)
         bpy.ops.meshfree.import_points(filepath=str(tmp_path / "wave_1.xyz"), sequence=True)
@@ -143,8 +144,8 @@ class TestImport:
         assert [shown(obj) for obj in frames] == ["Color"] * 3
         assert len(bpy.data.materials) == 1
 
-    def test_scenes_that_the_command_line_writes(self, tmp_path, module, shown):
-        opening = module("operators.files.opening")
+    def test_scenes_that_the_command_line_writes(self, tmp_path, shown):
+        opening = part("operators.files.opening")
         path = tmp_path / "red.xyz"
         save(path, evenly(800))
         obj, _ = opening.load(path)
@@ -181,17 +182,17 @@ class TestColor:
         assert shown(obj) == "Paint"
         assert looks(GREEN, tmp_path)
 
-    def test_of_several_the_active_one(self, module):
+    def test_of_several_the_active_one(self):
         obj = painted(evenly(100), GREEN)
         obj.data.color_attributes.new("Second", "BYTE_COLOR", "POINT")
         for name in ("Col", "Second"):
             obj.data.color_attributes.active_color_name = name
-            assert module("operators.objects.colors").own_colors(obj.data) == name
+            assert part("operators.objects.colors").own_colors(obj.data) == name
 
-    def test_colors_of_corners_are_none_of_points(self, module):
+    def test_colors_of_corners_are_none_of_points(self):
         obj = add_object(evenly(100), faces=[(0, 1, 2)])
         obj.data.color_attributes.new("Col", "BYTE_COLOR", "CORNER")
-        assert module("operators.objects.colors").own_colors(obj.data) == ""
+        assert part("operators.objects.colors").own_colors(obj.data) == ""
         assert "Color" not in draw()
 
     def test_the_list_in_edit_mode(self, imported):
@@ -218,16 +219,16 @@ class TestColor:
         obj.meshfree.show_groups = False
         assert looks(RED, tmp_path)
 
-    def test_no_legend(self, imported, module):
+    def test_no_legend(self, imported):
         obj, scene = imported(), bpy.context.scene
-        assert module("ui.overlay").pictures(obj, scene) == []
+        assert part("ui.overlay").pictures(obj, scene) == []
         scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
         scene.collection.objects.link(scene.camera)
         with pytest.raises(RuntimeError, match="its own colors, which are not values"):
             bpy.ops.meshfree.legend()
         bpy.ops.meshfree.analyze()
         bpy.ops.meshfree.legend()
-        legend = module("ui.legend").find_legend(scene, obj)
+        legend = part("ui.legend").find_legend(scene, obj)
         bpy.ops.meshfree.colormap(attribute="Color")
         assert legend.hide_render
         bpy.ops.meshfree.colormap(attribute="lb_area")
@@ -377,16 +378,16 @@ class TestOwnMaterial:
         bpy.context.view_layer.update()
         assert looks(RED, tmp_path)
 
-    def test_one_chosen_on_the_modifier_is_left_alone(self, module, modifiers, tmp_path):
+    def test_one_chosen_on_the_modifier_is_left_alone(self, modifiers, tmp_path):
         obj = add_object(evenly(800))
         add_material(obj, BLUE)
         bpy.ops.meshfree.show_surface()
         chosen = add_material(add_object(sphere_points(9), "Other"), GREEN)
         bpy.data.objects.remove(bpy.data.objects["Other"])
-        modifiers.set_input(module("ui.display").find_display(obj), "Material", chosen)
+        modifiers.set_input(part("ui.display").find_display(obj), "Material", chosen)
         obj.location.z = 0.01
         bpy.context.view_layer.update()
-        assert modifiers.get_input(module("ui.display").find_display(obj), "Material") == chosen
+        assert modifiers.get_input(part("ui.display").find_display(obj), "Material") == chosen
 
     def test_dots_and_faces_have_it_too(self, tmp_path):
         obj = add_object(evenly(800), faces=[(0, 1, 2)])

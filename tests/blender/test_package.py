@@ -1,7 +1,6 @@
 """The zip: its content, its manifest, the bundled wheels, and that nothing stays behind when it is switched off."""
 
 import html
-import importlib
 import json
 import posixpath
 import re
@@ -17,6 +16,7 @@ import pytest
 
 import manual_pages
 import package
+from tests.blender.conftest import part
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_the_manual_holds_all_words_of_its_pages(packed):
 
 
 def test_the_preferences_open_the_manual(extension):
-    opened = importlib.import_module(f"{extension.__name__}.ui.preferences").MANUAL
+    opened = part("ui.preferences").MANUAL
     assert opened.is_file()
     assert opened.name == manual_pages.START
     texts = []
@@ -180,47 +180,6 @@ def test_numpy_is_blenders_own(installed):
     import numpy
 
     assert not Path(numpy.__file__).is_relative_to(installed)
-
-
-def _registered():
-    """Everything that an extension may add to Blender, by name."""
-    handlers = [
-        f"{name}: {function.__module__}"
-        for name in dir(bpy.app.handlers)
-        if isinstance(functions := getattr(bpy.app.handlers, name), list)
-        for function in functions
-    ]
-    return {
-        "types": [name for name in dir(bpy.types) if "meshfree" in name.lower()],
-        "operators": dir(bpy.ops.meshfree),
-        "handlers": handlers,
-        **{
-            f"properties of {owner.__name__}": sorted(owner.bl_rna.properties.keys())
-            for owner in (bpy.types.Object, bpy.types.Scene, bpy.types.Mesh, bpy.types.WindowManager)
-        },
-    }
-
-
-def test_switching_off_and_on_leaves_nothing_behind(extension):
-    name = extension.__name__
-    bpy.ops.preferences.addon_disable(module=name)  # with what tests before have added
-    bpy.ops.preferences.addon_enable(module=name)
-    enabled = _registered()
-    assert "MESHFREE_OT_analyze" in enabled["types"]
-    try:
-        bpy.ops.preferences.addon_disable(module=name)
-        disabled = _registered()
-        assert disabled["types"] == []
-        assert disabled["operators"] == []
-        assert "meshfree" not in disabled["properties of Object"]
-        assert not [handler for handler in disabled["handlers"] if name in handler]
-        bpy.ops.preferences.addon_enable(module=name)
-        assert _registered() == enabled
-        bpy.ops.preferences.addon_disable(module=name)
-        assert _registered() == disabled
-    finally:
-        bpy.ops.preferences.addon_enable(module=name)
-    assert _registered() == enabled
 
 
 WITHOUT_SCIPY = """
@@ -404,9 +363,8 @@ folder = user / "extensions/user_default/meshfree_laplacian"
 print("OLD", (folder / "core/former.py").exists())
 install(sys.argv[2])
 print("NEW", (folder / "core/former.py").exists(), obj.meshfree.neighbors, NAME in bpy.context.preferences.addons)
-for _ in range(3):
-    bpy.ops.preferences.addon_disable(module=NAME)
-    bpy.ops.preferences.addon_enable(module=NAME)
+bpy.ops.preferences.addon_disable(module=NAME)
+bpy.ops.preferences.addon_enable(module=NAME)
 print("AGAIN", obj.meshfree.neighbors, len([name for name in dir(bpy.types) if name == "MESHFREE_OT_analyze"]))
 index = next(i for i, repo in enumerate(bpy.context.preferences.extensions.repos) if repo.module == "user_default")
 bpy.ops.extensions.package_uninstall(repo_index=index, pkg_id="meshfree_laplacian")

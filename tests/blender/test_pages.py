@@ -1,6 +1,5 @@
 """What the pages tell to type with Blender works, on small files and clouds of the names that they give."""
 
-import importlib
 import re
 import shlex
 from dataclasses import replace
@@ -118,8 +117,7 @@ def test_code(folder, snippet):
 
 @pytest.mark.any_blender
 @pytest.mark.parametrize(("verb", "options"), ROWS)
-def test_verbs_have_the_options_and_choices_of_the_table(extension, capsys, verb, options):
-    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
+def test_verbs_have_the_options_and_choices_of_the_table(command, capsys, verb, options):
     assert command.run([verb, "--help"]) == 0
     told = capsys.readouterr().out
     for option, choices in re.findall(r"(--[\w-]+)(?: ([A-Z]+(?:\\\|[A-Z]+)+))?", options):

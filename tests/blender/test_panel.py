@@ -1,6 +1,5 @@
 """The panel draws in every state, and dialogs show every setting."""
 
-import importlib
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +10,7 @@ import pytest
 
 from tests import splat_files
 from tests.blender.clouds import add_object, grid_points, sphere_points
+from tests.blender.conftest import part
 from tests.blender.operators import NOT_TOOLS, OPERATORS, tools
 from tests.blender.splats import add_splats, bar_splats
 
@@ -270,8 +270,7 @@ def test_panel_tells_of_parts_boundaries_and_points_left_out_where_there_are_any
 
 
 @pytest.mark.parametrize("method", ["DEFAULT", "PAPER"])
-def test_panel_shows_every_setting_that_changes_results(extension, method):
-    options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
+def test_panel_shows_every_setting_that_changes_results(options, method):
     settings = add_object(sphere_points()).meshfree
     settings.laplacian, settings.boundary_group = method, "Missing"
     texts, own = draw(), options.settings_values(settings)
@@ -372,9 +371,9 @@ def test_adjust_last_operation_offers_what_is_quick(name):
         assert not {"method", "modes", "parts", "wavelength", "handles", "tolerance"} & set(quick)
 
 
-def test_panel_while_something_runs(extension, monkeypatch):
+def test_panel_while_something_runs(monkeypatch):
     add_object(sphere_points())
-    panel = importlib.import_module(f"{extension.__name__}.ui.panel")
+    panel = part("ui.panel")
     monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(label="Smooth Points", stage="Filter", fraction=0.25))
     texts = draw()
     assert "Smooth Points (Esc to Stop)" in texts
@@ -382,8 +381,7 @@ def test_panel_while_something_runs(extension, monkeypatch):
 
 
 @pytest.mark.parametrize(("method", "kind"), [("DEFAULT", "LaplacianOptions"), ("PAPER", "PaperOptions")])
-def test_every_option_of_core_is_a_setting_with_its_default(extension, core, method, kind):
-    options = importlib.import_module(f"{extension.__name__}.operators.objects.options")
+def test_every_option_of_core_is_a_setting_with_its_default(options, core, method, kind):
     settings, kind = add_object(sphere_points()).meshfree, getattr(core, kind)
     settings.laplacian = method
     assert options.laplacian_options(settings) == kind()
@@ -450,8 +448,7 @@ def test_zero_that_leaves_a_setting_open_is_put_into_words():
 
 
 @pytest.mark.parametrize("value", [1234.5678, 12.345678, 0.0123456])
-def test_figures_have_the_digits_that_scans_bear(extension, value):
-    result = importlib.import_module(f"{extension.__name__}.operators.objects.result")
+def test_figures_have_the_digits_that_scans_bear(result, value):
     for text in (result.area_text(value), result.length_text(value)):
         digits = text.split()[0].replace(".", "").replace(",", "").lstrip("0")
         assert len(digits) <= 4, text

@@ -1,23 +1,17 @@
 """PointCloud objects: the same results as on meshes, attributes as groups, points moved in place."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender.clouds import attribute, everything, local_points, result_names
-from tests.blender.test_application import SETTINGS, add_ready, wave
+from tests.blender.test_application import SETTINGS, add_ready, run, wave
 from tests.blender.test_display import display_points
 from tests.blender.test_smooth import rough_sphere
 
 pytestmark = pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
 
 MOVING = ("smooth", "mode_shape", "minimal_surface")
-
-
-def run(name, *arguments, **settings):
-    return getattr(bpy.ops.meshfree, name)(*arguments, **settings)
 
 
 def add_pointcloud(points, name="Points"):
@@ -215,12 +209,11 @@ def test_weights_of_a_converted_vertex_group_are_kept():
     assert np.abs(local_points(cloud) - wave()).max() > 1e-3
 
 
-def test_results_go_stale_when_points_move(extension):
+def test_results_go_stale_when_points_move(result):
     cloud = add_pointcloud(rough_sphere(1000))
     cloud.meshfree.boundary_group = ""
     bpy.ops.meshfree.analyze()
     assert cloud.meshfree.point_count == 1000
-    result = importlib.import_module(f"{extension.__name__}.operators.objects.result")
     assert not result.is_stale(cloud)
     cloud.data.points[0].co.x += 0.1
     assert result.is_stale(cloud)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_object, attribute, everything, sphere_points
+from tests.blender.conftest import part
 from tests.blender.test_display import bounds, dark_share
 
 DISPLAY_SETTINGS = {
@@ -44,8 +45,7 @@ def ramp(display, obj):
 
 
 @pytest.mark.parametrize("name", ["VIRIDIS", "MAGMA", "COOL_WARM", "CYCLIC"])
-def test_maps_by_name_change_the_colors_at_once(module, display, obj, name):
-    colormaps = module("ui.colormaps")
+def test_maps_by_name_change_the_colors_at_once(colormaps, display, obj, name):
     bpy.ops.meshfree.colormap(attribute="lb_area")
     for reverse in (False, True):
         obj.meshfree.color_map, obj.meshfree.reverse = name, reverse
@@ -54,9 +54,9 @@ def test_maps_by_name_change_the_colors_at_once(module, display, obj, name):
         assert np.allclose(places, np.linspace(0.0, 1.0, len(places)))
 
 
-def test_changes_are_edits_of_values_and_compute_nothing(module, display, obj, monkeypatch):
-    monkeypatch.setattr(module("operators.running.cache"), "build", None)
-    monkeypatch.setattr(module("operators.running.cache"), "lowest_modes", None)
+def test_changes_are_edits_of_values_and_compute_nothing(display, obj, monkeypatch):
+    monkeypatch.setattr(part("operators.running.cache"), "build", None)
+    monkeypatch.setattr(part("operators.running.cache"), "lowest_modes", None)
     material = display.find_material(obj)
     before = {node.name: node.as_pointer() for node in material.node_tree.nodes}
     for name, value in DISPLAY_SETTINGS.items():
@@ -119,7 +119,7 @@ def test_locked_range_stays_for_other_attributes_and_can_be_edited(display, obj)
     assert bounds(display, obj) != (-0.25, 2.5)
 
 
-def test_settings_answer_in_edit_mode(module, display, modifiers, obj):
+def test_settings_answer_in_edit_mode(display, modifiers, obj):
     bpy.ops.meshfree.colormap(attribute="lb_area")
     obj.meshfree.range_mode = "DATA"
     before, radius = bounds(display, obj), modifiers.get_input(display.find_display(obj), "Radius")
@@ -128,7 +128,7 @@ def test_settings_answer_in_edit_mode(module, display, modifiers, obj):
     low, high = bounds(display, obj)
     assert before[0] < low < high < before[1]
     for name in ("lb_boundary", "lb_component", "lb_normal"):  # of other types
-        values = module("operators.objects.attributes").read_attribute(obj.data, name)
+        values = part("operators.objects.attributes").read_attribute(obj.data, name)
         bpy.ops.object.mode_set(mode="OBJECT")
         assert (values == attribute(obj, name)).all()
         assert values.dtype == attribute(obj, name).dtype
@@ -138,8 +138,8 @@ def test_settings_answer_in_edit_mode(module, display, modifiers, obj):
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_categories_repeat(module, display, obj):
-    colors = module("ui.colormaps").colors("CATEGORICAL")
+def test_categories_repeat(display, obj):
+    colors = part("ui.colormaps").colors("CATEGORICAL")
     numbers = np.arange(1000) % 20 - 1
     add_values(obj, "part", numbers, "INT")
     bpy.ops.meshfree.colormap(attribute="part", color_map="CATEGORICAL")
@@ -151,13 +151,13 @@ def test_categories_repeat(module, display, obj):
 
 
 @pytest.mark.parametrize("number", [-1, 0, 6, 7, 18])
-def test_categories_are_rendered_in_their_colors(module, display, number, tmp_path):
+def test_categories_are_rendered_in_their_colors(display, number, tmp_path):
     obj = add_object(sphere_points())
     add_values(obj, "part", np.where(np.arange(1000) > 0, number, 18), "INT")
     bpy.ops.meshfree.colormap(attribute="part", color_map="CATEGORICAL", radius=0.1)
     seen = median_color(tmp_path / "part.png")
     expected = np.array(display.step_colors(obj)[str(number)][:3])
-    others = [np.array(color[:3]) for color in module("ui.colormaps").colors("CATEGORICAL")]
+    others = [np.array(color[:3]) for color in part("ui.colormaps").colors("CATEGORICAL")]
     distances = [np.linalg.norm(direction(seen) - direction(color)) for color in others]
     assert np.allclose(others[int(np.argmin(distances))], expected, atol=1e-6)
 
@@ -222,11 +222,7 @@ def test_numbers_of_vectors(display, obj, tmp_path, part, index):
     obj.meshfree.component = part
     number = 5.0 if index is None else vectors[0, index]
     assert (display.shown_values(obj) == number).all()
-    (
-        red,
-        _,
-        blue,
-    ) = median_color(tmp_path / "way.png")
+    (red, _, blue) = median_color(tmp_path / "way.png")
     assert np.sign(red - blue) == np.sign(number) or (number == 0.0 and abs(red - blue) < 0.1)
 
 
@@ -292,8 +288,8 @@ def test_pictures_stay_on_their_plates(overlay, obj, name, title):
             assert 5.0 <= text.y <= picture.height - 5.0
 
 
-def test_legend_says_name_unit_and_round_numbers_inside_the_range(module, display, obj):
-    scale = module("ui.scale")
+def test_legend_says_name_unit_and_round_numbers_inside_the_range(display, obj):
+    scale = part("ui.scale")
     bpy.ops.meshfree.colormap(attribute="lb_mean_curvature")
     found = scale.shown_scale(obj, bpy.context.scene)
     assert (found.title, found.unit) == ("Mean Curvature", "1/m")
@@ -456,11 +452,6 @@ def test_legend_outlives_its_camera(obj):
 
 def title_of(legend):
     return next(part for part in legend.objects if part.type == "FONT" and part["meshfree_legend_part"] == "title")
-
-
-@pytest.fixture
-def legends(module):
-    return module("ui.legend")
 
 
 def test_legend_is_written_anew_on_the_same_objects(legends, obj):
@@ -676,8 +667,7 @@ def test_select_by_range_says_what_is_wrong(obj):
 
 
 @pytest.mark.parametrize("preset", ["DEFAULT", "PAPER", "CLEAN", "NOISY"])
-def test_presets_are_options_of_core(module, core, preset):
-    options = module("operators.objects.options")
+def test_presets_are_options_of_core(options, core, preset):
     obj = add_object(sphere_points())
     obj.meshfree.neighbors, obj.meshfree.regularization = 33, 0.5
     bpy.ops.meshfree.apply_preset(preset=preset)

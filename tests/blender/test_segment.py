@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_group, add_object, attribute, everything, local_points, result_names, sphere_points
+from tests.blender.clouds import add_group, add_object, attribute, local_points, result_names, sphere_points
+from tests.blender.operators import refused
 from tests.blender.test_smooth import key_points
 
 
@@ -45,11 +46,7 @@ def test_separating_keeps_every_point_and_what_it_holds(dumbbell):
     dumbbell.location = (1.0, 2.0, 3.0)
     bpy.ops.meshfree.analyze()
     bpy.ops.meshfree.segment(parts=3)
-    labels, points, areas = (
-        attribute(dumbbell, "lb_segment"),
-        local_points(dumbbell),
-        attribute(dumbbell, "lb_area"),
-    )
+    labels, points, areas = (attribute(dumbbell, "lb_segment"), local_points(dumbbell), attribute(dumbbell, "lb_area"))
     add_group(dumbbell, "Right", points[:, 0] > 0.0)
     bpy.ops.meshfree.separate_by_segment()
     for number, name in enumerate(["Cloud", "Cloud Segment 1", "Cloud Segment 2"]):
@@ -63,17 +60,13 @@ def test_separating_keeps_every_point_and_what_it_holds(dumbbell):
 
 
 def test_separating_without_parts(dumbbell):
-    before = everything(dumbbell)
-    with pytest.raises(RuntimeError, match="has no parts. Segment it first"):
+    with refused(dumbbell, "has no parts. Segment it first"):
         bpy.ops.meshfree.separate_by_segment()
-    assert everything(dumbbell) == before
 
 
 def test_too_many_modes_asked_for(dumbbell):
-    before = everything(dumbbell)
-    with pytest.raises(RuntimeError, match="modes were asked for"):
+    with refused(dumbbell, "modes were asked for"):
         bpy.ops.meshfree.segment(method="NODAL", mode=2000)
-    assert everything(dumbbell) == before
 
 
 @pytest.mark.parametrize("kind", ["HEAT", "WAVE"])
@@ -115,10 +108,8 @@ def test_a_part_is_not_separated_from_itself(dumbbell):
     part = bpy.data.objects["Cloud Segment 2"]
     bpy.context.view_layer.objects.active = part
     dumbbell.select_set(False)
-    before = everything(part)
-    with pytest.raises(RuntimeError, match="are in one part. Segment it"):
+    with refused(part, "are in one part. Segment it"):
         bpy.ops.meshfree.separate_by_segment()
-    assert everything(part) == before
 
 
 def test_the_largest_part_stays(dumbbell):
@@ -133,10 +124,8 @@ def test_separating_one_of_two_linked_duplicates(dumbbell):
     bpy.ops.meshfree.segment(parts=2)
     other = dumbbell.copy()
     bpy.context.scene.collection.objects.link(other)
-    before = everything(dumbbell)
-    with pytest.raises(RuntimeError, match="shares its mesh.*Make Single User"):
+    with refused(dumbbell, "shares its mesh.*Make Single User"):
         bpy.ops.meshfree.separate_by_segment()
-    assert everything(dumbbell) == before
     dumbbell.meshfree.make_single_user = True
     assert bpy.ops.meshfree.separate_by_segment() == {"FINISHED"}
     assert len(dumbbell.data.vertices) < len(other.data.vertices) == 2500
@@ -145,10 +134,8 @@ def test_separating_one_of_two_linked_duplicates(dumbbell):
 def test_groups_that_cannot_be_replaced(dumbbell):
     group = add_group(dumbbell, "Segment 1", [0])
     group.lock_weight = True
-    before = everything(dumbbell)
-    with pytest.raises(RuntimeError, match="Segment 1 of .* are locked.*Unlock"):
+    with refused(dumbbell, "Segment 1 of .* are locked.*Unlock"):
         bpy.ops.meshfree.segment(vertex_groups=True)
-    assert everything(dumbbell) == before
     dumbbell.vertex_groups.remove(group)
     dumbbell.data.attributes.new("Segment 1", "FLOAT", "POINT")
     with pytest.raises(RuntimeError, match="attributes named Segment 1.*Rename"):

@@ -9,8 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import everything
-from tests.blender.test_all_or_nothing import film, handled, keyed
+from tests.blender.test_all_or_nothing import film, handled, keyed, scene
 
 COUNT = int(os.environ.get("MESHFREE_SEQUENCES", "12"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))
@@ -52,11 +51,6 @@ STEPS = [
     ("convert", {}),
     ("convert", {"target": "MESH"}),
 ]
-
-
-def scene():
-    """All that the objects hold."""
-    return {obj.name: everything(obj) for obj in bpy.data.objects}
 
 
 def move_handle(obj):

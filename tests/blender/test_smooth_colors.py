@@ -1,7 +1,5 @@
 """Colors that run on from one disc to the next: slopes of what is shown, iso lines of one width, and shading."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
@@ -159,9 +157,8 @@ def test_slopes_follow_the_values_and_the_points(obj):
     assert_allclose(attribute(obj, SLOPES[0]), before, atol=1e-3)
 
 
-def test_settings_of_colors_compute_no_slopes_anew(extension, obj, monkeypatch):
+def test_settings_of_colors_compute_no_slopes_anew(core, obj, monkeypatch):
     show(obj, "height")
-    core = importlib.import_module(f"{extension.__name__}.core")
     monkeypatch.setattr(core.Slopes, "of", None)
     obj.meshfree.reverse, obj.meshfree.iso_lines, obj.meshfree.shaded = True, 7, 1.0
     assert rise(obj) is not None

@@ -1,12 +1,11 @@
 """Colors of results in viewports in Solid, which know no materials: what the display gives to the color attribute."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 
 from tests.blender.clouds import CORNERS, add_object, attribute, sphere_points
+from tests.blender.conftest import part
 
 SOLID = ".lb_color"
 
@@ -42,31 +41,31 @@ def show(obj, **settings):
     bpy.ops.meshfree.colormap(attribute="height")
 
 
-def ramp(extension, values, name="VIRIDIS"):
-    colors = np.array(importlib.import_module(f"{extension.__name__}.ui.colormaps").colors(name))
+def ramp(values, name="VIRIDIS"):
+    colors = np.array(part("ui.colormaps").colors(name))
     place = np.clip(0.5 * values + 0.5, 0.0, 1.0) * (len(colors) - 1)
     return np.stack([np.interp(place, range(len(colors)), column) for column in colors.T], axis=1)
 
 
-def test_discs_have_the_colors_of_the_map_all_over(shown, extension):
+def test_discs_have_the_colors_of_the_map_all_over(shown):
     show(shown, color_map="VIRIDIS")
     colors, places = colors_drawn(shown, SOLID)
     assert drawn(shown).color_attributes.active_color_name == SOLID
     near = np.abs(places[:, 2]) < 0.9  # there the height is nearly linear
-    off = np.abs(colors - ramp(extension, places[:, 2]))[near]
+    off = np.abs(colors - ramp(places[:, 2]))[near]
     assert np.percentile(off, 99) < 0.06
     shown.meshfree.smooth = False
-    flat = np.abs(colors_drawn(shown, SOLID)[0] - ramp(extension, places[:, 2]))[near]
+    flat = np.abs(colors_drawn(shown, SOLID)[0] - ramp(places[:, 2]))[near]
     assert np.percentile(flat, 99) > 2.0 * np.percentile(off, 99)
 
 
-def test_colors_of_the_points_own_stay_and_come_back(shown, extension):
+def test_colors_of_the_points_own_stay_and_come_back(shown):
     layer = shown.data.color_attributes.new("Photo", "BYTE_COLOR", "POINT")
     layer.data.foreach_set("color", np.tile([1.0, 0.0, 0.0, 1.0], 1500))
     shown.data.color_attributes.active_color_name = "Photo"
     show(shown, color_map="VIRIDIS", smooth=False)
     colors, _ = colors_drawn(shown, "Photo")
-    wanted = ramp(extension, attribute(shown, "height").astype(float))
+    wanted = ramp(attribute(shown, "height").astype(float))
     assert np.abs(colors.reshape(1500, -1, 4)[:, 0] - wanted).max() < 1e-5
     assert shown.data.color_attributes.active_color_name == "Photo"
     bpy.ops.meshfree.colormap(attribute="Photo")
@@ -74,7 +73,7 @@ def test_colors_of_the_points_own_stay_and_come_back(shown, extension):
     assert SOLID not in shown.data.attributes
 
 
-def test_colors_that_change_in_edit_mode_are_there_after_it(shown, extension):
+def test_colors_that_change_in_edit_mode_are_there_after_it(shown):
     show(shown, color_map="VIRIDIS")
     bpy.ops.object.mode_set(mode="EDIT")
     shown.meshfree.color_map = "COOL_WARM"
@@ -83,14 +82,14 @@ def test_colors_that_change_in_edit_mode_are_there_after_it(shown, extension):
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
     colors, places = colors_drawn(shown, SOLID)
-    off = np.abs(colors - ramp(extension, places[:, 2], "COOL_WARM"))[np.abs(places[:, 2]) < 0.9]
+    off = np.abs(colors - ramp(places[:, 2], "COOL_WARM"))[np.abs(places[:, 2]) < 0.9]
     assert np.percentile(off, 99) < 0.06
 
 
 @pytest.mark.parametrize("settings", [{"iso_lines": 5}, {"outside": "HIDE"}], ids=str)
-def test_what_solid_cannot_show_is_left_to_materials(shown, settings, extension):
+def test_what_solid_cannot_show_is_left_to_materials(shown, settings):
     show(shown, **settings)
-    assert not importlib.import_module(f"{extension.__name__}.ui.display").is_in_solid(shown)
+    assert not part("ui.display").is_in_solid(shown)
 
 
 @pytest.mark.parametrize("editor", ["VIEW_3D", "PROPERTIES"])

@@ -1,13 +1,12 @@
 """Vibration modes of the active object against the same call through core."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_object, attribute, local_points, result_names, sphere_points
+from tests.blender.conftest import part
 
 
 @pytest.fixture
@@ -51,15 +50,12 @@ def test_default_limit_is_50(obj):
 def test_fewer_modes_remove_the_surplus(obj):
     bpy.ops.meshfree.spectrum(count=6)
     bpy.ops.meshfree.spectrum(count=2)
-    assert [name for name in result_names(obj) if "eigenvector" in name] == [
-        "lb_eigenvector_001",
-        "lb_eigenvector_002",
-    ]
+    assert [name for name in result_names(obj) if "eigenvector" in name] == ["lb_eigenvector_001", "lb_eigenvector_002"]
     assert len(obj["lb_eigenvalues"]) == 2
 
 
-def test_repeating_re_uses_the_operator(extension, core, obj, monkeypatch):
-    cache = importlib.import_module(f"{extension.__name__}.operators.running.cache")
+def test_repeating_re_uses_the_operator(core, obj, monkeypatch):
+    cache = part("operators.running.cache")
     built, curved = [], []
     build, curve = core.build_laplacian, core.mean_curvature
     monkeypatch.setattr(core, "build_laplacian", lambda *args, **rest: built.append(1) or build(*args, **rest))

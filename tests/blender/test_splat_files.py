@@ -27,11 +27,7 @@ def exported(core, path, **settings):
     return core.read_splats(path)
 
 
-KINDS = {
-    "a.splat": splat_files.make_splat,
-    "a.spz": splat_files.make_spz,
-    "a.ply": splat_files.make_packed,
-}
+KINDS = {"a.splat": splat_files.make_splat, "a.spz": splat_files.make_spz, "a.ply": splat_files.make_packed}
 
 
 @pytest.mark.parametrize("name", KINDS)

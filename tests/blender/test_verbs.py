@@ -1,13 +1,12 @@
 """Verbs of the command line for meshes, comparison, sides of normals, and what starts at sources."""
 
-import importlib
-
 import bpy
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.blender.clouds import add_group, add_object, attribute, grid_points, local_points, sphere_points
+from tests.blender.conftest import part
 from tests.blender.test_command import run  # noqa: F401
 
 FAR = np.array([400_000.0, 5_000_000.0, 100.0])
@@ -15,9 +14,9 @@ POINTS = sphere_points(1500)
 
 
 @pytest.fixture
-def read(extension):
+def read():
     """Read a file of points."""
-    return importlib.import_module(f"{extension.__name__}.core.files").read_points
+    return part("core.files").read_points
 
 
 def write(path, points, **columns):
@@ -110,9 +109,10 @@ class TestMesh:
         assert outwards(middles, rows["normal"]).all()
 
 
+@pytest.mark.any_blender
 class TestCompare:
-    def test_clouds_in_a_national_grid_that_are_shifted_by_different_amounts(self, extension, run, read, tmp_path):  # noqa: F811
-        origin = importlib.import_module(f"{extension.__name__}.core.files").choose_origin
+    def test_clouds_in_a_national_grid_that_are_shifted_by_different_amounts(self, run, read, tmp_path):  # noqa: F811
+        origin = part("core.files").choose_origin
         plan = np.vstack([sphere_points(2000, seed=1), sphere_points(2000, seed=2) + (40.0, 0.0, 0.0)]) + FAR
         scan = 1.1 * POINTS + FAR
         assert (origin(plan) != origin(scan)).any()
@@ -134,7 +134,7 @@ class TestCompare:
         assert_allclose(table.attributes["lb_deviation"], 0.1, atol=3e-3)
         assert (table.attributes["lb_compared"] == 1).all()
 
-    def test_the_reference_is_analyzed_once_for_all(self, extension, core, run, tmp_path, monkeypatch):  # noqa: F811
+    def test_the_reference_is_analyzed_once_for_all(self, extension, core, cache, run, tmp_path, monkeypatch):  # noqa: F811
         build, built = core.build_laplacian, []
 
         def counted(points, **settings):
@@ -164,7 +164,6 @@ class TestCompare:
         assert code == 1
         assert "with --reference-object: Plan, Scan" in line["error"]
 
-    @pytest.mark.any_blender
     def test_what_is_far_away_is_not_compared(self, run, tmp_path):  # noqa: F811
         write(tmp_path / "plan.csv", POINTS)
         both = np.vstack([sphere_points(1100), sphere_points(1000, seed=1) + (9.0, 0.0, 0.0)])
@@ -203,6 +202,7 @@ class TestCompare:
         assert plan.read_bytes() == before
 
 
+@pytest.mark.any_blender
 class TestOrient:
     @pytest.mark.parametrize("flip", [False, True])
     @pytest.mark.parametrize("height", [5.0, -5.0])
@@ -276,6 +276,7 @@ class TestOrient:
         assert 'no object "Nobody"' in line["error"]
 
 
+@pytest.mark.any_blender
 class TestSources:
     def test_distance_from_places_in_a_national_grid(self, run, read, tmp_path):  # noqa: F811
         points = np.vstack([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], sphere_points(3000)])
@@ -462,8 +463,7 @@ def test_wrong_usage(run, tmp_path, monkeypatch, arguments):  # noqa: F811
 
 @pytest.mark.any_blender
 @pytest.mark.parametrize("verb", ["mesh", "compare", "orient", "geodesic-distance", "harmonic-field", "deform"])
-def test_help(extension, capfd, verb):
-    command = importlib.import_module(f"{extension.__name__}.operators.files.command")
+def test_help(command, capfd, verb):
     assert command.run([verb, "--help"]) == 0
     shown = capfd.readouterr().out
     assert "JSON line per input" in " ".join(shown.split())

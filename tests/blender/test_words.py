@@ -6,6 +6,7 @@ import bpy
 import pytest
 
 from operators.objects.quantities import QUANTITIES
+from tests.blender.test_manual import operators
 
 # Words that stay small within a label, and names that are not written as others are.
 SMALL = {"a", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "the", "to", "with"}
@@ -21,10 +22,6 @@ WITH_UNIT = re.compile(r"distance|radius|amplitude|wavelength|phase|area$|angle|
 OF_BLENDER = {"rna_type"}
 # Beyond these a number has no bound worth the name.
 LARGEST = {"INT": 2**31 - 1, "FLOAT": 3.4e38}
-
-
-def operators():
-    return {name: getattr(bpy.ops.meshfree, name).get_rna_type() for name in dir(bpy.ops.meshfree)}
 
 
 def groups():

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-WORKING = "[operator.bl_idname for operator in main_window().modal_operators]"
-ANALYZED = "'lb_area' in bpy.context.object.data.attributes"
+from tests.gui import test_play
+from tests.gui.test_play import ANALYZED, UNCHANGED, WORKING, finish, shading
+
 NEIGHBORS = "bpy.context.object.meshfree.neighbors"
 SIDEBAR = "view3d()[0].spaces.active.show_region_ui"
 PRESET_FILES = """
@@ -28,16 +29,8 @@ bpy.context.window_manager.clipboard.splitlines()
 
 
 def add_sphere(gui, count=1000, noise=0.0):
-    gui.python(
-        f"""
-points = sphere_points({count})
-points *= 1.0 + {noise} * np.random.default_rng(1).standard_normal((len(points), 1))
-add_object(points).select_set(True)
-view3d()[0].spaces.active.shading.type = "WIREFRAME"
-bpy.ops.ed.undo_push(message="Cloud")
-before = everything(bpy.context.object)
-"""
-    )
+    shading(gui, "WIREFRAME")
+    test_play.add_sphere(gui, count, noise)
     gui.settle()
 
 
@@ -131,7 +124,7 @@ class TestView:
         gui.wait_until("view3d()[0].spaces.active.local_view is None")
         gui.wait_for(lambda: drawn() == pytest.approx(shown, rel=0.1), "the legend is drawn as before")
 
-    def test_the_mouse_drags_the_legend(self, gui):
+    def test_the_legend_is_dragged_by_the_mouse_and_there_where_colors_are(self, gui):
         add_sphere(gui)
         gui.python("bpy.ops.meshfree.analyze(); bpy.ops.ed.undo_push(message='Analyzed')")
         gui.python(COLORED)
@@ -151,14 +144,8 @@ class TestView:
         gui.key("ctrl+z")
         gui.wait_until(f"{place} == [1.0, 0.0]")
         gui.wait_for(lambda: drawn() > 1000, "undo brings it back")
-
-    def test_the_legend_is_there_where_colors_are(self, gui):
-        add_sphere(gui)
-        gui.python("bpy.ops.meshfree.analyze()")
-        gui.python(COLORED)
-        gui.wait_for(lambda: colors(gui.pixels(corner(gui))) > 1000, "the legend is drawn")
-        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
-        gui.wait_for(lambda: colors(gui.pixels(corner(gui))) < 100, "no legend without colors")
+        shading(gui, "WIREFRAME")
+        gui.wait_for(lambda: drawn() < 100, "no legend without colors")
 
     def test_the_active_object_outside_of_the_local_view(self, gui):
         add_sphere(gui)
@@ -166,7 +153,6 @@ class TestView:
         gui.python("bpy.context.view_layer.objects.active = bpy.data.objects['Cloud']")
         gui.python("bpy.ops.meshfree.analyze()")
         gui.python("bpy.data.objects['Cloud'].select_set(False); other.select_set(True)")
-        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
         gui.point_at_view()
         gui.key("KP_Divide")
         gui.wait_until("view3d()[0].spaces.active.local_view is not None")
@@ -216,8 +202,8 @@ class TestSidebar:
         assert gui.python(f"bool({WORKING})")
         gui.shot("sidebar_while_it_works")
         gui.key("Escape")
-        gui.wait_until(f"not {WORKING}", 10)
-        assert gui.python("everything(bpy.data.objects['Cloud']) == before")
+        finish(gui, 10)
+        assert gui.python(UNCHANGED)
 
     @pytest.mark.parametrize("opened", ["MESHFREE_PT_segment"], indirect=True)
     def test_a_gray_button_says_why(self, opened):
@@ -237,7 +223,7 @@ class TestSidebar:
         gui.open_tab()
         gui.press("meshfree.analyze")
         gui.wait_until(ANALYZED, 60)
-        gui.wait_until(f"not {WORKING}")
+        finish(gui)
         notices = "[told.text for told in bpy.context.object.meshfree.notices]"
         told = gui.python(notices)
         assert told
@@ -253,7 +239,7 @@ class TestSidebar:
         gui.open_tab()
         gui.press("meshfree.analyze")
         gui.wait_until(ANALYZED, 60)
-        gui.wait_until(f"not {WORKING}")
+        finish(gui)
         gui.settle()
         assert gui.python("bpy.context.window_manager.operators[-1].name") == "Analyze Points"
         lines = gui.python(INFO_LOG)

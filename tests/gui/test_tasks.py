@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.gui.test_play import add_sphere, colored, finish
+from tests.gui.test_play import UNCHANGED, add_sphere, colored, finish, shading
 
 EGG = """
 import os
@@ -25,10 +25,7 @@ TASKS = {
     "deform_bind": "bpy.context.object.name == 'Cloud Handle'",
 }
 # By what the search finds: the attribute, and what it is at a point where the surface faces the viewer.
-PICKED = [
-    ("Unwrap Around Point", "lb_uv", [0.5, 0.5]),
-    ("Extend Direction", "lb_direction", [0.0, 0.0, -1.0]),
-]
+PICKED = [("Unwrap Around Point", "lb_uv", [0.5, 0.5]), ("Extend Direction", "lb_direction", [0.0, 0.0, -1.0])]
 SELECTED = """
 import bmesh
 [vertex.index for vertex in bmesh.from_edit_mesh(bpy.context.object.data).verts if vertex.select]
@@ -75,7 +72,7 @@ class TestTasks:
     @pytest.mark.parametrize(("task", "done"), TASKS.items(), ids=TASKS.keys())
     def test_one_click(self, gui, task, done):
         add_sphere(gui, 1500, 0.01)
-        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        shading(gui, "WIREFRAME")
         gui.open_tab()
         assert not gui.python(done)
         gui.press(f"meshfree.{task}", across=0.35 if task in ("smooth", "principal_curvatures") else 0.75)
@@ -85,7 +82,7 @@ class TestTasks:
         gui.point_at_view()
         gui.key("ctrl+z")
         gui.wait_until(f"bpy.context.object.name == 'Cloud' and not ({done})")
-        assert gui.python("everything(bpy.data.objects['Cloud']) == before")
+        assert gui.python(UNCHANGED)
 
 
 class TestSelection:
@@ -134,7 +131,7 @@ class TestPicked:
     @pytest.mark.parametrize(("name", "attribute", "there"), PICKED)
     def test_a_clicked_point_is_the_source(self, gui, name, attribute, there):
         add_sphere(gui, 1500)
-        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        shading(gui, "WIREFRAME")
         gui.key("KP_1", "Home", "Tab", "alt+a")
         gui.wait_until("bpy.context.object.mode == 'EDIT'")
         nearest = gui.python("points[:, 1].argmin()")
@@ -157,7 +154,7 @@ class TestAdjusting:
 
     def test_flip_the_normals(self, gui):
         add_sphere(gui, 1500)
-        gui.python("view3d()[0].spaces.active.shading.type = 'WIREFRAME'")
+        shading(gui, "WIREFRAME")
         gui.search("Mesh-Free Orient Normals")
         gui.key("Return")
         gui.wait_until("'lb_normal' in bpy.context.object.data.attributes", 90)
