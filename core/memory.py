@@ -13,7 +13,7 @@ from .options import LaplacianOptions
 _PER_NEIGHBOR = 42
 _ALONE = 43  # neighbours that would take as much as what each point needs for itself
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
-_ADAPTIVE = 0.13  # neighbours of "adaptive" kernels against "local" ones on random points, which have the most
+_ADAPTIVE = 60  # neighbours in "adaptive" kernels on random points, which have the most
 _SHARE = 0.8  # of the free memory, to leave some for other programs
 _CGROUP = Path("/sys/fs/cgroup")
 
@@ -35,8 +35,8 @@ def needed_memory(count: int, options: LaplacianOptions, modes: int = 0) -> int:
     int
         Bytes. Those of random points, which have the widest kernels; even samples take half.
     """
-    share = _ADAPTIVE if options.bandwidth == "adaptive" else 1.0
-    neighbors = 9.0 * share * options.bandwidth_factor**2 * options.neighbors  # inside of 3 h
+    inside = _ADAPTIVE if options.bandwidth == "adaptive" else 9.0 * options.neighbors  # of 3 h
+    neighbors = inside * options.bandwidth_factor**2
     return int(count * (_PER_NEIGHBOR * (neighbors + _ALONE) + _PER_MODE * modes))
 
 

@@ -12,7 +12,7 @@ from .moments import least_error
 from .nearest import ROUNDS, Nearest
 from .quadrics import Quadrics
 
-_NARROWEST = 0.108  # h over the radius of the cells, by the root of the neighbours of the options, 100
+_NARROWEST = 1.08  # h over the radius of the cells
 _WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
 _MET = 3e-3  # relative error of the moments that no wider kernel is tried for
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
@@ -59,7 +59,7 @@ def smoothing_lengths(
         some 15 others inside it then, random ones 60.
     """
     if options.bandwidth == "adaptive":
-        lengths = _NARROWEST * np.sqrt(options.neighbors) * mean_gaps(nearest, cells.radius, _POWER)
+        lengths = _NARROWEST * mean_gaps(nearest, cells.radius, _POWER)
         wider = _widening(nearest, normals, quadrics, cells, boundary, lengths)
         return options.bandwidth_factor * wider * lengths
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
