@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..algebra import blocks, on_all_cores
 from ..arguments import check_switches
 from ..errors import InvalidPointsError
-from ..geometry import as_indices, as_mask, circle_arc, pair_heights
+from ..geometry import SMOOTH, as_indices, as_mask, circle_arc, pair_heights, same_sheet
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
 from .graph import mean_spacing
@@ -22,6 +22,7 @@ _CURVED = 0.35  # sine of half the angle between two normals, at most, at which 
 _SQUARE = 0.1  # cosine of two normals below which they are nearly perpendicular
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 _WITHIN = (1.5, 6.0, np.inf)  # straight distances within which a path between two points is searched, one by one
+_FEW = 40  # pairs of a point, whose directions are too few for a path to be straight: neighbours' neighbours join them
 _GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point, if a surface is there
 
 
@@ -396,12 +397,9 @@ def _known_sources(laplacian: LaplaceBeltrami, sources: ArrayLike) -> tuple[Bool
 
 
 def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[[], None]) -> sparse.csr_array:
-    """Return the symmetric (n, n) CSR matrix of the lengths of all pairs of the operator."""
-    stiffness, points = laplacian.stiffness, laplacian.surface_points
-    count = len(points)
-    first = np.repeat(np.arange(count, dtype=np.int32), np.diff(stiffness.indptr))
-    once = first < stiffness.indices
-    first, second = first[once], stiffness.indices[once]
+    """Return the symmetric (n, n) CSR matrix of the lengths of all pairs of the operator, and of more where few are."""
+    points, count = laplacian.surface_points, len(laplacian.points)
+    first, second, added = _pairs(laplacian.stiffness)
     spacing = mean_spacing(laplacian)
     arcs = np.empty(len(first))
     kept = np.empty(len(first), dtype=bool)
@@ -419,9 +417,14 @@ def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[[], None]) ->
         sine = np.minimum(0.5 * rise / np.maximum(length, 1e-300), 1.0)
         arcs[block] = circle_arc(length, sine)
         short = length < 0.5 * (laplacian.smoothing_lengths[i] + laplacian.smoothing_lengths[j])
-        kept[block] = short | (sine < _CURVED)
+        flat = sine < _CURVED
+        apart = added[block] & flat  # not pairs of the operator: their sheet is to be told
+        near = 0.5 * (spacing[i[apart]] + spacing[j[apart]])
+        on_one = same_sheet(left[apart], right[apart], cosine[apart], length[apart], near)
+        flat[apart] = on_one & (cosine[apart] > SMOOTH)
+        kept[block] = (short & ~added[block]) | flat
         # The straight segment between two points near a boundary may cross a hole or a bay.
-        doubtful = np.flatnonzero(kept[block] & laplacian.near_boundary[i] & laplacian.near_boundary[j] & ~short)
+        doubtful = np.flatnonzero(kept[block] & (laplacian.near_boundary[i] | laplacian.near_boundary[j]) & ~short)
         middle = 0.5 * (points[i[doubtful]] + points[j[doubtful]])
         height = 0.25 * length[doubtful] * sine[doubtful]
         radius = _GAP * 0.5 * (spacing[i[doubtful]] + spacing[j[doubtful]]) + height
@@ -446,3 +449,24 @@ def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[[], None]) ->
     other = half.T.tocsr()
     report()
     return half + other
+
+
+def _pairs(stiffness: sparse.csr_array) -> tuple[Ints, Ints, Bools]:
+    """Return the ends of the operator's pairs, and of those with the neighbours' neighbours of points that have few.
+
+    Returns
+    -------
+    first, second : ndarray, (p,) int
+        In the order of the rows of the upper triangle.
+    added : ndarray, (p,) bool
+        The pairs that the operator does not have.
+    """
+    ones = np.ones(stiffness.nnz, dtype=np.float32)
+    coupled = sparse.csr_array((ones, stiffness.indices, stiffness.indptr), shape=stiffness.shape)
+    few = np.flatnonzero(np.diff(stiffness.indptr) <= _FEW)
+    if len(few):
+        reached = (coupled[few] @ coupled).tocoo()
+        more = sparse.csr_array((np.full(reached.nnz, 0.5), (few[reached.row], reached.col)), shape=stiffness.shape)
+        coupled = coupled + more.maximum(more.T)
+    upper = sparse.triu(coupled, 1, format="coo")
+    return upper.row, upper.col, upper.data < 1.0

@@ -19,7 +19,8 @@ from .sizes import SurfaceSize, match_size
 
 _KEPT = (None, "area", "volume")
 _TOLERANCE = 1e-5  # of the factors: the coordinates are large next to the spacing
-_DETAIL = 6.0  # smoothing lengths of a wavelength below which details count as roughness
+_NOISE = 1.25  # mean squares of the smoothing lengths: time that removes the noise of single points
+_DETAIL = 9.0  # smoothing lengths of a wavelength below which details count as roughness
 _AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 
@@ -155,8 +156,8 @@ def fair_points(
     ----------
     laplacian : LaplaceBeltrami
     time : float, optional
-        [L^2]. Details of a wavelength below ``2 pi sqrt(time)`` are more than halved. If not given, half the mean
-        square of the smoothing lengths, which removes the noise of single points.
+        [L^2]. Details of a wavelength below ``2 pi sqrt(time)`` are more than halved. If not given, 1.25 times
+        the mean square of the smoothing lengths, which removes the noise of single points.
     order : int
         1, 2 or 3: the higher, the sharper the cutoff.
     strength, mask, keep, dirichlet, progress, base
@@ -202,7 +203,7 @@ def fair_points(
     """
     if time is None:
         known = laplacian.component >= 0
-        time = 0.5 * float(np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known]))
+        time = _NOISE * float(np.average(laplacian.smoothing_lengths[known] ** 2, weights=laplacian.areas[known]))
     return smooth_points(
         laplacian,
         fairing(time, order),
@@ -226,7 +227,7 @@ def roughness(
         Its normals must agree in sign, as estimated ones do.
     wavelength : float, optional
         Wavelength [L] of which half counts as roughness: finer details count fully, wider ones as shape. If not given,
-        6 times the median smoothing length.
+        9 times the median smoothing length.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 

@@ -13,5 +13,6 @@ from .patches import Patch
 from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import along_curves, check_surface, frames
+from .sheets import same_sheet
 from .subset import blue_noise_subset
 from .thinning import nearest_in_blocks, thin
