@@ -76,7 +76,7 @@ def check_memory(count: int, options: LaplacianOptions, modes: int = 0) -> None:
         raise NotEnoughMemoryError(
             f"{count:,} points would take about {needed_memory(count, options, modes) / 2**30:.1f} GB of memory, and"
             f" {free / 2**30:.1f} GB are free: enough for {_rounded(most):,} points. Use fewer points,"
-            " fewer neighbors, or free memory.",
+            " a narrower kernel, or free memory.",
             fitting=most,
         )
 

@@ -32,8 +32,8 @@ class LaplacianOptions:
         "local", "global": the smoothing length is measured by the distance to this neighbour. There must be more points
         than that.
     bandwidth_factor : float
-        "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on the chosen
-        length. The radius of the kernel is 3 h.
+        "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on
+        the narrowest length, which is wider where the points ask for it. The radius of the kernel is 3 h.
     boundary : {"auto", "off"}
         "auto": detect the boundary, unless it is given, and mirror the points there. "off": take the surface as closed.
     sheets : bool

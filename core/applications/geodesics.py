@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..algebra import blocks, on_all_cores
 from ..arguments import check_switches
 from ..errors import InvalidPointsError
-from ..geometry import SMOOTH, as_indices, as_mask, circle_arc, pair_heights, same_sheet
+from ..geometry import SMOOTH, as_indices, as_mask, circle_arc, find_pairs, move_apart, pair_heights, same_sheet
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
 from .graph import mean_spacing
@@ -22,7 +22,8 @@ _CURVED = 0.35  # sine of half the angle between two normals, at most, at which 
 _SQUARE = 0.1  # cosine of two normals below which they are nearly perpendicular
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 _WITHIN = (1.5, 6.0, np.inf)  # straight distances within which a path between two points is searched, one by one
-_FEW = 40  # pairs of a point, whose directions are too few for a path to be straight: neighbours' neighbours join them
+_ENOUGH = 90  # pairs of a point, of which there are straight paths in all directions
+_WIDEST = 1.6  # reach of pairs that are added where there are fewer, over that of the operator's
 _GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point, if a surface is there
 
 
@@ -399,7 +400,7 @@ def _known_sources(laplacian: LaplaceBeltrami, sources: ArrayLike) -> tuple[Bool
 def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[[], None]) -> sparse.csr_array:
     """Return the symmetric (n, n) CSR matrix of the lengths of all pairs of the operator, and of more where few are."""
     points, count = laplacian.surface_points, len(laplacian.points)
-    first, second, added = _pairs(laplacian.stiffness)
+    first, second, added = _pairs(laplacian)
     spacing = mean_spacing(laplacian)
     arcs = np.empty(len(first))
     kept = np.empty(len(first), dtype=bool)
@@ -451,8 +452,8 @@ def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[[], None]) ->
     return half + other
 
 
-def _pairs(stiffness: sparse.csr_array) -> tuple[Ints, Ints, Bools]:
-    """Return the ends of the operator's pairs, and of those with the neighbours' neighbours of points that have few.
+def _pairs(laplacian: LaplaceBeltrami) -> tuple[Ints, Ints, Bools]:
+    """Return the ends of the operator's pairs, and of those within a wider reach of points that have few.
 
     Returns
     -------
@@ -461,12 +462,16 @@ def _pairs(stiffness: sparse.csr_array) -> tuple[Ints, Ints, Bools]:
     added : ndarray, (p,) bool
         The pairs that the operator does not have.
     """
+    stiffness = laplacian.stiffness
     ones = np.ones(stiffness.nnz, dtype=np.float32)
-    coupled = sparse.csr_array((ones, stiffness.indices, stiffness.indptr), shape=stiffness.shape)
-    few = np.flatnonzero(np.diff(stiffness.indptr) <= _FEW)
-    if len(few):
-        reached = (coupled[few] @ coupled).tocoo()
-        more = sparse.csr_array((np.full(reached.nnz, 0.5), (few[reached.row], reached.col)), shape=stiffness.shape)
-        coupled = coupled + more.maximum(more.T)
-    upper = sparse.triu(coupled, 1, format="coo")
+    pairs = sparse.csr_array((ones, stiffness.indices, stiffness.indptr), shape=stiffness.shape)
+    known = np.flatnonzero(laplacian.component >= 0)
+    wider = np.sqrt(_ENOUGH / np.maximum(np.diff(stiffness.indptr)[known], 1))
+    if np.any(wider > 1.0):
+        reach = np.clip(wider, 1.0, _WIDEST) * laplacian.smoothing_lengths[known]
+        tree = cKDTree(move_apart(laplacian.surface_points[known], laplacian.component[known]))
+        ends = np.sort(find_pairs(tree, reach)[:2], axis=0)
+        half = np.full(ends.shape[1], 0.5, dtype=np.float32)
+        pairs = pairs + sparse.csr_array((half, tuple(known[ends])), shape=stiffness.shape)
+    upper = sparse.triu(pairs, 1, format="csr").tocoo()
     return upper.row, upper.col, upper.data < 1.0

@@ -74,7 +74,7 @@ def test_the_operator_moves_with_the_points(cloud, change):
     size = np.abs(before.gaussian_curvature).max() + 1.0
     np.testing.assert_allclose(scale**2 * after.gaussian_curvature, before.gaussian_curvature[order], atol=1e-9 * size)
     size = np.abs(cloud.applied).max()
-    exact = 1e-6 if turn is TURN else 1e-7  # weights are worked out along axes in the tangent plane, in seven digits
+    exact = 3e-6 if turn is TURN else 1e-7  # weights are worked out along axes in the tangent plane, in seven digits
     np.testing.assert_allclose(
         scale**2 * after.apply(cloud.function[order]), cloud.applied[order], rtol=0.0, atol=exact * size
     )

@@ -66,7 +66,7 @@ def test_a_mass_comes_onto_the_diagonal(sphere):
 
 def test_pairs_that_face_opposite_ways_are_left_out(square):
     normals = square.normals.copy()
-    turned = np.arange(1600) % 7 == 0
+    turned = np.arange(1600) % 3 == 0
     normals[turned] *= -1.0
     matrix = connection_laplacian(square.stiffness, normals, tangent_frames(normals)).tocoo()
     assert not np.any(turned[matrix.row] != turned[matrix.col])
