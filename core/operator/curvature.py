@@ -62,7 +62,8 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     Returns
     -------
     ndarray, (n,)
-        Mean of the two principal curvatures [1 / L], averaged over the kernel; where that extends beyond a boundary,
+        Mean of the two principal curvatures [1 / L], averaged over the kernel, without what changes from each point to
+        its neighbours, which is noise; where the kernel extends beyond a boundary,
         `LaplaceBeltrami.quadric_mean_curvature`.
 
     See Also
@@ -88,7 +89,18 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     centered = points - points.mean(axis=0)
     curvature = -0.5 * np.einsum("ij,ij->i", laplacian.apply(centered), laplacian.normals)
     # At a boundary the natural operator takes the surface as level across it.
-    return np.where(laplacian.near_boundary, laplacian.quadric_mean_curvature, curvature)
+    edge = laplacian.near_boundary
+    curvature = np.where(edge, laplacian.quadric_mean_curvature, curvature)
+    return np.where(edge, curvature, curvature - _off_neighbors(laplacian, _off_neighbors(laplacian, curvature)))
+
+
+def _off_neighbors(laplacian: LaplaceBeltrami, values: Floats) -> Floats:
+    """Return how far values are off the mean of their neighbours by the weights of the stiffness, (n,).
+
+    Twice of it is of fourth order for what varies with the place, and all of what changes from point to point.
+    """
+    weight = laplacian.stiffness.diagonal()
+    return (laplacian.stiffness @ values) / np.where(weight > 0.0, weight, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
