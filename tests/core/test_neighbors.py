@@ -5,9 +5,8 @@ from scipy.spatial.distance import cdist
 
 from benchmarks.samplings import random_sphere, uneven_sphere
 from core.geometry import patches
-from core.geometry.bandwidth import smoothing_lengths
 from core.geometry.cloud import read_cloud
-from core.geometry.nearest import find_nearest, nearest_rows, typical_distance
+from core.geometry.nearest import nearest_rows, typical_distance
 from core.geometry.pairs import Pairs, find_pairs
 from core.options import LaplacianOptions
 

@@ -137,8 +137,9 @@ def test_parallel_sheets():
 def test_closed_plate():
     points, face, inset, area = closed_plate()
     laplacian = core.build_laplacian(points)
-    around = 2.0 * inset + 2.0  # the way from face to face
-    assert crossing_pairs(laplacian, np.where(around > 3.0 * laplacian.smoothing_lengths.max(), face, -1)) == 0
+    around = 2.0 * inset + 2.0  # the way from face to face; one of four spacings or less bends around the edge
+    far = around > max(3.0 * laplacian.smoothing_lengths.max(), 4.0)
+    assert crossing_pairs(laplacian, np.where(far, face, -1)) == 0
     assert area_error(laplacian, area) < 8e-2
 
 
