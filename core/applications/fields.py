@@ -73,8 +73,8 @@ def solve_poisson(
 
     A set of fixed points may be any band, line, or single points. Values past the edge of a band continue those before
     it linearly (as in Morris, Fox, Zhu, 1997), which makes weights across the edge larger: none becomes negative, so
-    that the maximum principle holds. Near sets thinner than the kernel, one of more than 60 neighbours is blended with a
-    narrow one.
+    that the maximum principle holds. Near sets thinner than the kernel, one of more than 60 neighbours is
+    blended with a narrow one.
 
     References
     ----------

@@ -85,22 +85,21 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     >>> print(curvature.min().round(1), curvature.max().round(1))
     1.0 1.0
     """
-    points = laplacian.surface_points
-    centered = points - points.mean(axis=0)
-    curvature = -0.5 * np.einsum("ij,ij->i", laplacian.apply(centered), laplacian.normals)
+    points, normals, edge = laplacian.surface_points, laplacian.normals, laplacian.near_boundary[:, None]
     # At a boundary the natural operator takes the surface as level across it.
-    edge = laplacian.near_boundary
-    curvature = np.where(edge, laplacian.quadric_mean_curvature, curvature)
-    return np.where(edge, curvature, curvature - _off_neighbors(laplacian, _off_neighbors(laplacian, curvature)))
+    at_edge = laplacian.quadric_mean_curvature[:, None] * normals
+    vector = np.where(edge, at_edge, -0.5 * laplacian.apply(points - points.mean(axis=0)))
+    vector -= np.where(edge, 0.0, _off_neighbors(laplacian, _off_neighbors(laplacian, vector)))
+    return np.einsum("ij,ij->i", vector, normals)
 
 
 def _off_neighbors(laplacian: LaplaceBeltrami, values: Floats) -> Floats:
-    """Return how far values are off the mean of their neighbours by the weights of the stiffness, (n,).
+    """Return how far values are off the mean of their neighbours by the weights of the stiffness, (n, k).
 
     Twice of it is of fourth order for what varies with the place, and all of what changes from point to point.
     """
     weight = laplacian.stiffness.diagonal()
-    return (laplacian.stiffness @ values) / np.where(weight > 0.0, weight, 1.0)
+    return (laplacian.stiffness @ values) / np.where(weight > 0.0, weight, 1.0)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
