@@ -9,7 +9,8 @@ from .errors import NotEnoughMemoryError
 from .options import LaplacianOptions
 
 # Bytes for each neighbour of a point, at the peak of a build: resident memory of builds of 50,000 points of a sphere,
-# beyond that before, with 40, 116 and 230 neighbours a point (3.6, 6.4 and 11.4 kB a point; 5.2 kB of a million).
+# beyond that before, with 40, 116 and 230 neighbours a point (3.6, 6.4 and 11.4 kB a point; of 150,000 random points,
+# 54 and 156 take 3.7 and 7.7 kB).
 _PER_NEIGHBOR = 42
 _ALONE = 43  # neighbours that would take as much as what each point needs for itself
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
