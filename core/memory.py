@@ -9,11 +9,12 @@ from .errors import NotEnoughMemoryError
 from .options import LaplacianOptions
 
 # Bytes for each neighbour of a point, at the peak of a build: resident memory of builds of 50,000 points of a sphere,
-# beyond that before, with 40, 116 and 230 neighbours a point (3.6, 6.4 and 11.4 kB a point; 5.2 kB of a million).
+# beyond that before, with 40, 116 and 230 neighbours a point (3.6, 6.4 and 11.4 kB a point; of 150,000 random points,
+# 54 and 156 take 3.7 and 7.7 kB).
 _PER_NEIGHBOR = 42
 _ALONE = 43  # neighbours that would take as much as what each point needs for itself
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
-_ADAPTIVE = 0.13  # neighbours of "adaptive" kernels against "local" ones on random points, which have the most
+_ADAPTIVE = 60  # neighbours in "adaptive" kernels on random points, which have the most
 _SHARE = 0.8  # of the free memory, to leave some for other programs
 _CGROUP = Path("/sys/fs/cgroup")
 
@@ -35,8 +36,8 @@ def needed_memory(count: int, options: LaplacianOptions, modes: int = 0) -> int:
     int
         Bytes. Those of random points, which have the widest kernels; even samples take half.
     """
-    share = _ADAPTIVE if options.bandwidth == "adaptive" else 1.0
-    neighbors = 9.0 * share * options.bandwidth_factor**2 * options.neighbors  # inside of 3 h
+    inside = _ADAPTIVE if options.bandwidth == "adaptive" else 9.0 * options.neighbors  # of 3 h
+    neighbors = inside * options.bandwidth_factor**2
     return int(count * (_PER_NEIGHBOR * (neighbors + _ALONE) + _PER_MODE * modes))
 
 
@@ -76,7 +77,7 @@ def check_memory(count: int, options: LaplacianOptions, modes: int = 0) -> None:
         raise NotEnoughMemoryError(
             f"{count:,} points would take about {needed_memory(count, options, modes) / 2**30:.1f} GB of memory, and"
             f" {free / 2**30:.1f} GB are free: enough for {_rounded(most):,} points. Use fewer points,"
-            " fewer neighbors, or free memory.",
+            " a narrower kernel, or free memory.",
             fitting=most,
         )
 

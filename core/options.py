@@ -29,10 +29,11 @@ class LaplacianOptions:
         "adaptive": a smoothing length h per point, chosen by the widest gaps between the points around, h_ij
         the mean of both ends. "local": it follows the spacing alone. "global": one for all points.
     neighbors : int
-        The smoothing length is measured by the distance to this neighbour; "adaptive" ones change as its square root.
+        "local", "global": the smoothing length is measured by the distance to this neighbour. There must be more points
+        than that.
     bandwidth_factor : float
-        "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on the chosen
-        length. The radius of the kernel is 3 h.
+        "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on
+        the narrowest length, which is wider where the points ask for it. The radius of the kernel is 3 h.
     boundary : {"auto", "off"}
         "auto": detect the boundary, unless it is given, and mirror the points there. "off": take the surface as closed.
     sheets : bool
@@ -80,12 +81,12 @@ class LaplacianOptions:
         check_switches(sheets=self.sheets)
         _check_neighbors(self)
         _make_positive(self, "bandwidth_factor")
-        # About 9 factor^2 neighbors points share a support of 3 h on an even sample; ten keep a plane well determined.
-        narrow = 0.12 if self.bandwidth == "adaptive" else 1.0
-        if 9.0 * (narrow * self.bandwidth_factor) ** 2 * self.neighbors < 10.0:
+        # So many points share a support of 3 h on an even sample; ten keep a plane well determined.
+        inside = self.bandwidth_factor**2 * (13.0 if self.bandwidth == "adaptive" else 9.0 * self.neighbors)
+        if inside < 10.0:
             raise PointCloudError(
-                f"A bandwidth factor of {self.bandwidth_factor:g} with {self.neighbors} neighbors leaves fewer"
-                " than 10 points inside the kernel. Raise one of them."
+                f"A bandwidth factor of {self.bandwidth_factor:g} leaves fewer than 10 points inside the kernel."
+                " Raise it."
             )
 
 

@@ -156,7 +156,7 @@ def solve_symmetric(
             if not found.converged:
                 raise SolverError(
                     f"The equations of {len(load)} points were not solved in {found.products} steps: a share of"
-                    f" {found.residual:.1g} is left. Fix more points, or raise the number of neighbors."
+                    f" {found.residual:.1g} is left. Fix more points, or widen the kernel."
                 )
             values[number] = found.values * unit
     return values.T.reshape(load.shape)

@@ -73,7 +73,8 @@ def solve_poisson(
 
     A set of fixed points may be any band, line, or single points. Values past the edge of a band continue those before
     it linearly (as in Morris, Fox, Zhu, 1997), which makes weights across the edge larger: none becomes negative, so
-    that the maximum principle holds. Near sets thinner than the kernel the operator is blended with a narrow one.
+    that the maximum principle holds. Near sets thinner than the kernel, one of more than 60 neighbours is
+    blended with a narrow one.
 
     References
     ----------
@@ -251,7 +252,7 @@ def _with_fixed_points(
     edge[thin] = 0.0
     thin &= ~laplacian.boundary  # images do the same there
     weights, own, load = _weights(laplacian, fixed, values)
-    if thin.any():
+    if thin.any() and laplacian.stiffness.nnz > _NARROW * np.count_nonzero(laplacian.component >= 0):
         report("Equations", 0.2)
         distance = cKDTree(laplacian.points[thin]).query(laplacian.points, workers=-1)[0]
         ramp = np.clip((distance / laplacian.smoothing_lengths - _NEAR[0]) / (_NEAR[1] - _NEAR[0]), 0.0, 1.0)

@@ -13,7 +13,7 @@ from ..operator import LaplaceBeltrami, connection_laplacian, tangent_frames
 from ..types import Array, Floats, Progress
 from .geodesics import Geodesics
 
-_TIME = 2.0  # smoothing lengths that heat spreads over: fewer do not average out the randomness of points
+_TIME = 3.0  # smoothing lengths that heat spreads over: fewer do not average out the randomness of points
 _FARTHEST = 200.0  # extent of the object in such lengths, at most, or the heat there underflows
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 

@@ -8,10 +8,11 @@ from .moments import RIDGE, TERMS, EdgeTerms, put_terms
 from .nearest import ON, ROUNDS, SMOOTH, fading_weights, find_nearest, nearest_rows, typical_distance
 from .normals import unit_normals
 from .orientation import orient_normals, toward
-from .pairs import Pairs
+from .pairs import Pairs, find_pairs
 from .patches import Patch
 from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import along_curves, check_surface, frames
+from .sheets import same_sheet
 from .subset import blue_noise_subset
 from .thinning import nearest_in_blocks, thin

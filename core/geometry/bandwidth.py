@@ -12,7 +12,7 @@ from .moments import least_error
 from .nearest import ROUNDS, Nearest
 from .quadrics import Quadrics
 
-_NARROWEST = 0.108  # h over the radius of the cells, by the root of the neighbours of the options, 100
+_NARROWEST = 1.08  # h over the radius of the cells
 _WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
 _MET = 3e-3  # relative error of the moments that no wider kernel is tried for
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
@@ -53,15 +53,15 @@ def smoothing_lengths(
     ndarray, (m,)
         Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
         twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: as narrow as the points
-        and the shape let it be. It starts from 1.08 times the radius of the cells around, in the eighth mean: the width
-        of a gap in one direction decides, not the number of points in the others. Where a wider kernel would meet its
-        moments better by more than the bend of the surface costs it, it is up to 2.2 times as wide. Even points have
-        some 15 others inside it then, random ones 60.
+        and the shape let it be. It starts from 1.08 times the radius of the cells around, in the eighth mean, times the
+        factor: the width of a gap in one direction decides, not the number of points in the others. Where a wider
+        kernel would meet its moments better by more than the bend of the surface costs it, it is up to 2.2 times as
+        wide. Even points have some 15 others inside it then, random ones 55. A larger factor leaves fewer points that
+        ask for more, so that h varies less.
     """
     if options.bandwidth == "adaptive":
-        lengths = _NARROWEST * np.sqrt(options.neighbors) * mean_gaps(nearest, cells.radius, _POWER)
-        wider = _widening(nearest, normals, quadrics, cells, boundary, lengths)
-        return options.bandwidth_factor * wider * lengths
+        lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, _POWER)
+        return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
         return np.full(len(distance), options.bandwidth_factor * distance.mean())

@@ -416,7 +416,7 @@ def laplacian_of(
     if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
         notices.append(
             "The kernel of most points covers more than a third of the object, which is too wide for good results."
-            " Add points, or lower the number of neighbors."
+            " Add points, or make the kernel narrower."
         )
     trust = _trust(cloud, assembled.residual)
     doubtful = np.sum(areas[trust < 0.5]) / np.sum(areas)

@@ -163,8 +163,8 @@ def correct_eigenvalues(laplacian: LaplaceBeltrami, values: Floats, vectors: Flo
         resolved = int(np.argmin(np.isfinite(corrected)))
         raise UnresolvedModesError(
             f"The {len(values)} modes asked for vary faster than the smoothing length resolves: {resolved} are"
-            f" resolved on {len(laplacian.areas)} points. Ask for at most {resolved}, or lower the number of"
-            " neighbors.",
+            f" resolved on {len(laplacian.areas)} points. Ask for at most {resolved}, or make the"
+            " kernel narrower.",
             resolved=resolved,
         )
     return corrected

@@ -43,7 +43,7 @@ class Stability:
         found = []
         if self.area_ratio > 1e4:
             found.append(f"(A1) The areas differ by a factor of {self.area_ratio:.3g}.")
-        if self.least_bandwidth < 0.6:
+        if self.least_bandwidth < 0.4:
             found.append(
                 f"(A2, A4) Somewhere the smoothing length is only {self.least_bandwidth:.2g} times the distance to"
                 " the sixth neighbor."

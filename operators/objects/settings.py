@@ -75,7 +75,8 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     neighbors: IntProperty(
         name="Neighbors",
-        description="Bandwidths follow the distance to this neighbor; more are smoother and slower",
+        description="With Local and Global, the smoothing length follows the distance to this neighbor. There must be"
+        " more points than that",
         default=DEFAULTS.neighbors,
         min=6,
         soft_max=200,

@@ -11,7 +11,7 @@ from ..objects.reading import obstacle, sharing_objects
 _TEXTS = {  # errors that any computation may raise, and what to report
     PointCloudError: "{}",
     MemoryError: "The memory is used up. Close other programs, or lower the Point Budget",
-    LinAlgError: "The equations have no solution ({}). Raise Neighbors, or delete points that lie on each other",
+    LinAlgError: "The equations have no solution ({}). Raise Bandwidth Factor, or delete points that lie on each other",
     OSError: "A file could not be read or written: {}",
 }
 TROUBLES = tuple(_TEXTS)

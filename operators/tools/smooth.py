@@ -17,7 +17,7 @@ from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.discs import disc_finder
 
-_HEAT, _DETAIL = 6.0, 12.0  # default wavelengths in smoothing lengths: the kernel does not resolve finer ones
+_HEAT, _DETAIL = 9.0, 18.0  # default wavelengths in smoothing lengths: those of details of some points
 _READY = 20  # modes computed at least, so that Adjust Last Operation can step through them
 _FINEST = 8.0  # details finer than the wavelength by this factor count as noise, which is not amplified
 

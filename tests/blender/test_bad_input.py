@@ -136,10 +136,7 @@ def test_mesh_with_a_fake_user_is_not_shared():
             "vertex groups named lb_eigenvector_002.*Rename",
         ),
         (lambda obj: setattr(obj, "scale", (1.0, 0.0, 1.0)), "scaled to nothing along an axis.*scale above zero"),
-        (
-            lambda obj: [setattr(obj.meshfree, *one) for one in (("neighbors", 6), ("bandwidth_factor", 0.1))],
-            "Raise one",
-        ),
+        (lambda obj: setattr(obj.meshfree, "bandwidth_factor", 0.1), "leaves fewer than 10 points.*Raise it"),
         (lambda obj: setattr(obj.data.vertices[0].co, "x", np.nan), "not finite"),
     ],
 )

@@ -62,4 +62,4 @@ def test_roughness_of_dents_in_a_scaled_sphere():
     assert bpy.ops.meshfree.roughness(wavelength=2.0) == {"FINISHED"}
     rough = attribute(obj, "lb_roughness")
     assert rough[depth > 0.0].max() < -0.03
-    assert np.abs(rough[depth == 0.0]).max() < 0.02
+    assert np.abs(rough[depth == 0.0]).max() < 0.035

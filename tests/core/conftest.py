@@ -37,21 +37,21 @@ CLOUDS = {
 
 @pytest.fixture(scope="session")
 def operators():
-    """Function from the name of a cloud to its operator with default options; nobody may change it."""
+    """Function from the name of a cloud, and a bandwidth factor, to its operator; nobody may change it."""
 
     @functools.cache
-    def build(name):
-        return core.build_laplacian(CLOUDS[name]())
+    def build(name, factor=1.0):
+        return core.build_laplacian(CLOUDS[name](), options=core.LaplacianOptions(bandwidth_factor=factor))
 
     return build
 
 
 @pytest.fixture(scope="session")
 def eigenvalues(operators):
-    """Function from the name of a cloud and a count to the first eigenvalues of its operator."""
+    """Function from the name of a cloud, a count, and a bandwidth factor to the first eigenvalues of its operator."""
 
     @functools.cache
-    def solve(name, count):
-        return operators(name).eigenpairs(count).eigenvalues
+    def solve(name, count, factor=1.0):
+        return operators(name, factor).eigenpairs(count).eigenvalues
 
     return solve

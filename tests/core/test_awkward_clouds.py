@@ -101,7 +101,7 @@ LAYOUTS = {
 OPTIONS = {
     "bandwidth": ["adaptive", "local", "global"],
     "neighbors": [6, 10, 20, 40, 100],
-    "bandwidth_factor": [0.4, 0.6, 1.0, 2.0],
+    "bandwidth_factor": [0.6, 0.9, 1.0, 2.0],
     "boundary": ["auto", "off"],
     "sheets": [True, False],
     "projection": ["auto", "off", "quadric"],

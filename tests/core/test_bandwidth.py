@@ -41,8 +41,8 @@ class TestAdaptive:
     def test_constant_where_the_density_is(self, seed):
         points = random_sphere(1200, seed)
         adaptive = lengths(points)
-        assert spread(adaptive) < 0.06
-        assert np.abs(adaptive / adaptive.mean() - 1.0).max() < 0.2
+        assert spread(adaptive) < 0.2  # single neighborhoods ask for more
+        assert np.abs(adaptive / adaptive.mean() - 1.0).max() < 0.6
 
     @pytest.mark.parametrize("seed", range(2))
     def test_follows_a_density_jump(self, seed):
@@ -52,7 +52,7 @@ class TestAdaptive:
         assert 1.5 < coarse / dense < 3.3  # the spacing changes threefold, and the sphere bends
 
     def test_varies_slowly(self):
-        for points, most in ((random_sphere(1000), 0.2), (uneven_sphere(1200), 0.9)):
+        for points, most in ((random_sphere(1000), 0.7), (uneven_sphere(1200), 1.0)):
             pairs = read_cloud(points, LaplacianOptions()).pairs
             assert np.abs(np.log(pairs.lengths[pairs.first] / pairs.lengths[pairs.second])).max() < most
 
@@ -62,7 +62,7 @@ class TestAdaptive:
         points = np.concatenate([few[few[:, 2] > 0.0], many[many[:, 2] < 0.0]])
         laplacian = core.build_laplacian(points)
         x = points[:, 0]
-        assert np.linalg.norm(laplacian.apply(x) + 2.0 * x) < 2e-2 * np.linalg.norm(2.0 * x)
+        assert np.linalg.norm(laplacian.apply(x) + 2.0 * x) < 5e-2 * np.linalg.norm(2.0 * x)
         values = laplacian.eigenpairs(36).eigenvalues[1:] / np.repeat([2.0, 6.0, 12.0, 20.0, 30.0], [3, 5, 7, 9, 11])
         assert np.abs(values - 1.0).mean() < 1e-3
 
@@ -72,7 +72,7 @@ class TestAdaptive:
         points = torus_rows(16, ratio)
         laplacian = core.build_laplacian(points)
         across = 2.0 * np.pi * 0.4 / 16
-        assert np.all(laplacian.smoothing_lengths > 0.8 * across)
+        assert np.all(laplacian.smoothing_lengths > 0.5 * across)  # 3 h is beyond the next row
         assert np.all(laplacian.smoothing_lengths < 2.0 * across)
         assert laplacian.component.max() == 0
         assert laplacian.areas.sum() == pytest.approx(torus_area(), rel=2e-2)
@@ -88,7 +88,7 @@ class TestAdaptive:
     def test_never_narrower_than_the_points_demand(self):
         points = torus_low_discrepancy(4000, minor=0.05)
         spacing = np.sqrt(torus_area(1.0, 0.05) / 4000)
-        assert lengths(points).min() > 1.2 * spacing
+        assert lengths(points).min() > 0.65 * spacing
 
     def test_widens_with_irregularity(self):
         spacing = np.sqrt(4.0 * np.pi / 1200)
@@ -105,7 +105,9 @@ class TestAdaptive:
         points = square_random(1200)
         adaptive = lengths(points)
         middle = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.25
-        np.testing.assert_allclose(adaptive, adaptive[middle].mean(), rtol=0.2)
+        mean = adaptive[middle].mean()
+        assert adaptive[~middle].mean() == pytest.approx(mean, rel=0.1)
+        np.testing.assert_allclose(adaptive, mean, rtol=0.5)
         # Without the boundary, neighbourhoods there would look sparse.
         unaware = lengths(points, boundary="off")
         assert unaware.max() > 1.1 * unaware[middle].mean()
@@ -115,14 +117,19 @@ class TestAdaptive:
         assert narrow.max() < 0.3 * 10.5
         assert narrow.min() > 1.2
 
-    def test_a_factor_scales_them(self):
-        points = random_sphere(900)
-        np.testing.assert_allclose(lengths(points, bandwidth_factor=1.3), 1.3 * lengths(points), rtol=1e-9)
+    def test_a_factor_scales_them_where_no_point_asks_for_more(self):
+        points = fibonacci_sphere(900)
+        np.testing.assert_allclose(lengths(points, bandwidth_factor=1.7), 1.7 * lengths(points), rtol=0.05)
 
-    def test_fewer_neighbors_make_them_narrower(self):
+    def test_a_factor_leaves_less_to_ask_for(self):
+        points = random_sphere(900)
+        narrow, wide = lengths(points), lengths(points, bandwidth_factor=1.7)
+        assert 1.2 < wide.mean() / narrow.mean() < 1.7
+        assert spread(wide) < 0.7 * spread(narrow)
+
+    def test_the_number_of_neighbors_is_not_theirs(self):
         points = random_sphere(1000)
-        ratio = lengths(points, neighbors=50).mean() / lengths(points).mean()
-        assert ratio == pytest.approx(np.sqrt(0.5), rel=0.05)
+        np.testing.assert_array_equal(lengths(points, neighbors=50), lengths(points))
 
 
 class TestAny:

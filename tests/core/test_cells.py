@@ -71,7 +71,7 @@ def test_the_reach_is_that_of_the_wider_spacing():
     inner = (np.abs(points[:, 0] - 20.0) < 10.0) & (np.abs(points[:, 1] - 20.0) < 10.0)
     reach = 0.5 * np.hypot(1.0, 0.25)
     lengths = cloud.scaled.scatter(cloud.pairs.lengths * cloud.scaled.scale, 0.0)
-    np.testing.assert_allclose(lengths[inner], 1.8 * reach, rtol=1e-3)
+    np.testing.assert_allclose(lengths[inner], 1.08 * reach, rtol=1e-3)
 
 
 def test_curvature_makes_cells_smaller_than_in_the_plane():

@@ -29,7 +29,7 @@ def across(points):
 )
 @pytest.mark.parametrize("sign", ["alike", "at random"])
 def test_arcs_are_exact_to_sixth_order(points, normals, exact, sign):
-    cloud = read_cloud(points, LaplacianOptions(boundary="off", bandwidth_factor=1.8))
+    cloud = read_cloud(points, LaplacianOptions(boundary="off", bandwidth_factor=3.0))
     pairs = replace(cloud.pairs, points=points[cloud.scaled.first])
     i, j = pairs.first, pairs.second
     pairs = replace(pairs, distance=np.linalg.norm(pairs.points[j] - pairs.points[i], axis=1))

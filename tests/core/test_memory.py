@@ -20,7 +20,7 @@ def test_the_need_grows_with_points_neighbors_and_modes():
     one = memory.needed_memory(1000, DEFAULT)
     assert memory.needed_memory(2000, DEFAULT) == 2 * one
     assert memory.needed_memory(1000, DEFAULT, modes=50) > one
-    assert memory.needed_memory(1000, core.LaplacianOptions(neighbors=200)) > 1.5 * one
+    assert memory.needed_memory(1000, core.LaplacianOptions(bandwidth_factor=1.7)) > 1.5 * one
     assert memory.needed_memory(1000, core.PaperOptions().cloud) > 5.0 * one
 
 

@@ -5,9 +5,8 @@ from scipy.spatial.distance import cdist
 
 from benchmarks.samplings import random_sphere, uneven_sphere
 from core.geometry import patches
-from core.geometry.bandwidth import smoothing_lengths
 from core.geometry.cloud import read_cloud
-from core.geometry.nearest import find_nearest, nearest_rows, typical_distance
+from core.geometry.nearest import nearest_rows, typical_distance
 from core.geometry.pairs import Pairs, find_pairs
 from core.options import LaplacianOptions
 
@@ -68,15 +67,14 @@ def test_support_may_hold_every_point():
 def test_global_length_is_the_mean_distance_to_the_hundredth_neighbor():
     points = random_sphere(500)
     distance = np.sort(cdist(points, points), axis=1)[:, 100]  # column 0 is the point itself
-    nearest = find_nearest(points)
-    lengths = smoothing_lengths(nearest, nearest.spacing, LaplacianOptions(bandwidth="global"))
-    np.testing.assert_allclose(lengths, distance.mean(), rtol=1e-12)
+    cloud = read_cloud(points, LaplacianOptions(bandwidth="global"))
+    np.testing.assert_allclose(cloud.pairs.lengths * cloud.scaled.scale, distance.mean(), rtol=1e-12)
 
 
 def test_local_length_follows_the_spacing():
     points = uneven_sphere(4000)
-    nearest = find_nearest(points)
-    lengths = smoothing_lengths(nearest, nearest.spacing, LaplacianOptions(bandwidth="local"))
+    cloud = read_cloud(points, LaplacianOptions(bandwidth="local"))
+    lengths = cloud.scaled.scatter(cloud.pairs.lengths, 0.0)
     dense, coarse = lengths[points[:, 2] > 0.6].mean(), lengths[points[:, 2] < -0.6].mean()
     assert coarse / dense == pytest.approx(3.0, rel=0.1)
 

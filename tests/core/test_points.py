@@ -183,7 +183,7 @@ class TestDuplicates:
         found = use(doubled)[place]
         np.testing.assert_allclose(found[600:640], found[:40], atol=1e-9)
         np.testing.assert_allclose(found[640:], found[:10], atol=1e-9)
-        assert np.ptp(found[:40]) > 0.0
+        assert np.ptp(found) > 0.0
 
     def test_the_operator_and_its_spectrum_are_the_same(self, both):
         single, doubled, place = both

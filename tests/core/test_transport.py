@@ -66,7 +66,7 @@ def test_a_mass_comes_onto_the_diagonal(sphere):
 
 def test_pairs_that_face_opposite_ways_are_left_out(square):
     normals = square.normals.copy()
-    turned = np.arange(1600) % 7 == 0
+    turned = np.arange(1600) % 3 == 0
     normals[turned] *= -1.0
     matrix = connection_laplacian(square.stiffness, normals, tangent_frames(normals)).tocoo()
     assert not np.any(turned[matrix.row] != turned[matrix.col])
@@ -182,22 +182,24 @@ class TestTransport:
 
 
 class TestLogarithmicMap:
-    @pytest.mark.parametrize(("sample", "most"), [(square_random, 0.02), (lambda count: square_grid(32), 0.05)])
-    def test_on_a_plane_differences_of_coordinates(self, sample, most):
+    @pytest.mark.parametrize(
+        ("sample", "mean", "most"), [(square_random, 0.012, 0.08), (lambda count: square_grid(32), 0.03, 0.08)]
+    )
+    def test_on_a_plane_differences_of_coordinates(self, sample, mean, most):
         laplacian = core.build_laplacian(sample(2000))
         source = np.argmin(np.linalg.norm(laplacian.points - laplacian.points.mean(axis=0), axis=1))
         found = core.logarithmic_map(laplacian, source, [1.0, 0.0, 0.0])
         exact = (laplacian.points - laplacian.points[source])[:, :2] * [1.0, laplacian.normals[source, 2]]
         error = np.linalg.norm(found - exact, axis=1) / np.ptp(exact[:, 0])
-        assert np.sqrt(np.mean(error**2)) < 0.6 * most  # on a grid shortest paths keep to its directions
-        assert error.max() < 1.5 * most
+        assert np.sqrt(np.mean(error**2)) < mean  # on a grid shortest paths keep to its directions
+        assert error.max() < most
 
     def test_on_a_sphere_distance_and_azimuth(self, sphere):
         direction = np.array([0.0, 0.3, 1.0])
         found = core.logarithmic_map(sphere, 7, direction)
         exact, distance = exact_map(sphere, 7, direction)
         error = np.linalg.norm(found - exact, axis=1)[distance < 2.6]
-        assert np.sqrt(np.mean(error**2)) < 0.012
+        assert np.sqrt(np.mean(error**2)) < 0.025
         assert_allclose(found[7], 0.0)
 
     def test_a_cylinder_unrolls(self):

@@ -4,7 +4,7 @@ import pytest
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere
 
-WIDE = core.LaplacianOptions(bandwidth_factor=2.0)  # so many neighbours that sums are integrals to a percent
+WIDE = core.LaplacianOptions(bandwidth_factor=3.4)  # so many neighbours that sums are integrals to a percent
 
 
 def cap(angle):
