@@ -15,8 +15,8 @@ def ball():
 
 
 def two_spheres():
-    """Random points of two spheres whose distance is 0.7 of the spacing of either."""
-    gap = 0.7 * np.sqrt(4.0 * np.pi / 2000)
+    """Random points of two spheres whose distance is 0.8 of the spacing of either."""
+    gap = 0.8 * np.sqrt(4.0 * np.pi / 2000)
     return np.concatenate([random_sphere(2000), (1.0 + gap) * random_sphere(2000, 1)])
 
 
@@ -31,7 +31,7 @@ def rows():
 CLOUDS = {
     Doubt.FEW: lambda: box([1.0, 1.0, 1.0], 300),
     Doubt.VOLUME: ball,
-    Doubt.NOISE: lambda: noisy_sphere(2000, 1.5),
+    Doubt.NOISE: lambda: noisy_sphere(4000, 1.2),
     Doubt.ROWS: rows,
     Doubt.SHEETS: two_spheres,
 }
@@ -74,7 +74,10 @@ def test_the_cause_moves_with_the_points(told, turned):
     order = np.random.default_rng(1).permutation(len(laplacian.points))
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0] if turned else np.eye(3)
     after = core.build_laplacian((7e3 * laplacian.points @ turn + 4.0)[order])
-    assert np.mean(after.doubt == laplacian.doubt[order]) > 0.999  # in a tie rounding decides
+    before = laplacian.doubt[order]
+    assert np.mean(after.doubt == before) > 0.99  # rounding decides where trust is a half
+    both = (after.doubt > 0) & (before > 0)
+    np.testing.assert_array_equal(after.doubt[both], before[both])
 
 
 @pytest.mark.parametrize(
