@@ -37,7 +37,7 @@ MODES = 50
 LARGEST = 100_000  # beyond, the peers are left out
 STAGES = {  # the rest of the build is its surface: outliers, components, quadrics, sheets, noise, cells
     "pairs": [(cloud, "find_pairs"), (cloud, "separate_sheets"), (laplacian, "arc_length")],
-    "normals": [(cloud, "orient_outwards")],
+    "normals": [(cloud, "orient_by_winding")],
     "areas": [(laplacian, "solve_areas")],
     "weights": [(stiffness, "balance_weights")],
     "matrix": [(laplacian, "assemble_stiffness")],

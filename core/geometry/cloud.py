@@ -19,12 +19,13 @@ from .distances import measure_squared_slope
 from .doubt import likely_causes
 from .nearest import Nearest, find_nearest
 from .noise import FILLING, LEFT, MOST, mean_misfits, near_misfit, noise_level, project_points
-from .normals import orient_outwards, unit_normals
+from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
 from .quadrics import Quadrics, check_surface, frames
 from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
+from .winding import orient_by_winding
 
 _DRAWN = 20  # points that a surface needs at least, to be drawn
 _NARROW = 0.6  # h over the depth of the surface that is too wide
@@ -59,6 +60,11 @@ class Sample:
     def moved(self) -> Floats:
         """Offsets by which the points were moved to smooth noise, (m, 3)."""
         return self.nearest.points - move_apart(self.scaled.points, self.component)
+
+    @property
+    def places(self) -> Floats:
+        """Where the points are, noisy ones where they were moved to, components where they stand, (m, 3)."""
+        return self.scaled.points + self.moved
 
 
 @dataclass(frozen=True)
@@ -173,7 +179,7 @@ def read_cloud(
 
     report("Normals", 0.18)
     given = None if normals is None else unit_normals(normals, len(points))[sample.scaled.first]
-    oriented = orient_outwards(nearest, quadrics.normals if given is None else given)
+    oriented = orient_by_winding(nearest, quadrics.normals if given is None else given, sample.places, sample.component)
 
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature
@@ -592,9 +598,11 @@ def surface_discs(points: ArrayLike, *, progress: Progress | None = None) -> Dis
     """
     report = progress or (lambda stage, fraction: None)
     report("Normals", 0.0)
-    scaled, surface = read_surface(check_points(points), LaplacianOptions(neighbors=_DRAWN, projection="off"), report)
+    scaled, surface = read_surface(
+        check_points(points), LaplacianOptions(bandwidth="local", neighbors=_DRAWN, projection="off"), report
+    )
     sample = surface.sample
-    oriented = orient_outwards(sample.nearest, surface.quadrics.normals)
+    oriented = orient_by_winding(sample.nearest, surface.quadrics.normals, sample.places, sample.component)
     report("Discs", 0.5)
     curvature, everywhere = surface.quadrics.gaussian_curvature, no_boundary(len(oriented))
     cells = measure_cells(

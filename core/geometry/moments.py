@@ -87,25 +87,24 @@ def least_error(
     edges, near = EdgeTerms(boundary, lengths, tangents), boundary.reached(lengths)
 
     def measure(part: slice) -> None:
-        block = rows[part]
-        found, open_ = np.zeros(len(block)), np.arange(len(block))
+        block, found = rows[part], result[part]
+        open_ = np.arange(len(block))
         for most in _MOST:
             asked = block[open_]
             if most == COUNT:
                 distance, index = nearest.distance[asked], nearest.index[asked]
             else:
                 distance, index = nearest.tree.query(nearest.points[asked], k=min(most, len(normals)))
-            whole = (distance[:, -1] > SUPPORT * lengths[asked]) | (len(normals) <= most)
-            found[open_[whole]] = solve(asked[whole], distance[whole, 1:], index[whole, 1:])
-            open_ = open_[~whole]
+            found[open_] = solve(asked, distance[:, 1:], index[:, 1:])
+            # More neighbours can only meet the moments better.
+            more = (distance[:, -1] <= SUPPORT * lengths[asked]) & (len(normals) > most) & (found[open_] > _SMALL)
+            open_ = open_[more]
             if not len(open_):
-                break
-        result[part] = found
+                return
+        found[open_] = 0.0
 
     def solve(rows: Ints, distance: Floats, index: Ints) -> Floats:
         """Return the least error of some points with these neighbours."""
-        if not len(rows):
-            return np.zeros(0)
         lengths_here = lengths[rows, None]
         within = slice(np.count_nonzero(distance < SUPPORT * lengths_here, axis=1).max())
         distance, index = distance[:, within], index[:, within]

@@ -19,8 +19,8 @@ from core.geometry.cloud import (
     read_cloud,
     remove_noise,
 )
-from core.geometry.normals import orient_outwards
 from core.geometry.points import scale_points
+from core.geometry.winding import orient_by_winding
 
 NEEDED = 101
 
@@ -115,7 +115,8 @@ def test_one_sheet_stays_as_it_is():
 class TestBoundary:
     def located(self, points, search=True, **given):
         surface = fit_surface(sample_of(points), True)
-        oriented = orient_outwards(surface.sample.nearest, surface.quadrics.normals)
+        sample = surface.sample
+        oriented = orient_by_winding(sample.nearest, surface.quadrics.normals, sample.places, sample.component)
         gaps = gaps_of(surface, oriented) if search else None
         return surface.sample, locate_boundary(surface.sample, oriented, gaps, **given)
 
@@ -150,7 +151,8 @@ def test_the_walk_is_these_stages():
     points = np.concatenate([grid(24), grid(24) + [0.0, 0.0, 1.5]])
     options = core.LaplacianOptions()
     surface = divide_sheets(fit_surface(sample_of(points), True), NEEDED)
-    oriented = orient_outwards(surface.sample.nearest, surface.quadrics.normals)
+    sample = surface.sample
+    oriented = orient_by_winding(sample.nearest, surface.quadrics.normals, sample.places, sample.component)
     cloud = read_cloud(points, options)
     np.testing.assert_array_equal(cloud.component, surface.sample.component)
     np.testing.assert_array_equal(cloud.normals, oriented)

@@ -6,9 +6,10 @@ from scipy import sparse
 
 import core
 from benchmarks.samplings import fibonacci_sphere, torus_points
-from core.geometry import orientation
+from core.geometry import winding
 from core.geometry.nearest import find_nearest
-from core.geometry.orientation import _energies, _least, _near_energies, _patch_energies, _settled
+from core.geometry.orientation import _near_energies, _settled
+from core.geometry.winding import _energies, _least, _patch_energies, coupling
 from tests.core.test_normals import torus_normals
 
 
@@ -143,14 +144,14 @@ def test_clumps_that_are_near_are_taken_finely(monkeypatch):
     points = fibonacci_sphere(600)
     weight, patch = np.random.default_rng(0).random(600) + 0.5, (points[:, 2] > 0.0) + 2 * (points[:, 0] > 0.3)
     exact = _patch_energies(points, points, weight, patch)
-    monkeypatch.setattr(orientation, "_CLUMPS", 150)
-    monkeypatch.setattr(orientation, "_PAIRS", 10_000)
-    monkeypatch.setattr(orientation, "_NEAR", 1e9)
+    monkeypatch.setattr(winding, "_CLUMPS", 150)
+    monkeypatch.setattr(winding, "_PAIRS", 10_000)
+    monkeypatch.setattr(winding, "_NEAR", 1e9)
     off = ~np.eye(4, dtype=bool)
     np.testing.assert_allclose(_patch_energies(points, points, weight, patch)[off], exact[off], rtol=1e-9)
-    monkeypatch.setattr(orientation, "_NEAR", 3.0)
+    monkeypatch.setattr(winding, "_NEAR", 3.0)
     near = np.abs(_patch_energies(points, points, weight, patch) - exact)[off].max()
-    monkeypatch.setattr(orientation, "_NEAR", 0.0)
+    monkeypatch.setattr(winding, "_NEAR", 0.0)
     assert near < 0.1 * np.abs(_patch_energies(points, points, weight, patch) - exact)[off].max()
 
 
@@ -163,13 +164,16 @@ def test_signs_of_least_energy_are_found_among_all():
 
 
 def test_energy_of_near_points_is_that_of_dipoles():
-    """The same as between patches of one point each, where the spacing is even and all are neighbours."""
+    """Where the spacing is even and all are neighbours."""
     points = torus_points(40)
     nearest, normals = find_nearest(points), torus_normals(points)
     even = replace(nearest, distance=np.broadcast_to(nearest.distance[:1], nearest.distance.shape))
     weight = np.random.default_rng(0).random(40)
     near = _near_energies(points, even, normals, weight).toarray()
-    whole = _energies(points, weight[:, None] * normals, weight, np.arange(40), even.spacing[0], 40)
+    offset = points[:, None] - points
+    square = np.sum(offset**2, axis=2) + even.spacing[0] ** 2
+    along = np.einsum("ic,ijc->ij", normals, offset) * np.einsum("jc,ijc->ij", normals, offset)
+    whole = weight[:, None] * weight * (normals @ normals.T / square**1.5 - 3.0 * along / square**2.5) / (4.0 * np.pi)
     np.testing.assert_allclose(near, whole - np.diag(np.diag(whole)), rtol=1e-9)
 
 
@@ -235,3 +239,34 @@ def test_directions_that_do_not_fit_are_refused():
     for directions in (np.zeros((600, 2)), np.zeros(600), np.full((600, 3), np.nan)):
         with pytest.raises(core.InvalidPointsError):
             laplacian.toward(directions)
+
+
+def test_parallel_layers_of_dipoles_have_no_common_energy_however_close():
+    """Else facing sheets, a spacing apart, would rather look in one direction."""
+    side, width = np.meshgrid(np.arange(-60.0, 61.0), np.arange(-60.0, 61.0)), 1.0
+    square = side[0] ** 2 + side[1] ** 2
+    for gap in 0.3, 1.0, 2.0:
+        layer, point = coupling(1.0, gap**2, square + gap**2 + width**2, width**2), coupling(1.0, 0.0, 1.0)
+        assert np.abs(layer.sum()) < 0.5 * point  # what lies beyond the edges of this layer
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_the_ends_of_a_ring_that_nearly_touch_face_each_other(seed):
+    """Between them are no other points, so that their neighbours would take them for one sheet, or for two alike."""
+    rng = np.random.default_rng(seed)
+    gap, ring, tube = 0.05, 1.0, 0.3
+    turn, around = rng.random(6000) * (2.0 * np.pi - gap) + 0.5 * gap, rng.random(6000) * 2.0 * np.pi
+    kept = rng.random(6000) < (ring + tube * np.cos(around)) / (ring + tube)
+    turn, around = turn[kept], around[kept]
+    out, up = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1), np.array([0.0, 0.0, 1.0])
+    normals = np.cos(around)[:, None] * out + np.sin(around)[:, None] * up
+    points = ring * out + tube * normals
+    for angle, sign in (0.5 * gap, -1.0), (2.0 * np.pi - 0.5 * gap, 1.0):
+        count = int(len(turn) / (2.0 * np.pi - gap) * tube / (2.0 * ring))
+        radius, around = tube * np.sqrt(rng.random(count)), rng.random(count) * 2.0 * np.pi
+        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        end = (ring + radius * np.cos(around))[:, None] * out + (radius * np.sin(around))[:, None] * up
+        points = np.concatenate([points, end])
+        normals = np.concatenate([normals, np.tile(sign * np.array([-out[1], out[0], 0.0]), (count, 1))])
+    found = core.estimate_normals(points)
+    assert np.mean(np.einsum("ij,ij->i", found, normals) < 0.0) < 5e-3

@@ -1,0 +1,260 @@
+"""Which side of a surface is outside, by winding numbers: signs of patches within which all normals agree."""
+
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..types import Array, Floats, Ints
+from .nearest import Nearest, spacing_of
+from .normals import NEIGHBORS, outer_signs, propagate_signs
+
+_CERTAIN = 0.9  # cosine of a link that carries a sign without doubt: 26 degrees from a circular arc
+_PATCHES = 200  # that a surface is divided into at most
+_CLUMPS = 1500  # of points, each a dipole; pairs of them are summed in blocks
+_FINE = 32_000  # clumps that stand for the points where they are near, so that close sheets are separated
+_NEAR = 3.0  # sizes of a clump
+_BLOCK = 250
+_PAIRS = 1_000_000  # of fine clumps that are summed at once
+_COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
+_SAMPLE = 2000  # points whose spacing gives the median one
+
+
+def orient_by_winding(nearest: Nearest, normals: Floats, place: Floats, part: Ints) -> Floats:
+    """Flip normals so that neighbours agree, and every patch of the surface with all others, outwards.
+
+    Where sheets come close, neighbours tell little: a leg of a figure may get its sign from the other leg that it
+    touches. The winding number, of all points, decides.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals of arbitrary sign.
+    place : ndarray, (m, 3)
+        Where the points are, components not moved apart.
+    part : ndarray, (m,) int
+        Component of each point.
+
+    Returns
+    -------
+    ndarray, (m, 3)
+        The same normals with consistent signs, each component as `outer_signs` has it.
+    """
+    normals, tree = propagate_signs(nearest, normals)
+    patch = divide_patches(nearest.points, normals, tree)
+    if patch.max() > 0:
+        normals = normals * _least(_patch_energies(place, normals, nearest.spacing**2, patch))[patch][:, None]
+    return normals * outer_signs(place, normals, part)[part, None]
+
+
+def divide_patches(points: Floats, normals: Floats, tree: sparse.csr_array) -> Ints:
+    """Number patches of points, (m,), joined by links of the tree over which the sign is beyond doubt.
+
+    Small patches are joined to their surest neighbour, round by round, until none is left.
+    """
+    count = len(points)
+    tree = tree.tocoo()
+    first, second = tree.coords
+    certainty = _certainty(points, normals, first, second)
+    joined = certainty > _CERTAIN
+    least = max(NEIGHBORS, count // _PATCHES)
+    while True:
+        links = sparse.csr_array((joined[joined], (first[joined], second[joined])), shape=(count, count))
+        _, patch = connected_components(links, directed=False)
+        small = np.bincount(patch) < least
+        open_ = np.flatnonzero(~joined & (small[patch[first]] | small[patch[second]]))
+        if not len(open_):
+            return patch
+        surest = open_[np.argsort(certainty[open_], kind="stable")]
+        best = np.full(len(small), -1)
+        best[patch[first[surest]]] = surest  # the last assignment, of the surest, stays
+        other = np.full(len(small), -1)
+        other[patch[second[surest]]] = surest
+        for links in best[small], other[small]:
+            joined[links[links >= 0]] = True
+
+
+def _certainty(points: Floats, normals: Floats, first: Ints, second: Ints) -> Floats:
+    """Return how surely two points lie on one smooth sheet: the cosine of normals, less the chord's slope over both."""
+    chord = points[second] - points[first]
+    chord /= np.linalg.norm(chord, axis=1)[:, None]
+    left, right = normals[first], normals[second]
+    slope = np.maximum(np.abs(np.einsum("ij,ij->i", chord, left)), np.abs(np.einsum("ij,ij->i", chord, right)))
+    return np.abs(np.einsum("ij,ij->i", left, right)) - 2.0 * slope**2
+
+
+def winding_signs(points: Floats, normals: Floats, weight: Floats, patch: Ints, part: Ints) -> Floats:
+    """Return the sign of each patch by which the winding number changes least off the surface, outside 0.
+
+    Parameters
+    ----------
+    points, normals : ndarray, (m, 3)
+    weight : ndarray, (m,)
+        Areas, up to a factor.
+    patch, part : ndarray, (m,) int
+        Numbers of patches, and of the connected parts of the surface that they divide.
+    """
+    count = part.max() + 1
+    energy = _patch_energies(points, normals, weight, patch)
+    sign = _least(energy)
+    owner = np.empty(len(sign), dtype=int)
+    owner[patch] = part
+    signed = sparse.csr_array((sign, (np.arange(len(sign)), owner)), shape=(len(sign), count))
+    area = np.bincount(part, weight, count) + np.finfo(float).tiny
+    group = _grouped(signed.T @ energy @ signed, area)[part]
+    outside = outer_signs(points, sign[patch][:, None] * normals, group, weight)
+    group_of_patch = np.empty(len(sign), dtype=int)
+    group_of_patch[patch] = group
+    return sign * outside[group_of_patch]
+
+
+def _patch_energies(points: Floats, normals: Floats, weight: Floats, patch: Ints) -> Floats:
+    """Return the mutual energy of each two patches: of clumps of points, and of finer ones where those are near."""
+    count = patch.max() + 1
+    fine, _ = _clumps(points, weight[:, None] * normals, weight, patch, _FINE)
+    coarse, clump = _clumps(*fine[:4], _CLUMPS)
+    energy = _energies(*coarse, count)
+    return energy if len(coarse[0]) == len(fine[0]) else energy + _corrections(fine, coarse, clump, count)
+
+
+def _clumps(
+    points: Floats, moments: Floats, weight: Floats, patch: Ints, most: int
+) -> tuple[tuple[Array, Array, Array, Ints, float], Ints]:
+    """Gather dipoles of one patch and place, until there are at most so many.
+
+    Returns
+    -------
+    tuple
+        Place, moment, weight and patch of each clump, and the size of a place.
+    ndarray, (m,) int
+        The clump of each given dipole.
+    """
+    size = 0.0 if len(points) <= most else np.sqrt(len(points) / most) * _median_spacing(points)
+    while True:
+        if not size:
+            clump, count = np.arange(len(points)), len(points)
+        else:
+            cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
+            _, clump = np.unique(np.column_stack([patch, cell]), axis=0, return_inverse=True)
+            clump = clump.reshape(-1)
+            count = clump.max() + 1
+        if count <= most:
+            break
+        size *= 1.2
+    total = np.bincount(clump, weight, count)
+    share = np.where(total[clump] > 0.0, weight, 1.0)
+    share = share / np.bincount(clump, share, count)[clump]
+    place = np.column_stack([np.bincount(clump, share * points[:, axis], count) for axis in range(3)])
+    moment = np.column_stack([np.bincount(clump, moments[:, axis], count) for axis in range(3)])
+    owner = np.empty(count, dtype=int)
+    owner[clump] = patch
+    return (place, moment, total, owner, max(size, _median_spacing(points))), clump
+
+
+def _median_spacing(points: Floats) -> float:
+    """Return the spacing around most points."""
+    some = points[:: max(1, len(points) // _SAMPLE)]
+    return float(np.median(spacing_of(cKDTree(points).query(some, k=min(NEIGHBORS + 1, len(points)))[0])))
+
+
+def _energies(place: Floats, moment: Floats, _: Floats, owner: Ints, width: float, count: int) -> Floats:
+    """Return the mutual energy of each two patches, (count, count), by dipoles smoothed over a width."""
+    result = np.zeros((count, count))
+    patches = sparse.csr_array((np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), count))
+    for start in range(0, len(place), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        offset = place[None, :, :] - place[block, None, :]
+        square = np.einsum("ijk,ijk->ij", offset, offset) + width**2
+        here = np.einsum("ik,ijk->ij", moment[block], offset)
+        there = np.einsum("jk,ijk->ij", moment, offset)
+        result += patches[block].T @ (coupling(moment[block] @ moment.T, here * there, square, width**2) @ patches)
+    return result
+
+
+def _corrections(fine: Any, coarse: Any, clump: Any, count: Any) -> Any:
+    """Return by how much the energy of each two patches is more, (count, count), where near clumps are taken finely.
+
+    Within a clump there is one patch, whose energy with itself does not matter.
+    """
+    first, second = cKDTree(coarse[0]).query_pairs(_NEAR * coarse[4], output_type="ndarray").T
+    apart = coarse[3][first] != coarse[3][second]
+    first, second = first[apart], second[apart]
+    member, size = np.argsort(clump, kind="stable"), np.bincount(clump)
+    start = np.cumsum(size) - size
+    ends = np.cumsum(size[first] * size[second])
+    result = np.zeros((count, count))
+    for rows in np.split(np.arange(len(first)), np.searchsorted(ends, np.arange(_PAIRS, ends[-1:].sum(), _PAIRS))):
+        one, other = first[rows], second[rows]
+        times = size[one] * size[other]
+        row = np.repeat(np.arange(len(rows)), times)
+        place = np.arange(len(row)) - np.repeat(np.cumsum(times) - times, times)
+        left = member[start[one][row] + place // size[other][row]]
+        right = member[start[other][row] + place % size[other][row]]
+        more = np.bincount(row, _pair_energies(fine, left, right), len(rows)) - _pair_energies(coarse, one, other)
+        np.add.at(result, (coarse[3][one], coarse[3][other]), more)
+    return result + result.T
+
+
+def _pair_energies(dipoles: Any, first: Any, second: Any) -> Any:
+    """Return the energy of pairs of dipoles."""
+    place, moment, _, _, width = dipoles
+    offset = place[second] - place[first]
+    left, right = moment[first], moment[second]
+    along = np.einsum("ij,ij->i", left, offset) * np.einsum("ij,ij->i", right, offset)
+    square = np.einsum("ij,ij->i", offset, offset) + width**2
+    return coupling(np.einsum("ij,ij->i", left, right), along, square, width**2)
+
+
+def coupling(alike: Floats, along: Floats, square: Floats, smoothed: float = 0.0) -> Floats:
+    """Return the energy of dipoles by the product of their moments, of those along their distance, and its square.
+
+    The squared width over which they are smoothed, which the square of the distance holds, too, makes layers of dipoles
+    thick. What they do to each other within that thickness is left out: two parallel layers have no energy in common,
+    however close, as those that are thin.
+    """
+    return (alike * (1.0 - 3.0 * smoothed / square) - 3.0 * along / square) / (4.0 * np.pi * square**1.5)
+
+
+def _least(energy: Floats) -> Floats:
+    """Return signs, (m,), that no flip of one patch improves, the best of two beginnings."""
+    mutual = energy - np.diag(np.diag(energy))
+    mutual = 0.5 * (mutual + mutual.T)
+    scale = np.sqrt(np.maximum(np.abs(np.diag(energy)), np.finfo(float).tiny))
+    leading = np.linalg.eigh(mutual / scale / scale[:, None])[1][:, -1]
+    best, most = np.ones(len(mutual)), -np.inf
+    for sign in np.ones(len(mutual)), np.where(leading < 0.0, -1.0, 1.0):
+        field = mutual @ sign
+        for _ in range(20 * len(sign)):
+            worst = np.argmin(sign * field)
+            if sign[worst] * field[worst] >= 0.0:
+                break
+            sign[worst] = -sign[worst]
+            field += 2.0 * sign[worst] * mutual[worst]
+        total = float(sign @ field)
+        if total > most * (1.0 + 1e-9):  # the propagated signs, where both are alike
+            best, most = sign, total
+    return best
+
+
+def _grouped(energy: Floats, area: Floats) -> Ints:
+    """Number groups of parts of the surface that have one outside, (m,).
+
+    Parts, and then groups of them, are joined one by one as long as the energy that two have in common, which is a
+    length, is some share of the smaller one's size. Closed surfaces have none in common with others.
+    """
+    energy, area, group = energy.copy(), area.copy(), np.arange(len(area))
+    np.fill_diagonal(energy, -np.inf)
+    while True:
+        share = energy / np.sqrt(np.minimum(area[:, None], area))
+        into, gone = np.unravel_index(np.argmax(share), share.shape)
+        if not share[into, gone] > _COUPLED:
+            return np.unique(group, return_inverse=True)[1]
+        group[group == gone] = into
+        area[into] += area[gone]
+        for rows in (energy, energy.T):
+            rows[into] += rows[gone]
+        energy[gone] = energy[:, gone] = -np.inf
