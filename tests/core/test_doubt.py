@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.awkward import box
+from benchmarks.awkward import box, globe
 from benchmarks.samplings import fibonacci_sphere, noisy_sphere, random_sphere, torus_points
 from core import Doubt
 
@@ -20,19 +20,11 @@ def two_spheres():
     return np.concatenate([random_sphere(2000), (1.0 + gap) * random_sphere(2000, 1)])
 
 
-def rows():
-    """A torus in rows along the ring, up to ten times as far from each other as the points along them."""
-    ring, tube = (np.arange(count) * 2.0 * np.pi / count for count in (200, 16))
-    u, v = (angle.ravel() for angle in np.meshgrid(ring, tube))
-    radius = 1.0 + 0.4 * np.cos(v)
-    return np.stack([radius * np.cos(u), radius * np.sin(u), 0.4 * np.sin(v)], axis=1)
-
-
 CLOUDS = {
     Doubt.FEW: lambda: box([1.0, 1.0, 1.0], 300),
     Doubt.VOLUME: ball,
     Doubt.NOISE: lambda: noisy_sphere(4000, 1.2),
-    Doubt.ROWS: rows,
+    Doubt.ROWS: lambda: globe(30, 300),  # on circles of latitude, five times denser along than across and more
     Doubt.SHEETS: two_spheres,
 }
 SAID = {
@@ -75,7 +67,7 @@ def test_the_cause_moves_with_the_points(told, turned):
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0] if turned else np.eye(3)
     after = core.build_laplacian((7e3 * laplacian.points @ turn + 4.0)[order])
     before = laplacian.doubt[order]
-    assert np.mean(after.doubt == before) > 0.99  # rounding decides where trust is a half
+    assert np.mean(after.doubt == before) > 0.95  # where moments cannot be met, what is left depends on rounding
     both = (after.doubt > 0) & (before > 0)
     np.testing.assert_array_equal(after.doubt[both], before[both])
 
