@@ -150,7 +150,7 @@ QUANTITIES = (  # in the order of the panel
         carried="label",
         left_out=6,
         # As in `core.Doubt`.
-        names=("Trusted", "Too Few Points", "Volume", "Noise", "Rows", "Close Sheets", "Left Out"),
+        names=("Trusted", "Too Few", "Volume", "Noise", "Rows", "Sheets", "Left Out"),
     ),
     Quantity(SEGMENT, "Segment", "Number of the part", "segment", data_type="INT", carried="label"),
     Quantity(

@@ -42,7 +42,7 @@ class Analysis:
     @property
     def trusted_area(self) -> float:
         """Area of its parts whose results are not in doubt."""
-        return float(self.measures[AREA] @ (self.measures[DOUBT] == 0))
+        return float(self.measures[AREA][self.measures[DOUBT] == 0].sum())
 
     @property
     def counts(self) -> dict:
