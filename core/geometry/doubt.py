@@ -8,11 +8,11 @@ import numpy as np
 from ..types import Floats, Ints
 from .cells import Cells
 from .nearest import ON, Nearest, fading_weights
-from .noise import FILLING, ROUNDS
+from .noise import AVERAGINGS, FILLING
 
 _OWN = 0.5  # share of what a quadric misses all neighbours by, that one through the own sheet misses it by at most
 _AGREED = 0.8  # mean squared cosine of normals, by which they belong to one smooth surface
-_LONG = 5.0  # circle around a cell over its area: that of rectangles six times as long as wide, of even points 1.6
+_LONG = 5.0  # circle around a cell over its area: that of rectangles six times as long as wide, of random points 3.3
 
 
 class Doubt(IntEnum):
@@ -88,11 +88,10 @@ def likely_causes(nearest: Nearest, normals: Floats, cells: Cells, scatter: Floa
     """
     missed, own = scatter
     filling = missed > FILLING
-    smooth = np.zeros(len(missed), dtype=bool)
-    smooth[filling] = _agreement(nearest, normals)[filling] > _AGREED if filling.any() else False
+    smooth = filling & (_agreement(nearest, normals) > _AGREED) if filling.any() else filling
     slender = np.exp(nearest.averaging() @ np.log(np.pi * cells.radius**2 / cells.areas))
     return np.select(
-        [(missed > ON) & (own < _OWN * missed), filling & smooth, filling, slender > _LONG],
+        [(missed > ON) & (own < _OWN * missed), smooth, filling, slender > _LONG],
         [Doubt.SHEETS, Doubt.NOISE, Doubt.VOLUME, Doubt.ROWS],
         Doubt.FEW,
     )
@@ -102,7 +101,7 @@ def _agreement(nearest: Nearest, normals: Floats) -> Floats:
     """Return the mean squared cosine of the normals around every point to the direction that they agree with most."""
     averaging = replace(nearest, weight=fading_weights(nearest.distance)).averaging()  # over all sheets
     products = np.einsum("ia,ib->iab", normals, normals).reshape(-1, 9)
-    for _ in range(ROUNDS):
+    for _ in range(AVERAGINGS):
         products = averaging @ products
     largest: Floats = np.linalg.eigvalsh(products.reshape(-1, 3, 3))[:, 2]
     return largest

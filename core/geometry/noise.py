@@ -10,7 +10,7 @@ from .quadrics import fit_quadrics
 
 _FEW = 20  # neighbours of the fit that separates noise from shape, compared with that to all 40
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
-ROUNDS = 4  # of averaging over the neighbourhood
+AVERAGINGS = 4  # rounds of averaging over the neighbourhood
 _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
@@ -43,7 +43,7 @@ def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
     """
     averaging = nearest.averaging()
     logarithms = np.log(np.maximum(np.stack(misfits, axis=1) / nearest.spacing[:, None], 1e-12))
-    for _ in range(ROUNDS):
+    for _ in range(AVERAGINGS):
         logarithms = averaging @ logarithms
     means: Floats = np.exp(logarithms.T)
     return means
