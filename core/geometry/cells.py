@@ -10,7 +10,7 @@ import numpy as np
 from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints, Report
 from .distances import arc_squared
-from .nearest import Nearest
+from .nearest import COUNT, Nearest
 from .quadrics import frames
 from .sheets import on_sheet
 
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from .boundary import Boundary
 
 _BLOCK = 1 << 12
-_WIDER = 1, 4, 16  # times the 40 neighbours are looked at where a cell is open: a jump of density has them on one side
+_MANY = 21, COUNT, 4 * COUNT, 16 * COUNT  # of the nearest points, the first itself: more are looked at while a cell is
+# open, as a jump of density has them on one side
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
 _CURVED = -0.5  # least Gaussian curvature times the squared radius, where the fit is poor
 _OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
@@ -87,23 +88,23 @@ def measure_cells(
         rows = np.flatnonzero(boundary.distance[:, 0] < np.maximum(nearest.distance[:, -1], before.radius))
     whole = ~np.any(nearest.apart, axis=1)  # no neighbour was left out: more of them can close a cell
     spacing = nearest.spacing
-    for wider in _WIDER:
+    for many in _MANY:
         still_open = np.zeros(count, dtype=bool)
 
-        def measure(part: slice, rows: Ints = rows, wider: int = wider, still_open: Bools = still_open) -> None:
+        def measure(part: slice, rows: Ints = rows, many: int = many, still_open: Bools = still_open) -> None:
             block = rows[part]
-            cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, wider)
+            cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, many)
             areas, radius, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
             known = np.flatnonzero(closed)
-            if wider == 1 and not closed.all():
+            if many == COUNT and not closed.all():
                 gaps = np.flatnonzero(~closed)
                 capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / (_OPEN * spacing[block[gaps]]))], axis=1)
                 areas[gaps], radius[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
                 known = np.arange(len(block))
             cells.areas[block[known]], cells.radius[block[known]] = areas[known], radius[known]
-            still_open[block] = ~closed & whole[block]
+            still_open[block] = ~closed & (whole[block] | (many < COUNT))
 
-        on_all_cores(measure, blocks(len(rows), _BLOCK // wider), report)
+        on_all_cores(measure, blocks(len(rows), _BLOCK * COUNT // max(many, COUNT)), report)
         rows = np.flatnonzero(still_open)
     return cells
 
@@ -115,16 +116,17 @@ def _cuts(
     boundary: Boundary,
     component: Ints,
     rows: Ints,
-    wider: int,
+    many: int,
 ) -> tuple[Floats, Floats]:
-    """Return the cuts of some points, (k, cuts, 2), and how far the last of their neighbours is.
+    """Return the cuts of some points by so many neighbours, (k, cuts, 2), and how far the last of these is.
 
     A cut is the vector across it, as long as one over its distance; one that does not count is zero.
     """
-    if wider == 1:
-        index, distance, counted = nearest.index[rows], nearest.distance[rows], nearest.weight[rows] > 0.0
+    if many <= COUNT:
+        known = rows, slice(many)
+        index, distance, counted = nearest.index[known], nearest.distance[known], nearest.weight[known] > 0.0
     else:
-        many = min(wider * nearest.index.shape[1], len(normals))
+        many = min(many, len(normals))
         distance, index = nearest.tree.query(nearest.points[rows], k=many, workers=-1)
         counted = on_sheet(nearest, normals, rows, index, distance)[0]
         counted &= component[index] == component[rows, None]

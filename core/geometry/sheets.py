@@ -27,7 +27,7 @@ _AROUND = (
     1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an eighth;
 )
 # points that many spacings apart touch
-_SOURCES = 1 << 7  # points from which paths are followed at once
+_NEARBY, _SOURCES = 1 << 9, 1 << 6  # points that share a neighbourhood; of them, from which paths are followed at once
 
 
 def same_sheet(
@@ -342,24 +342,30 @@ def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints
     longest : ndarray, (k,)
         Greatest length of the path.
     """
-    # Ways start at the end with more pairs, so that fewer are followed; starts near each other share a neighbourhood.
+    # Ways start at the end with more pairs, so that fewer are followed.
     often = np.bincount(first, minlength=tree.n) + np.bincount(second, minlength=tree.n)
     swap = often[second] > often[first]
     first, second = np.where(swap, second, first), np.where(swap, first, second)
-    place = np.empty(tree.n, dtype=np.int64)
-    place[tree.indices] = np.arange(tree.n)
-    order = np.argsort(place[first], kind="stable")
-    start = np.flatnonzero(np.diff(place[first[order]], prepend=-1))
+    furthest = np.zeros(tree.n)
+    np.maximum.at(furthest, first, longest)
+    # Starts near each other share a neighbourhood; those of ways as long among them are followed at once.
+    start = tree.indices[furthest[tree.indices] > 0.0]
+    start = start[np.lexsort((furthest[start], np.arange(len(start)) // _NEARBY))]
+    number = np.empty(tree.n, dtype=np.int64)
+    number[start] = np.arange(len(start))
+    order = np.argsort(number[first], kind="stable")
+    ends = np.searchsorted(number[first[order]], np.arange(len(start) + 1))
     result = np.empty(len(first))
-    for block in range(0, len(start), _SOURCES):
-        source = first[order[start[block : block + _SOURCES]]]
-        end = start[block + _SOURCES] if block + _SOURCES < len(start) else len(order)
-        rows = order[start[block] : end]
-        limit = longest[rows].max()
-        low, high = tree.data[source].min(axis=0), tree.data[source].max(axis=0)
-        reach = 0.5 * np.linalg.norm(high - low) + limit
+    for nearby in blocks(len(start), _NEARBY):
+        places = tree.data[start[nearby]]
+        low, high = places.min(axis=0), places.max(axis=0)
+        reach = 0.5 * np.linalg.norm(high - low) + furthest[start[nearby]].max()
         around = np.array(tree.query_ball_point(0.5 * (low + high), reach, return_sorted=True))
-        length = dijkstra(steps[around][:, around], indices=np.searchsorted(around, source), limit=1.001 * limit)
-        which = np.cumsum(np.diff(first[rows], prepend=first[rows[0]]) != 0)
-        result[rows] = length[which, np.searchsorted(around, second[rows])]
+        local = steps[around][:, around]
+        for part in blocks(nearby.stop - nearby.start, _SOURCES):
+            begin, end = nearby.start + part.start, nearby.start + part.stop
+            source, rows = start[begin:end], order[ends[begin] : ends[end]]
+            limit = 1.001 * furthest[source].max()
+            length = dijkstra(local, indices=np.searchsorted(around, source), limit=limit)
+            result[rows] = length[number[first[rows]] - begin, np.searchsorted(around, second[rows])]
     return result
