@@ -62,6 +62,7 @@ from .errors import TooFewPointsError as TooFewPointsError
 from .errors import UnresolvedModesError as UnresolvedModesError
 from .example import example_sphere as example_sphere
 from .geometry import Discs as Discs
+from .geometry import Doubt as Doubt
 from .geometry import Prolongation as Prolongation
 from .geometry import blue_noise_subset as blue_noise_subset
 from .geometry import check_points as check_points

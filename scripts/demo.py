@@ -50,6 +50,7 @@ def demonstrate(scan, up):
     area = obj.meshfree.total_area
     exact = f" (exact: {shape.area():.6g})" if scan is None else ""
     print(f"total area   {area:.6g}{exact}")
+    print(f"trusted area {obj.meshfree.trusted_area:.6g}")
     values = obj["lb_eigenvalues"]
     print(f"eigenvalues  {', '.join(f'{value:.4g}' for value in values[:8])}, ...")
 

@@ -100,8 +100,11 @@ def step_colors(obj) -> dict:
         return dict(zip(("No", "Yes"), colors, strict=True))
     first, last = (round(value) for value in shown_range(obj))
     none, *repeated = colors
-    steps = range(first, last + 1)
-    return {str(number): none if number < 0 else repeated[number % CLASSES] for number in steps}
+    names = dict(enumerate(quantity(shown_attribute(obj)).names))
+    return {
+        names.get(number, str(number)): none if number < 0 else repeated[number % CLASSES]
+        for number in range(first, last + 1)
+    }
 
 
 def shown_values(obj):

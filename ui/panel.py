@@ -9,7 +9,7 @@ from ..operators.objects.colors import own_colors, own_material, shows_own_mater
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.quantities import APPLICATIONS, DEVIATION, RESULTS, quantity
 from ..operators.objects.reading import obstacle, sharing_objects
-from ..operators.objects.result import area_text, is_analyzed, is_stale, read_eigenvalues
+from ..operators.objects.result import area_text, is_analyzed, is_stale, is_trusted, read_eigenvalues
 from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..operators.running.application import ApplicationOperator
 from ..operators.running.job import running
@@ -170,8 +170,10 @@ def _draw_notices(layout, context, obj):
 
 
 def _draw_result(layout, context, result):
-    """Draw the total area, and the numbers of components, boundary points and points left out where not trivial."""
+    """Draw the total area, and where not trivial the trusted part and numbers of components and of kinds of points."""
     lines = [("Total Area", area_text(result.total_area))]
+    if result.is_property_set("trusted_area") and not is_trusted(result):  # it is not in files of earlier versions
+        lines.append(("Trusted Area", area_text(result.trusted_area)))
     if result.subset_count:
         lines.append(("Analyzed Points", f"{result.subset_count:,}"))
     if result.component_count > 1:

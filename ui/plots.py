@@ -12,7 +12,7 @@ _LINE = 16.0  # height of a line of text
 _BEYOND = (0.45, 0.45, 0.45, 1.0)
 _MARK = (1.0, 0.75, 0.2, 1.0)
 _BOX = 18.0  # height of a box in a legend
-_NAMED = 6  # bins that have a name each, at most
+_NAMED = 24  # letters in the names of bins, at most: of more only the first and the last bin have one
 
 
 def legend_picture(scale, width: float = 150.0) -> Picture:
@@ -71,14 +71,11 @@ def histogram_picture(scale, edges, counts, beyond) -> Picture:
         _write_axis(picture, scale.factor * edges[0], scale.factor * edges[-1], left, right, bottom - 0.7 * _LINE)
     elif total:
         names = list(scale.boxes)
-        for index in {0, len(counts) - 1} if len(counts) > _NAMED else range(len(counts)):
-            x = across(0.5 * (edges[index] + edges[index + 1]))
-            picture.text(
-                names[index] if len(names) == len(counts) else f"{low + 0.5 + index:.0f}",
-                x,
-                bottom - 0.7 * _LINE,
-                "CENTER",
-            )
+        if len(names) != len(counts):
+            names = [f"{low + 0.5 + index:.0f}" for index in range(len(counts))]
+        few = len("".join(names)) <= _NAMED
+        for index in range(len(counts)) if few else {0, len(counts) - 1}:
+            picture.text(names[index], across(0.5 * (edges[index] + edges[index + 1])), bottom - 0.7 * _LINE, "CENTER")
     y = _EDGE + 0.2 * _LINE
     if any(beyond):
         picture.text(f"{beyond[0]:,} below", left, y)

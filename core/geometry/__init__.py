@@ -4,6 +4,7 @@ from .boundary import Boundary
 from .cloud import Cloud, Discs, estimate_normals, read_cloud, surface_discs
 from .components import SMALLEST, move_apart
 from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights
+from .doubt import Doubt
 from .moments import RIDGE, TERMS, EdgeTerms, put_terms
 from .nearest import ON, ROUNDS, SMOOTH, fading_weights, find_nearest, nearest_rows, typical_distance
 from .normals import unit_normals

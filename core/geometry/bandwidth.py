@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..kernel import SUPPORT
 from ..options import LaplacianOptions
 from ..types import Floats, Ints
 from .boundary import Boundary
@@ -13,6 +14,7 @@ from .nearest import ROUNDS, Nearest
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
+_FEWEST = 24  # neighbours inside the kernel, so that weights are left to choose where five moments of a point are met
 _WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
 _MET = 3e-3  # relative error of the moments that no wider kernel is tried for
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
@@ -61,6 +63,7 @@ def smoothing_lengths(
     """
     if options.bandwidth == "adaptive":
         lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, _POWER)
+        lengths = np.maximum(lengths, nearest.distance[:, :_FEWEST + 1][:, -1] / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":

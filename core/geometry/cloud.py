@@ -16,8 +16,9 @@ from .boundary import Boundary, find_boundary, given_boundary, measure_boundary,
 from .cells import Cells, measure_cells
 from .components import label_components, move_apart
 from .distances import measure_squared_slope
+from .doubt import likely_causes
 from .nearest import Nearest, find_nearest
-from .noise import FILLING, LEFT, MOST, near_misfit, noise_level, project_points
+from .noise import FILLING, LEFT, MOST, mean_misfits, near_misfit, noise_level, project_points
 from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
@@ -45,12 +46,15 @@ class Sample:
         Neighbours of each point; components stand far apart there, and noisy points are where they were moved to.
     noise : ndarray, (m,)
         Noise that was smoothed at each point, as a share of the spacing; zero where none was.
+    scatter : ndarray, (2, m)
+        What quadrics missed the neighbours of each point by before that, see `likely_causes`; zero until it is known.
     """
 
     scaled: ScaledPoints
     component: Ints
     nearest: Nearest
     noise: Floats
+    scatter: Floats
 
     @property
     def moved(self) -> Floats:
@@ -108,6 +112,8 @@ class Cloud:
         Root mean square distance of the neighbours from the quadric.
     squared_slope : ndarray, (m,)
         Mean squared slope of the roughness that is finer than the normals resolve; zero where it is noise.
+    cause : ndarray, (m,) int
+        Of `Doubt`: why results would be in doubt.
     boundary : Boundary
     pairs : Pairs
         Points as moved, smoothing lengths and pairs.
@@ -126,6 +132,7 @@ class Cloud:
     spacing: Floats
     misfit: Floats
     squared_slope: Floats
+    cause: Ints
     boundary: Boundary
     pairs: Pairs
     notices: list[str]
@@ -209,6 +216,7 @@ def read_cloud(
         misfit=quadrics.misfit,
         # Where noise was smoothed, slopes are noise.
         squared_slope=np.where(sample.noise > 0.0, 0.0, measure_squared_slope(nearest, quadrics.normals)),
+        cause=likely_causes(nearest, oriented, cells, sample.scatter),
         boundary=edge,
         pairs=pairs,
         notices=_notices(
@@ -243,6 +251,8 @@ def read_surface(
     sample = divide_components(sample, needed)
     report("Normals", 0.1)
     surface = fit_surface(sample, options.sheets)
+    scatter = mean_misfits(surface.sample.nearest, surface.mixed.misfit, surface.quadrics.misfit)
+    surface = replace(surface, sample=replace(surface.sample, scatter=scatter))
     report("Normals", 0.12)
     surface = remove_noise(surface, options)
     report("Normals", 0.16)
@@ -271,7 +281,9 @@ def leave_outliers(scaled: ScaledPoints, needed: int, report: Report = lambda: N
         Too few are left.
     """
     count = len(scaled.points)
-    sample = Sample(scaled, np.zeros(count, dtype=int), find_nearest(scaled.points), np.zeros(count))
+    sample = Sample(
+        scaled, np.zeros(count, dtype=int), find_nearest(scaled.points), np.zeros(count), np.zeros((2, count))
+    )
     report()
     return _regroup(sample, np.where(find_outliers(sample.nearest), -1, 0), needed)
 
@@ -405,7 +417,7 @@ def _regroup(sample: Sample, component: Ints, needed: int) -> Sample:
     scaled, changed, moved = sample.scaled.leave_out(~kept), sample.nearest.across(component), sample.moved[kept]
     component = component[kept]
     nearest = sample.nearest.renewed(move_apart(scaled.points, component) + moved, changed, kept)
-    return Sample(scaled, component, nearest, sample.noise[kept])
+    return Sample(scaled, component, nearest, sample.noise[kept], sample.scatter[:, kept])
 
 
 def locate_boundary(

@@ -10,7 +10,7 @@ from .quadrics import fit_quadrics
 
 _FEW = 20  # neighbours of the fit that separates noise from shape, compared with that to all 40
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
-_ROUNDS = 4  # of averaging over the neighbourhood
+AVERAGINGS = 4  # rounds of averaging over the neighbourhood
 _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
@@ -25,6 +25,28 @@ def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
     part = slice(_FEW + 1)
     weight = fading_weights(nearest.distance[rows, part])
     return fit_quadrics(nearest.points, nearest.index[rows, part], weight, rows).misfit
+
+
+def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
+    """Return the geometric means of misfits of quadrics over the neighbourhood, in spacings.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    *misfits : ndarray, (m,)
+
+    Returns
+    -------
+    ndarray, (k, m)
+        Of the k given ones. An edge that runs through a neighbourhood has little weight.
+    """
+    averaging = nearest.averaging()
+    logarithms = np.log(np.maximum(np.stack(misfits, axis=1) / nearest.spacing[:, None], 1e-12))
+    for _ in range(AVERAGINGS):
+        logarithms = averaging @ logarithms
+    means: Floats = np.exp(logarithms.T)
+    return means
 
 
 def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -> Floats:
@@ -43,16 +65,12 @@ def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -
     ndarray, (m,)
         The misfit of a quadric through 20 neighbours; zero where it is next to nothing, or where a quadric through
         40 fits so much worse that it is shape, not noise, that it misses. No shape is missed by as much as `FILLING`.
-        All are geometric means over the neighbourhood: an edge that runs through it is no noise. The majority of
-        the neighbours decides.
+        All are `mean_misfits`: an edge that runs through the neighbourhood is no noise. The majority of the neighbours
+        decides.
     """
-    averaging = nearest.averaging()
-    logarithms = np.log(np.maximum(np.stack([near, mixed, misfit], axis=1) / nearest.spacing[:, None], 1e-12))
-    for _ in range(_ROUNDS):
-        logarithms = averaging @ logarithms
-    few, many, own = np.exp(logarithms.T)
+    few, many, own = mean_misfits(nearest, near, mixed, misfit)
     noisy = (few > _LEAST) & (few < _SHAPE * own) & ((few > FILLING) | (many < _SHAPE * few))
-    return np.where(averaging @ noisy.astype(float) > 0.5, few, 0.0)
+    return np.where(nearest.averaging() @ noisy.astype(float) > 0.5, few, 0.0)
 
 
 def project_points(tree: cKDTree, rows: Ints, noise: Floats, component: Ints | None = None) -> Floats:

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from ..arguments import check_switches
 from ..errors import InvalidPointsError
-from ..geometry import arc_length, check_points, check_values, move_apart, read_cloud, toward
+from ..geometry import Doubt, arc_length, check_points, check_values, move_apart, read_cloud, toward
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
@@ -19,12 +19,11 @@ from ..types import Bools, Floats, Ints, Progress
 from .areas import NO_AREA, solve_areas
 from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
 from .stiffness import Stiffness, assemble_stiffness
+from .trust import doubt_notices, measure_trust
 
 if TYPE_CHECKING:
     from ..geometry import Cloud
 
-_FAR, _MISSED = 0.1, 1.0  # residual of the moments, and misfit of quadrics in spacings, at which trust is a half
-_DOUBTFUL = 0.02  # share of the area without trust from which there is a notice
 NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that suffice for random points
 
 
@@ -65,6 +64,8 @@ class LaplaceBeltrami:
     trust : ndarray, (n,)
         How reliable results are, from 0 to 1: less than a half where no positive weights have the moments of the kernel
         within a tenth, or where the neighbours deviate from a quadric by their spacing. 0 for points left out.
+    doubt : ndarray, (n,) int
+        Why it is less than a half, of `Doubt`; 0 where it is not.
     smoothing_lengths : ndarray, (n,)
         h of each point [L]; the radius of the kernel is 3 h.
     kernel_widths : ndarray, (n,)
@@ -94,6 +95,7 @@ class LaplaceBeltrami:
     boundary_direction: Floats
     component: Ints
     trust: Floats
+    doubt: Ints
     smoothing_lengths: Floats
     kernel_widths: Floats
     stiffness: sparse.csr_array
@@ -418,13 +420,10 @@ def laplacian_of(
             "The kernel of most points covers more than a third of the object, which is too wide for good results."
             " Add points, or make the kernel narrower."
         )
-    trust = _trust(cloud, assembled.residual)
-    doubtful = np.sum(areas[trust < 0.5]) / np.sum(areas)
-    if doubtful > _DOUBTFUL and options.bandwidth == "adaptive":  # the width of others is the caller's choice
-        notices.append(
-            f"On {doubtful:.0%} of the surface the results are unreliable: the points are too few for its curvature,"
-            " lie in rows, or lie between close sheets. The attribute lb_trust shows where. Add points there."
-        )
+    trust = measure_trust(cloud, assembled.residual)
+    doubt = np.where(trust < 0.5, cloud.cause, Doubt.NONE)
+    if options.bandwidth == "adaptive":  # the width of others is the caller's choice
+        notices += doubt_notices(doubt, areas)
     return LaplaceBeltrami(
         points=points,
         surface_points=points + scaled.scatter(cloud.moved * scaled.scale, 0.0),
@@ -441,6 +440,7 @@ def laplacian_of(
         boundary_direction=scaled.scatter(cloud.boundary.outward[:, 0], 0.0),
         component=scaled.scatter(cloud.component, -1),
         trust=scaled.scatter(trust, 0.0),
+        doubt=scaled.scatter(doubt, Doubt.LEFT_OUT),
         smoothing_lengths=scaled.scatter(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         kernel_widths=scaled.scatter(assembled.widths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         stiffness=assembled.matrix,
@@ -448,11 +448,6 @@ def laplacian_of(
         options=options,
         notices=notices,
     )
-
-
-def _trust(cloud: Cloud, residual: Floats) -> Floats:
-    """Return how reliable results are, (m,), from 0 to 1."""
-    return 1.0 / (1.0 + (residual / _FAR) ** 2 + (cloud.misfit / (_MISSED * cloud.spacing)) ** 2)
 
 
 def narrow_laplacian(

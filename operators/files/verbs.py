@@ -125,9 +125,9 @@ class Analyze(ObjectVerb):
         super().__init__("analyze")
         self.help = "areas, normals, curvature, boundaries and vibration modes of point clouds"
         self.description = (
-            "Analyze point clouds. Writes one JSON line per input: points, total area, components, points at a"
-            " boundary, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1 if"
-            " any input failed."
+            "Analyze point clouds. Writes one JSON line per input: points, total area, trusted area, components, points"
+            " at a boundary, points left out, eigenvalues, seconds per stage, notices; or the error. The exit code is 1"
+            " if any input failed."
         )
         self._earlier = None  # modes and points of the frame before
 
@@ -166,6 +166,7 @@ class Analyze(ObjectVerb):
         return {
             "points": point_count(obj.data),
             "total_area": analysis.total_area,
+            "trusted_area": analysis.trusted_area,
             **analysis.counts,
             "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
             **matched,

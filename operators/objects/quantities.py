@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 AREA, NORMAL = "lb_area", "lb_normal"
 MEAN_CURVATURE, GAUSSIAN_CURVATURE = "lb_mean_curvature", "lb_gaussian_curvature"
-BOUNDARY, COMPONENT, TRUST = "lb_boundary", "lb_component", "lb_trust"
+BOUNDARY, COMPONENT = "lb_boundary", "lb_component"
+TRUST, DOUBT = "lb_trust", "lb_doubt"
 SEGMENT = "lb_segment"
 SHAPE_INDEX, CURVEDNESS = "lb_shape_index", "lb_curvedness"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"
@@ -52,6 +53,8 @@ class Quantity(NamedTuple):
         Whether it is a vector in the tangent plane.
     numbered : bool
         Whether there are several, with numbers of three digits; written without a unit, since they are compared.
+    names : tuple of str
+        What its whole numbers from zero stand for; empty where they are numbers.
     """
 
     attribute: str
@@ -67,6 +70,7 @@ class Quantity(NamedTuple):
     color_range: str = ""
     along_surface: bool = False
     numbered: bool = False
+    names: tuple = ()
 
     def of(self, found):
         """Return its values from the result of the tool."""
@@ -135,6 +139,18 @@ QUANTITIES = (  # in the order of the panel
         "laplacian.trust",
         left_out=0.0,
         bounds=(0.0, 1.0),
+    ),
+    Quantity(
+        DOUBT,
+        "Doubt",
+        "Why the results are in doubt where trust is below 0.5",
+        "analyze",
+        "laplacian.doubt",
+        "INT",
+        carried="label",
+        left_out=6,
+        # As in `core.Doubt`.
+        names=("Trusted", "Too Few", "Volume", "Noise", "Rows", "Sheets", "Left Out"),
     ),
     Quantity(SEGMENT, "Segment", "Number of the part", "segment", data_type="INT", carried="label"),
     Quantity(

@@ -21,6 +21,7 @@ from .quantities import AREA, EIGENVECTOR, NORMAL, RESULTS
 from .reading import chosen_sides, fingerprint, metric, sharing_objects
 
 _DIGITS = 3  # that scans justify
+_LEAST = 1e-3  # share of an area in doubt that is told
 EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
 
 
@@ -99,7 +100,7 @@ def _settings(obj):
 def _note_analysis(obj, analysis, settings):
     """Keep the figures of an analysis on an object, with its settings as text."""
     kept = obj.meshfree
-    kept.total_area = analysis.total_area
+    kept.total_area, kept.trusted_area = analysis.total_area, analysis.trusted_area
     kept.point_count = point_count(obj.data)
     kept.subset_count = analysis.subset_count
     for name, count in analysis.counts.items():
@@ -111,6 +112,11 @@ def _note_analysis(obj, analysis, settings):
     kept.fingerprint = fingerprint(obj)
     kept.metric = metric(obj).reshape(-1)
     kept.settings_used = settings
+
+
+def is_trusted(result) -> bool:
+    """Whether nothing of the area of a result, or of the settings of an object with one, is in doubt."""
+    return result.trusted_area >= (1.0 - _LEAST) * result.total_area
 
 
 def read_eigenvalues(obj):

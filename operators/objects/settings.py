@@ -354,6 +354,9 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
 
     # Results of the last analysis, for the panel and for scripts.
     total_area: FloatProperty(name="Total Area", description="Area of the whole surface", unit="AREA", min=0.0)
+    trusted_area: FloatProperty(
+        name="Trusted Area", description="Area of the parts whose results are not in doubt", unit="AREA", min=0.0
+    )
     point_count: IntProperty(name="Points", description="How many points the last analysis had", min=0)
     subset_count: IntProperty(
         name="Points in the Subset",

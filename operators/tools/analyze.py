@@ -10,9 +10,9 @@ from ... import core
 from ...core import UnresolvedModesError
 from ..objects.attributes import point_count
 from ..objects.options import laplacian_options, point_budget
-from ..objects.quantities import AREA, BOUNDARY, COMPONENT, NORMAL
+from ..objects.quantities import AREA, BOUNDARY, COMPONENT, DOUBT, NORMAL
 from ..objects.reading import read_points
-from ..objects.result import analysis_names, area_text, write_result
+from ..objects.result import analysis_names, area_text, is_trusted, write_result
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator
@@ -38,6 +38,11 @@ class Analysis:
     def total_area(self) -> float:
         """Area of the whole surface."""
         return float(self.measures[AREA].sum())
+
+    @property
+    def trusted_area(self) -> float:
+        """Area of its parts whose results are not in doubt."""
+        return float(self.measures[AREA][self.measures[DOUBT] == 0].sum())
 
     @property
     def counts(self) -> dict:
@@ -130,7 +135,8 @@ class AnalysisOperator(ShownOperator):
         write_result(obj, result, self.write_limit)
         modes = "" if result.spectrum is None else f", {len(result.spectrum.eigenvalues)} modes"
         points, seconds = point_count(obj.data), sum(result.seconds.values())
-        line = f"{obj.name}: {area_text(result.total_area)} from {points:,} points{modes}, {seconds:.1f} s"
+        trusted = "" if is_trusted(result) else f" ({area_text(result.trusted_area)} of it trusted)"
+        line = f"{obj.name}: {area_text(result.total_area)}{trusted} from {points:,} points{modes}, {seconds:.1f} s"
         return [*result.notices, line]
 
 

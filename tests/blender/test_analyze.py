@@ -21,6 +21,7 @@ def expected(core, obj):
         "lb_area": laplacian.areas,
         "lb_boundary": laplacian.boundary,
         "lb_component": laplacian.component,
+        "lb_doubt": laplacian.doubt,
         "lb_disc": normals / np.linalg.norm(normals, axis=1)[:, None] * (laplacian.cell_radius / spacing)[:, None],
         "lb_gaussian_curvature": laplacian.gaussian_curvature,
         "lb_mean_curvature": core.mean_curvature(laplacian),
@@ -55,7 +56,7 @@ def test_types_of_the_attributes():
     types = {name: obj.data.attributes[name].data_type for name in RESULTS}
     assert {types.pop("lb_normal"), types.pop("lb_disc")} == {"FLOAT_VECTOR"}
     assert types.pop("lb_boundary") == "BOOLEAN"
-    assert types.pop("lb_component") == "INT"
+    assert types.pop("lb_component") == types.pop("lb_doubt") == "INT"
     assert set(types.values()) == {"FLOAT"}
 
 

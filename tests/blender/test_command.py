@@ -74,6 +74,7 @@ def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
     assert line["file"] == str(tmp_path / name)
     assert line["points"] == 1000
     assert line["total_area"] == pytest.approx(laplacian.areas.sum(), rel=1e-4)
+    assert line["trusted_area"] == line["total_area"]
     assert line["eigenvalues"] == pytest.approx(spectrum.eigenvalues.tolist(), rel=1e-3, abs=1e-9)
     assert (line["component_count"], line["boundary_count"], line["left_out_count"]) == (1, 0, 0)
     assert line["notices"] == []
@@ -89,8 +90,9 @@ def test_every_input_gives_what_core_gives(core, run, tmp_path, name):
         assert_allclose(arrays["gaussian_curvature"], laplacian.gaussian_curvature, rtol=0.01)
         assert not arrays["boundary"].any()
         assert not arrays["component"].any()
+        assert not arrays["doubt"].any()
         stiffness = {"format", "shape", "data", "indices", "indptr"}
-        numbers = arrays.keys() - {"boundary", "component"} - stiffness
+        numbers = arrays.keys() - {"boundary", "component", "doubt"} - stiffness
         assert {arrays[key].dtype for key in numbers} == {np.dtype(np.float64)}
         assert stiffness < arrays.keys()
 

@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_group, add_object, sphere_points
+from operators.objects.quantities import quantity
+from tests.blender.clouds import add_group, add_object, attribute, sphere_points
 from tests.blender.test_panel import draw
 from tests.blender.test_seeing import add_camera
 
@@ -38,6 +39,24 @@ def test_a_legend_is_as_high_as_what_it_holds(overlay, cloud):
         assert min(boxes) < 25.0
     assert heights[2] < 90.0 < heights[6] < heights[12]
     assert heights[12] - heights[6] == pytest.approx(6 / 4 * (heights[6] - heights[2]))
+
+
+def test_a_legend_names_the_causes_of_doubt(core, overlay):
+    """In the order of core's numbers, and in the colors of these; the histogram has room for the outer names only."""
+    obj = add_object(np.random.default_rng(0).uniform(-1.0, 1.0, (1000, 3)))
+    bpy.ops.meshfree.analyze()
+    doubt = attribute(obj, "lb_doubt")
+    assert np.count_nonzero(doubt == core.Doubt.VOLUME) > 100
+    doubt[:7] = range(7)
+    obj.data.attributes["lb_doubt"].data.foreach_set("value", doubt)
+    bpy.ops.meshfree.colormap(attribute="lb_doubt")
+    obj.meshfree.histogram = True
+    legend, histogram = overlay.pictures(obj, bpy.context.scene)
+    boxes = [text.text for text in legend.texts if text.part.startswith("box")]
+    assert boxes == list(quantity("lb_doubt").names)
+    others = {core.Doubt.NONE: "Trusted", core.Doubt.FEW: "Too Few"}
+    assert boxes == [others.get(cause, cause.name.replace("_", " ").title()) for cause in core.Doubt]
+    assert {"Trusted", "Left Out"} == set(boxes) & {text.text for text in histogram.texts}
 
 
 @pytest.mark.parametrize(

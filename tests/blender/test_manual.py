@@ -29,7 +29,8 @@ KEPT = {
     "metric",
     "settings_used",
 }
-RESULTS = {"total_area", "point_count", "subset_count", "component_count", "boundary_count", "left_out_count"}
+RESULTS = {"total_area", "trusted_area", "point_count", "subset_count"}
+RESULTS |= {"component_count", "boundary_count", "left_out_count"}
 BINDING = {"name", "is_bound", "matrix", "handle_items", "binding_id", "point_count", "fingerprint"}
 BINDING |= {"groups_used", "settings_used"}
 

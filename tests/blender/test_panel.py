@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests import splat_files
-from tests.blender.clouds import add_object, grid_points, sphere_points
+from tests.blender.clouds import add_object, attribute, grid_points, sphere_points
 from tests.blender.conftest import part
 from tests.blender.operators import NOT_TOOLS, OPERATORS, tools
 from tests.blender.splats import add_splats, bar_splats
@@ -88,6 +88,21 @@ def draw():
         if not hasattr(panel, "poll") or panel.poll(bpy.context):
             panel.draw(SimpleNamespace(layout=Layout(texts), bl_label=panel.bl_label), bpy.context)
     return texts
+
+
+def test_the_area_that_can_be_trusted_stands_beside_the_total(capfd):
+    obj = add_object(np.random.default_rng(0).uniform(-1.0, 1.0, (1000, 3)))
+    bpy.ops.meshfree.analyze()
+    areas, doubt = attribute(obj, "lb_area"), attribute(obj, "lb_doubt")
+    assert obj.meshfree.trusted_area == pytest.approx(areas[doubt == 0].sum(), rel=1e-5)
+    assert obj.meshfree.trusted_area < 0.9 * obj.meshfree.total_area
+    texts = draw()
+    trusted = texts[texts.index("Trusted Area") + 1]
+    assert f"{texts[texts.index('Total Area') + 1]} ({trusted} of it trusted) from" in capfd.readouterr().out
+    add_object(sphere_points(), "Sphere")
+    bpy.ops.meshfree.analyze()
+    assert "Total Area" in draw()
+    assert "Trusted Area" not in draw()
 
 
 def test_panel_without_object_says_what_to_do():

@@ -13,7 +13,8 @@ WITHOUT = {  # functions whose examples are those of what they go with, or which
     *("modes_needed", "points_that_fit", "signature_energies", "signature_times", "smoothing_base", "values_on_mesh"),
     *("read_splats", "write_splats"),
 }
-CLASSES = {"CoarseDeformer", "Deformer", "Geodesics", "LaplacianOptions", "Prolongation", "Slopes", "Transport"}
+CLASSES = {"CoarseDeformer", "Deformer", "Doubt", "Geodesics", "LaplacianOptions", "Prolongation", "Slopes"}
+CLASSES |= {"Transport"}
 METHODS = {"LaplaceBeltrami.apply", "LaplaceBeltrami.eigenpairs", "LaplaceBeltrami.toward", "paper.build_laplacian"}
 FUNCTIONS = {name for name in core.__all__ if inspect.isfunction(getattr(core, name))}
 SHOWN = sorted(CLASSES | METHODS | FUNCTIONS - WITHOUT)

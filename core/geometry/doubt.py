@@ -1,0 +1,107 @@
+"""Why results are in doubt where they are: what the neighbours of a point look like."""
+
+from dataclasses import replace
+from enum import IntEnum
+
+import numpy as np
+
+from ..types import Floats, Ints
+from .cells import Cells
+from .nearest import ON, Nearest, fading_weights
+from .noise import AVERAGINGS, FILLING
+
+_OWN = 0.5  # share of what a quadric misses all neighbours by, that one through the own sheet misses it by at most
+_AGREED = 0.8  # mean squared cosine of normals, by which they belong to one smooth surface
+_LONG = 5.0  # circle around a cell over its area: that of rectangles six times as long as wide, of random points 3.3
+
+
+class Doubt(IntEnum):
+    """Causes for which the results at a point are in doubt.
+
+    Attributes
+    ----------
+    NONE
+        They are not.
+    FEW
+        The points are too few for how much the surface bends, or for how fast their density changes.
+    VOLUME
+        The neighbours fill a volume and lie on no surface, as in vegetation, or where details are finer than the
+        spacing.
+    NOISE
+        They lie around a surface, but are off it by about the spacing.
+    ROWS
+        They lie in rows, far from each other.
+    SHEETS
+        Another sheet of the surface is about as near as the next points.
+    LEFT_OUT
+        The point is an outlier, or in a component of few points, and left out of the operator.
+
+    See Also
+    --------
+    LaplaceBeltrami : Its `doubt` holds these.
+
+    Examples
+    --------
+    None of the results on a well sampled sphere are in doubt; many on points throughout a cube are, for one cause:
+
+    >>> import numpy as np
+    >>> import core
+    >>> points = core.example_sphere()
+    >>> print(core.build_laplacian(points).doubt.max())
+    0
+    >>> points = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, 3))
+    >>> doubt = core.build_laplacian(points).doubt
+    >>> print(core.Doubt(np.bincount(doubt[doubt > 0]).argmax()).name)
+    VOLUME
+    """
+
+    NONE = 0
+    FEW = 1
+    VOLUME = 2
+    NOISE = 3
+    ROWS = 4
+    SHEETS = 5
+    LEFT_OUT = 6
+
+
+def likely_causes(nearest: Nearest, normals: Floats, cells: Cells, scatter: Floats) -> Ints:
+    """Tell what would be wrong at every point, if its results should turn out to be in doubt.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    normals : ndarray, (m, 3)
+        Unit normals of any sign.
+    cells : Cells
+        Of the points.
+    scatter : ndarray, (2, m)
+        What quadrics through all neighbours, and through those of the own sheet, missed them by before noise was
+        smoothed, in spacings: from `mean_misfits`.
+
+    Returns
+    -------
+    ndarray, (m,) int
+        Of `Doubt`. No shape is missed by more than `FILLING`: where all neighbours are, but those of the own sheet are
+        not, there are several sheets; otherwise noise, if the normals agree once it is smoothed, and no surface if they
+        do not. Where the neighbours lie on a surface, these are rows, if cells are long and narrow, or too few points.
+    """
+    missed, own = scatter
+    filling = missed > FILLING
+    smooth = filling & (_agreement(nearest, normals) > _AGREED) if filling.any() else filling
+    slender = np.exp(nearest.averaging() @ np.log(np.pi * cells.radius**2 / cells.areas))
+    return np.select(
+        [(missed > ON) & (own < _OWN * missed), smooth, filling, slender > _LONG],
+        [Doubt.SHEETS, Doubt.NOISE, Doubt.VOLUME, Doubt.ROWS],
+        Doubt.FEW,
+    )
+
+
+def _agreement(nearest: Nearest, normals: Floats) -> Floats:
+    """Return the mean squared cosine of the normals around every point to the direction that they agree with most."""
+    averaging = replace(nearest, weight=fading_weights(nearest.distance)).averaging()  # over all sheets
+    products = np.einsum("ia,ib->iab", normals, normals).reshape(-1, 9)
+    for _ in range(AVERAGINGS):
+        products = averaging @ products
+    largest: Floats = np.linalg.eigvalsh(products.reshape(-1, 3, 3))[:, 2]
+    return largest
