@@ -63,7 +63,7 @@ def smoothing_lengths(
     """
     if options.bandwidth == "adaptive":
         lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, _POWER)
-        lengths = np.maximum(lengths, nearest.distance[:, :_FEWEST + 1][:, -1] / SUPPORT)
+        lengths = np.maximum(lengths, nearest.distance[:, : _FEWEST + 1][:, -1] / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
