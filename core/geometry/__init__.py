@@ -12,6 +12,6 @@ from .pairs import Pairs
 from .patches import Patch
 from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values
 from .prolongation import Prolongation, balanced_weights
-from .quadrics import along_curves, check_surface, frames
+from .quadrics import check_surface, frames, roundness
 from .subset import blue_noise_subset
 from .thinning import nearest_in_blocks, thin
