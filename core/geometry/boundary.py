@@ -21,8 +21,6 @@ _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 _FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
 _BESIDE = 16  # the nearest of them, by which those that face elsewhere are found: on coarse balls more lie behind
-_LINK = 6.0  # gaps between candidates of the same boundary
-_SHORTEST = 16  # candidates of a boundary that is found
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at least, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
@@ -81,7 +79,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
 
     Candidates are points around which the directions of the neighbours leave a wide gap, and far into which there is
     nothing. Where neighbours lie off a point's sheet or face elsewhere, the surface does not end but goes on past an
-    edge. Short rows of candidates are dropped, as chance or as a hole that the kernel spans.
+    edge. Candidates that could not surround the empty place before them are dropped, as chance.
 
     Parameters
     ----------
@@ -117,10 +115,14 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     rows = rows[~_bends_away(nearest, oriented, rows)]
     ahead = _PROBE * gaps[rows]
     probe = points[rows] + ahead[:, None] * outward_directions(nearest, oriented, rows)
-    rows = rows[nearest.tree.query(probe, workers=-1)[0] > _EMPTY * ahead]
-    if len(rows) < _SHORTEST:
+    distance, next_one = nearest.tree.query(probe, workers=-1)
+    # What is nearest there may be sparser: then the surface goes on, as sparse as that.
+    rows = rows[distance > _EMPTY * np.maximum(ahead, _PROBE * gaps[next_one])]
+    if len(rows) < FEWEST:
         return result
-    result[rows[_row_sizes(points[rows], _LINK * gaps[rows]) >= _SHORTEST]] = True
+    label = _label_courses(points[rows], _PROBE * gaps[rows])
+    length = np.bincount(label, nearest.spacing[rows] / gaps[rows])
+    result[rows] = length[label] >= 2.0 * np.pi * _EMPTY * _PROBE
     return result
 
 
@@ -132,11 +134,10 @@ def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
     return np.count_nonzero(beside, axis=1) > _FOLDED
 
 
-def _row_sizes(points: Floats, reach: Floats) -> Ints:
-    """Return how many candidates, (k, 3), the row of each one has; those of a row are within reach of each other."""
+def _label_courses(points: Floats, reach: Floats) -> Ints:
+    """Number the boundaries that boundary points, (k, 3), lie on; those of one are within reach of each other."""
     distance, other = cKDTree(points).query(points, k=min(9, len(points)), workers=-1)
-    label = label_connected(other, distance <= reach[:, None])
-    return np.bincount(label)[label]
+    return label_connected(other, distance <= reach[:, None])
 
 
 def outward_directions(nearest: Nearest, normals: Floats, rows: Ints) -> Floats:
@@ -264,8 +265,9 @@ class _Course:
 def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     points = nearest.points
     distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
-    # A boundary that is given may be sparse, so that its rows are found without a reach.
-    fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, *_CURVE)[:, None]
+    # A boundary that is given may be sparse, so that its courses are found without a reach.
+    label = _label_courses(points[rows], np.full(len(rows), np.inf))
+    fitted = np.clip(np.bincount(label)[label] // _PART, *_CURVE)[:, None]
     across = outward_directions(nearest, normals, rows)
     near = other[:, :9]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
