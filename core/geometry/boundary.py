@@ -21,8 +21,9 @@ _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 _FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
 _BESIDE = 16  # the nearest of them, by which those that face elsewhere are found: on coarse balls more lie behind
+_AROUND = 5.0  # radii of the empty place that candidates must go around it, of 2 pi: chance leaves some of them out
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
-_CURVE = 34  # candidates that the boundary's course is fitted to, at most
+_CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at least, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
@@ -120,7 +121,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
         return result
     label = _label_courses(points[rows], _PROBE * gaps[rows])
     length = np.bincount(label, nearest.spacing[rows] / gaps[rows])
-    result[rows] = length[label] >= 2.0 * np.pi * _EMPTY * _PROBE
+    result[rows] = length[label] >= _AROUND * _EMPTY * _PROBE
     return result
 
 
@@ -264,10 +265,10 @@ class _Course:
 
 def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     points = nearest.points
-    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE + 1, len(rows)), workers=-1)
+    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
     # A boundary that is given may be sparse, so that its courses are found without a reach.
     label = _label_courses(points[rows], np.full(len(rows), np.inf))
-    fitted = np.clip(np.bincount(label)[label] // _PART, FEWEST, _CURVE)[:, None]
+    fitted = np.clip(np.bincount(label)[label] // _PART, *_CURVE)[:, None]
     across = outward_directions(nearest, normals, rows)
     near = other[:, :9]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
