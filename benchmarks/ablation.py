@@ -24,6 +24,7 @@ from core.geometry import (
     noise,
     outliers,
     quadrics,
+    rows,
     sheets,
 )
 from core.operator import areas, curvature, images, stiffness, weights
@@ -42,12 +43,12 @@ from .samplings import fibonacci_sphere, random_sphere
 from .tables import Table
 
 MODULES = (
-    *(nearest, outliers, components, quadrics, sheets, noise, boundary, cells, bandwidth, distances, cloud),
+    *(nearest, outliers, components, quadrics, rows, sheets, noise, boundary, cells, bandwidth, distances, cloud),
     *(areas, weights, images, curvature, stiffness),
 )
 UNTUNED = (  # memory, rounding, counts, and what only notices go by
     *("_BLOCK", "_SOURCES", "_SAME", "_EVEN", "_SMALLEST", "_TERMS", "_PAIRS", "NO_AREA", "_WIDER", "COUNT"),
-    *("_MEMORY", "_RIDGE", "_NARROW", "bandwidth._STEPS", "boundary._REACH", "_AT_BOUNDARY"),
+    *("_MEMORY", "_RIDGE", "components._FIRST", "_NARROW", "bandwidth._STEPS", "boundary._REACH", "_AT_BOUNDARY"),
 )
 DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"
 NOTE = """\

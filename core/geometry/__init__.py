@@ -13,7 +13,7 @@ from .pairs import Pairs, find_pairs
 from .patches import Patch
 from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values
 from .prolongation import Prolongation, balanced_weights
-from .quadrics import along_curves, check_surface, frames
+from .quadrics import check_surface, frames, roundness
 from .sheets import same_sheet
 from .subset import blue_noise_subset
 from .thinning import nearest_in_blocks, thin

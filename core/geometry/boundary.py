@@ -11,7 +11,7 @@ from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
-from .nearest import ON, SMOOTH, Nearest, fading_weights
+from .nearest import COUNT, ON, SMOOTH, Nearest, fading_weights
 from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
@@ -21,17 +21,14 @@ _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 _FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
 _BESIDE = 16  # the nearest of them, by which those that face elsewhere are found: on coarse balls more lie behind
-_LINK = 6.0  # gaps between candidates of the same boundary
-_SHORTEST = 16  # candidates of a boundary that is found
+_AROUND = 5.0  # radii of the empty place that candidates must go around it, of 2 pi: chance leaves some of them out
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at least, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
-_KINKED = 1.3  # scatter over that of the neighbours at which a corner is near
 _EXACT = 0.1  # of the spacing: candidates that scatter less about the boundary's course lie on it
-_VIEWS = 48  # nearest candidates that a point looks at
-_AVERAGED = 8  # the nearest of them on one side of a corner, whose measures of the distance are averaged
+_NEAREST = 8  # power of the doubt in what a boundary point tells: the nearest ones on one side of a corner decide
 _STRAIGHT = 0.8  # cosine of the directions across one course of the boundary, at least
 _FURTHER = 2.0  # times the measured distance, and spacings more, within which a point of the boundary must lie
 
@@ -81,7 +78,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
 
     Candidates are points around which the directions of the neighbours leave a wide gap, and far into which there is
     nothing. Where neighbours lie off a point's sheet or face elsewhere, the surface does not end but goes on past an
-    edge. Short rows of candidates are dropped, as chance or as a hole that the kernel spans.
+    edge. Candidates that could not surround the empty place before them are dropped, as chance.
 
     Parameters
     ----------
@@ -117,10 +114,14 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     rows = rows[~_bends_away(nearest, oriented, rows)]
     ahead = _PROBE * gaps[rows]
     probe = points[rows] + ahead[:, None] * outward_directions(nearest, oriented, rows)
-    rows = rows[nearest.tree.query(probe, workers=-1)[0] > _EMPTY * ahead]
-    if len(rows) < _SHORTEST:
+    distance, next_one = nearest.tree.query(probe, workers=-1)
+    # What is nearest there may be sparser: then the surface goes on, as sparse as that.
+    rows = rows[distance > _EMPTY * np.maximum(ahead, _PROBE * gaps[next_one])]
+    if len(rows) < FEWEST:
         return result
-    result[rows[_row_sizes(points[rows], _LINK * gaps[rows]) >= _SHORTEST]] = True
+    label = _label_courses(points[rows], _PROBE * gaps[rows])
+    length = np.bincount(label, nearest.spacing[rows] / gaps[rows])
+    result[rows] = length[label] >= _AROUND * _EMPTY * _PROBE
     return result
 
 
@@ -132,11 +133,10 @@ def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
     return np.count_nonzero(beside, axis=1) > _FOLDED
 
 
-def _row_sizes(points: Floats, reach: Floats) -> Ints:
-    """Return how many candidates, (k, 3), the row of each one has; those of a row are within reach of each other."""
+def _label_courses(points: Floats, reach: Floats) -> Ints:
+    """Number the boundaries that boundary points, (k, 3), lie on; those of one are within reach of each other."""
     distance, other = cKDTree(points).query(points, k=min(9, len(points)), workers=-1)
-    label = label_connected(other, distance <= reach[:, None])
-    return np.bincount(label)[label]
+    return label_connected(other, distance <= reach[:, None])
 
 
 def outward_directions(nearest: Nearest, normals: Floats, rows: Ints) -> Floats:
@@ -177,15 +177,15 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
         return boundary
     course = _fit_course(nearest, normals, rows)
     tree = cKDTree(nearest.points[rows])
-    span, view = tree.query(nearest.points, k=min(_VIEWS, len(rows)), workers=-1)
+    span, view = tree.query(nearest.points, k=min(COUNT, len(rows)), workers=-1)
     close = np.flatnonzero(span[:, 0] < reach)
 
     def measure(part: slice) -> None:
         block = close[part]
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
-        # Near candidates are best, but not those at a corner of the boundary while there are others.
-        doubt = (near + _FURTHER * spacing) * np.where(course.kinked[seen], 10.0, 1.0)
+        # Near candidates are best, and those away from corners of the boundary.
+        doubt = (near + _FURTHER * spacing) * course.scatter[seen]
         distance, curvature = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
         eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
@@ -193,8 +193,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
             best = np.argmin(np.where(eligible, doubt, np.inf), axis=1)
             ahead = course.outward[seen[every, best]]
             same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > _STRAIGHT)
-            rank = np.argsort(np.argsort(np.where(same, doubt, np.inf), axis=1, kind="stable"), axis=1, kind="stable")
-            trust = np.where(same & (rank < _AVERAGED), 1.0 / doubt, 0.0)
+            trust = np.where(same, (doubt / doubt.min(axis=1, keepdims=True)) ** -_NEAREST, 0.0)
             total = trust.sum(axis=1)
             known = same.any(axis=1)
             total[~known] = 1.0
@@ -224,14 +223,17 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
 
 @dataclass(frozen=True)
 class _Course:
-    """Parabolas that the boundary follows around each boundary point: e = a + b t + c t^2 along two tangents."""
+    """Parabolas that the boundary follows around each boundary point: e = a + b t + c t^2 along two tangents.
+
+    `scatter` is that of the boundary points about each over the usual one around: above one next to a corner.
+    """
 
     rows: Ints
     along: Array
     across: Array
     outward: Array
     coefficients: Floats
-    kinked: Bools
+    scatter: Floats
 
     def ahead(self, points: Floats, chosen: Ints, seen: Ints) -> tuple[Floats, Floats]:
         """Return how far other boundary points lie outside a parabola's tangent, and its direction across there."""
@@ -264,8 +266,9 @@ class _Course:
 def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     points = nearest.points
     distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
-    # A boundary that is given may be sparse, so that its rows are found without a reach.
-    fitted = np.clip(_row_sizes(points[rows], np.full(len(rows), np.inf)) // _PART, *_CURVE)[:, None]
+    # A boundary that is given may be sparse, so that its courses are found without a reach.
+    label = _label_courses(points[rows], np.full(len(rows), np.inf))
+    fitted = np.clip(np.bincount(label)[label] // _PART, *_CURVE)[:, None]
     across = outward_directions(nearest, normals, rows)
     near = other[:, :9]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
@@ -288,11 +291,11 @@ def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
         fit[better], scatter[better] = other_fit[better], other_scatter[better]
     close = np.where(np.arange(other.shape[1]) < fitted // 2, scatter[other] * unit[other, 0], np.nan)
     usual = np.nanmedian(close, axis=1) / unit[:, 0]
-    kinked = scatter > _KINKED * usual + _EXACT * spacing
+    relative = np.maximum((scatter + _EXACT * spacing) / (usual + _EXACT * spacing), 1.0)
     fit[:, 0] += _LEVEL * usual
     fit *= np.concatenate([unit, np.ones_like(unit), 1.0 / unit], axis=1)
     outward = across - fit[:, 1:2] * along
-    return _Course(rows, along, across, outward / np.linalg.norm(outward, axis=1)[:, None], fit, kinked)
+    return _Course(rows, along, across, outward / np.linalg.norm(outward, axis=1)[:, None], fit, relative)
 
 
 def _on_sheet(nearest: Nearest, normals: Floats, rows: Ints, other: Ints, distance: Floats) -> Bools:

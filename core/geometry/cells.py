@@ -118,19 +118,21 @@ def _cuts(
     rows: Ints,
     many: int,
 ) -> tuple[Floats, Floats]:
-    """Return the cuts of some points by so many neighbours, (k, cuts, 2), and how far the last of these is.
+    """Return the cuts of some points by so many neighbours, (k, cuts, 2), and how far away the last of these is.
 
     A cut is the vector across it, as long as one over its distance; one that does not count is zero.
     """
     if many <= COUNT:
         known = rows, slice(many)
         index, distance, counted = nearest.index[known], nearest.distance[known], nearest.weight[known] > 0.0
+        joined = np.ones(index.shape, dtype=bool)
     else:
         many = min(many, len(normals))
         distance, index = nearest.tree.query(nearest.points[rows], k=many, workers=-1)
         counted = on_sheet(nearest, normals, rows, index, distance)[0]
-        counted &= component[index] == component[rows, None]
-    index, distance, counted = index[:, 1:], distance[:, 1:], counted[:, 1:]
+        joined = component[index] == component[rows, None]
+        counted &= joined
+    index, distance, counted, joined = index[:, 1:], distance[:, 1:], counted[:, 1:], joined[:, 1:]
     frame = frames(normals[rows])[:, :, 1:]
     chord = nearest.points[index] - nearest.points[rows, None]
     own, other = normals[rows], normals[index]
@@ -145,7 +147,8 @@ def _cuts(
     cuts = step * (counted / (np.maximum(np.linalg.norm(step, axis=2), 1e-300) * length))[:, :, None]
     inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])
     outward = np.einsum("iac,ick->iak", boundary.outward[rows], frame) / inside[:, :, None]
-    return np.concatenate([cuts, outward], axis=1), np.sqrt(squared[:, -1])
+    # Of a small component all points are seen, and nothing is known of what lies further away than they do.
+    return np.concatenate([cuts, outward], axis=1), np.sqrt(np.max(squared, axis=1, where=joined, initial=0.0))
 
 
 def _caps(cuts: Floats, size: Floats) -> Floats:

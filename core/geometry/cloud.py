@@ -24,6 +24,7 @@ from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
 from .quadrics import Quadrics, check_surface, frames
+from .rows import look_across_rows
 from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 from .winding import orient_by_winding
 
@@ -281,9 +282,8 @@ def leave_outliers(scaled: ScaledPoints, needed: int, report: Report = lambda: N
         Too few are left.
     """
     count = len(scaled.points)
-    sample = Sample(
-        scaled, np.zeros(count, dtype=int), find_nearest(scaled.points), np.zeros(count), np.zeros((2, count))
-    )
+    nearest = look_across_rows(find_nearest(scaled.points))
+    sample = Sample(scaled, np.zeros(count, dtype=int), nearest, np.zeros(count), np.zeros((2, count)))
     report()
     return _regroup(sample, np.where(find_outliers(sample.nearest), -1, 0), needed)
 
@@ -321,7 +321,7 @@ def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, cha
     """
     nearest = sample.nearest
     if not sheets:
-        check_surface(nearest.quadrics.curved)
+        check_surface(nearest.quadrics.roundness)
         return Surface(sample, nearest.quadrics)
     fitted = fit_sheets(nearest, before.sheets if before else None, changed)
     return Surface(replace(sample, nearest=fitted.nearest), fitted.quadrics, fitted)
@@ -375,7 +375,7 @@ def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, B
     points, rows = nearest.points.copy(), np.flatnonzero(moving)
     points[rows] = project_points(nearest.tree, rows, noise, sample.component)
     changed = moving | moving[nearest.index].any(axis=1)
-    moved = replace(sample, nearest=nearest.renewed(points, changed))
+    moved = replace(sample, nearest=look_across_rows(nearest.renewed(points, changed)))
     return fit_surface(moved, surface.sheets is not None, surface, changed), changed
 
 
@@ -416,7 +416,7 @@ def _regroup(sample: Sample, component: Ints, needed: int) -> Sample:
         )
     scaled, changed, moved = sample.scaled.leave_out(~kept), sample.nearest.across(component), sample.moved[kept]
     component = component[kept]
-    nearest = sample.nearest.renewed(move_apart(scaled.points, component) + moved, changed, kept)
+    nearest = look_across_rows(sample.nearest.renewed(move_apart(scaled.points, component) + moved, changed, kept))
     return Sample(scaled, component, nearest, sample.noise[kept], sample.scatter[:, kept])
 
 

@@ -32,12 +32,15 @@ class Nearest:
     distance : ndarray, (m, 41)
     weight : ndarray, (m, 41)
         From 1 at the point to 0 at its last neighbour; 0 too for neighbours on another sheet of the surface.
+    in_row : ndarray, (m,) bool
+        Points that crowd along a row, so that their neighbours are not simply the nearest: see `look_across_rows`.
     """
 
     tree: cKDTree
     index: Ints
     distance: Floats
     weight: Floats
+    in_row: Bools
 
     @property
     def points(self) -> Floats:
@@ -58,6 +61,12 @@ class Nearest:
     def quadrics(self) -> Quadrics:
         """A quadric around every point through its neighbours, fitted once: `Quadrics`."""
         return fit_quadrics(self.points, self.index, self.weight)
+
+    def with_quadrics(self, quadrics: Quadrics) -> Nearest:
+        """Return the same neighbours with quadrics that were fitted already."""
+        result = replace(self)
+        vars(result)["quadrics"] = quadrics
+        return result
 
     def keep(self, kept: Bools) -> Nearest:
         """Return the same neighbours with the weight of those not kept, (m, 41) bool, set to zero.
@@ -92,11 +101,11 @@ class Nearest:
         rows, row = np.flatnonzero(changed[kept]), (np.cumsum(kept) - 1).astype(np.int32)
         tree, index, distance = cKDTree(points), row[self.index[kept]], self.distance[kept]
         distance[rows], index[rows] = tree.query(points[rows], k=width, workers=-1)
-        result = Nearest(tree, index, distance, fading_weights(distance))
-        if "quadrics" in vars(self):
-            fitted = fit_quadrics(points, index[rows], result.weight[rows], rows)
-            vars(result)["quadrics"] = self.quadrics.take(np.flatnonzero(kept)).put(rows, fitted)
-        return result
+        result = Nearest(tree, index, distance, fading_weights(distance), self.in_row[kept] & ~changed[kept])
+        if "quadrics" not in vars(self):
+            return result
+        fitted = fit_quadrics(points, index[rows], result.weight[rows], rows)
+        return result.with_quadrics(self.quadrics.take(np.flatnonzero(kept)).put(rows, fitted))
 
     def averaging(self) -> sparse.csr_array:
         """Return the (m, m) CSR matrix whose product is the weighted mean over the neighbours."""
@@ -110,7 +119,7 @@ def find_nearest(points: Floats) -> Nearest:
     """Find the 40 nearest neighbours of every point, (m, 3)."""
     tree = cKDTree(points)
     distance, index = tree.query(points, k=min(COUNT, len(points)), workers=-1)
-    return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance))
+    return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance), np.zeros(len(points), dtype=bool))
 
 
 def spacing_of(distance: Floats) -> Floats:

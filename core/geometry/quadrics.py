@@ -6,10 +6,10 @@ import numpy as np
 
 from ..algebra import blocks, eliminate, on_all_cores
 from ..errors import NotASurfaceError
-from ..types import Bools, Floats, Ints
+from ..types import Floats, Ints
 
 _BLOCK = 1 << 13  # points fitted at one time
-_CURVE = 5e-3  # variance across over that along, of neighbours on a curve
+_CURVE = 5e-3  # roundness of neighbours on a curve
 _CURVES = 0.01  # share of the points around which they may be
 _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie on a conic
 
@@ -31,8 +31,9 @@ class Quadrics:
         surface curves away from the normal.
     misfit : ndarray, (m,)
         Root mean square distance of the neighbours from the quadric [L].
-    curved : ndarray, (m,) bool
-        The neighbours lie along a curve, so that they have no normal.
+    roundness : ndarray, (m,)
+        Variance of the neighbours across over that along: next to zero on a curve, which has no normal; one where the
+        normal was given.
     """
 
     normals: Floats
@@ -40,7 +41,7 @@ class Quadrics:
     height: Floats
     shape_operator: Floats
     misfit: Floats
-    curved: Bools
+    roundness: Floats
 
     def take(self, rows: Ints) -> "Quadrics":
         """Return those of some rows, (k,) int."""
@@ -85,7 +86,7 @@ def fit_quadrics(
         height=np.empty((count, 3)),
         shape_operator=np.empty((count, 3, 3)),
         misfit=np.empty(count),
-        curved=np.zeros(count, dtype=bool),
+        roundness=np.ones(count),
     )
 
     def fit_block(block: slice) -> None:
@@ -95,7 +96,7 @@ def fit_quadrics(
         covariance = _covariance(offset, share)
         if normals is None:
             variance, frame = np.linalg.eigh(covariance)
-            fitted.curved[block] = along_curves(variance)
+            fitted.roundness[block] = roundness(variance)
         else:
             frame = frames(normals[block])
         unit = 3.0 * np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))  # makes the equations well scaled
@@ -142,20 +143,20 @@ def _sums(left: Floats, right: Floats) -> Floats:
     return np.einsum("ik,ik->i", left, right)
 
 
-def along_curves(variances: Floats) -> Bools:
-    """Return which neighbourhoods lie along a curve, (k,), by their variances in ascending order, (k, 3)."""
-    return variances[:, 1] < _CURVE * variances[:, 2]
+def roundness(variances: Floats) -> Floats:
+    """Return the second over the largest variance of neighbourhoods, (k,), by variances in ascending order, (k, 3)."""
+    return variances[:, 1] / np.maximum(variances[:, 2], 1e-300)
 
 
-def check_surface(curved: Bools) -> None:
-    """Check that the points are those of a surface, by which neighbourhoods lie along a curve, (m,).
+def check_surface(roundness: Floats) -> None:
+    """Check that the points are those of a surface, by how round their neighbourhoods are, (m,).
 
     Raises
     ------
     NotASurfaceError
         The points of many neighbourhoods lie along a curve.
     """
-    curves, count = np.count_nonzero(curved), len(curved)
+    curves, count = np.count_nonzero(roundness < _CURVE), len(roundness)
     if curves > _CURVES * count:
         raise NotASurfaceError(
             f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane."

@@ -134,7 +134,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
     else:
         rows = np.flatnonzero(changed)
         mixed = before.mixed.put(rows, fit_quadrics(points, index[rows], whole[rows], rows))
-    check_surface(mixed.curved)
+    check_surface(mixed.roundness)
     spacing = nearest.spacing
     missed = mixed.misfit > ON * spacing
     planes = mixed.normals.copy()

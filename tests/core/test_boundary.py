@@ -121,6 +121,19 @@ class TestFinding:
     def test_none_on_closed_surfaces(self, name):
         assert np.count_nonzero(read_cloud(CLOSED[name], LaplacianOptions()).boundary.at_boundary) == 0
 
+    @pytest.mark.parametrize("seed", range(1, 4))
+    def test_none_where_a_dense_half_goes_on_as_a_sparse_one(self, seed):
+        dense, sparse = random_sphere(12_000, seed), random_sphere(200, seed + 10)
+        points = np.concatenate([dense[dense[:, 2] < 0.0], sparse[sparse[:, 2] >= 0.0]])
+        assert not np.any(read_cloud(points, LaplacianOptions()).boundary.at_boundary)
+
+    @pytest.mark.parametrize(("radius", "found"), [(2.0, False), (8.0, True)])
+    def test_holes_that_are_wide_enough(self, radius, found):
+        points = grid_points(np.arange(50.0), np.arange(50.0), [0.0])
+        center = np.linalg.norm(points - [24.5, 24.5, 0.0], axis=1)
+        at_boundary = flat_boundary(points[center > radius]).at_boundary
+        assert np.any(at_boundary[center[center > radius] < 12.0]) == found
+
     @pytest.mark.parametrize("seed", range(2))
     def test_none_at_the_edge_of_a_thin_lens(self, seed):
         # Two caps that meet at an acute edge, and hardly bend elsewhere.

@@ -6,6 +6,7 @@ import pytest
 import core
 from benchmarks.samplings import (
     fibonacci_sphere,
+    grid_points,
     random_sphere,
     square_grid,
     square_random,
@@ -114,3 +115,15 @@ def test_measured_alone():
     np.testing.assert_allclose(cells.areas, cloud.cell_areas, rtol=1e-2)
     assert np.all(cells.radius > 0.5 * nearest.spacing)
     assert np.all(cells.radius < nearest.spacing)
+
+
+def test_cells_of_a_small_component_end_near_its_points():
+    # A strip that bends around a place with no points, seen whole in one look at more neighbours, and a sheet far away.
+    angle, radius = np.meshgrid(np.linspace(0.0, 0.5 * np.pi, 48), np.arange(30.0, 33.0))
+    strip = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=2).reshape(-1, 3)
+    sheet = grid_points(np.arange(40.0), np.arange(40.0), [0.0]) + [200.0, 0.0, 0.0]
+    points = np.concatenate([strip, sheet])
+    nearest, component = find_nearest(points), np.repeat([1, 0], [len(strip), len(sheet)])
+    count = len(points)
+    cells = measure_cells(nearest, np.tile([0.0, 0.0, 1.0], (count, 1)), np.zeros(count), no_boundary(count), component)
+    assert cells.radius.max() < 3.0

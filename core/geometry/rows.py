@@ -1,0 +1,100 @@
+"""Neighbours across rows: where points crowd along lines, such as the rings of a turning lidar."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..algebra import blocks, on_all_cores
+from ..types import Bools, Floats, Ints
+from .components import label_connected
+from .nearest import Nearest, fading_weights
+from .quadrics import fit_quadrics, roundness
+
+_ROW = 0.2  # roundness of the nearest points of a row: ten times denser along than across, and of the nearest eight
+_NEXT = 8  # nearest neighbours that a row is followed by
+_WIDER = 16  # times the 40 neighbours are looked at: the next row may be a hundred times as far as the next point
+_BLOCK = 1 << 11  # points looked at at one time
+
+
+def look_across_rows(nearest: Nearest) -> Nearest:
+    """Find the neighbours of points anew whose nearest ones lie along a row, as long as there are other rows.
+
+    They are then the nearest ones in each of eight directions, in turn. Of a curve, which has no rows beside it, the
+    points keep the neighbours that they have.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+
+    Returns
+    -------
+    Nearest
+        The same one where points nowhere lie along rows.
+    """
+    rows = np.flatnonzero((nearest.quadrics.roundness < _ROW) & ~nearest.in_row)
+    rows = rows[_round(nearest, rows) < _ROW]
+    if not len(rows):
+        return nearest
+    in_row = nearest.in_row.copy()
+    in_row[rows] = True
+    label = _label_rows(nearest, in_row)
+    index, distance, weight = nearest.index.copy(), nearest.distance.copy(), nearest.weight.copy()
+    alone = np.zeros(len(rows), dtype=bool)
+
+    def find(part: slice) -> None:
+        block = rows[part]
+        far, other = nearest.tree.query(nearest.points[block], k=min(_WIDER * index.shape[1], nearest.tree.n))
+        beside = label[other] != label[block, None]
+        alone[part] = ~beside.any(axis=1)
+        offset = nearest.points[other] - nearest.points[block, None]
+        every = np.arange(len(block))
+        sector = _sectors(offset, offset[:, _NEXT], offset[every, beside.argmax(axis=1)])
+        sector[:, 0] = 8  # the point itself
+        chosen = np.argsort(_ranks(sector), axis=1, kind="stable")[:, : index.shape[1]]
+        chosen.sort(axis=1)
+        found = ~alone[part]
+        some = block[found]
+        index[some] = np.take_along_axis(other, chosen, axis=1)[found]
+        distance[some] = np.take_along_axis(far, chosen, axis=1)[found]
+
+    on_all_cores(find, blocks(len(rows), _BLOCK))
+    in_row[rows[alone]] = False
+    rows = rows[~alone]
+    weight[rows] = fading_weights(distance[rows])
+    fitted = fit_quadrics(nearest.points, index[rows], weight[rows], rows)
+    result = replace(nearest, index=index, distance=distance, weight=weight, in_row=in_row)
+    return result.with_quadrics(nearest.quadrics.put(rows, fitted))
+
+
+def _round(nearest: Nearest, rows: Ints) -> Floats:
+    """Return how round the nearest eight neighbours of some points lie, (k,)."""
+    offset = nearest.points[nearest.index[rows, : _NEXT + 1]]
+    offset = offset - offset.mean(axis=1, keepdims=True)
+    return roundness(np.linalg.eigvalsh(np.swapaxes(offset, 1, 2) @ offset))
+
+
+def _label_rows(nearest: Nearest, in_row: Bools) -> Ints:
+    """Number the rows, chains of points each of which is next to those nearest to it, (m,); other points are alone."""
+    next_to = nearest.index[:, : _NEXT + 1]
+    return label_connected(next_to, in_row[:, None] | in_row[next_to])
+
+
+def _sectors(offset: Floats, along: Floats, beside: Floats) -> Ints:
+    """Return in which of eight directions offsets lie, (k, views), counted from that along the row."""
+    along = along / np.linalg.norm(along, axis=1)[:, None]
+    across = beside - np.einsum("ic,ic->i", beside, along)[:, None] * along
+    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
+    angle = np.arctan2(np.einsum("ikc,ic->ik", offset, across), np.einsum("ikc,ic->ik", offset, along))
+    return np.round(angle * (4.0 / np.pi)).astype(int) % 8
+
+
+def _ranks(label: Ints) -> Ints:
+    """Return how many before each entry of a line have its label, (k, views)."""
+    place = np.arange(label.shape[1])
+    order = np.argsort(label, axis=1, kind="stable")
+    ordered = np.take_along_axis(label, order, axis=1)
+    new = np.diff(ordered, axis=1, prepend=-1) != 0
+    rank = np.empty_like(order)
+    np.put_along_axis(rank, order, place - np.maximum.accumulate(np.where(new, place, 0), axis=1), axis=1)
+    return rank

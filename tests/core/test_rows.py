@@ -1,0 +1,86 @@
+"""Points that crowd along rows, and curves, which are none of a surface."""
+
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import grid_points, random_sphere
+from core.geometry.nearest import find_nearest
+from core.geometry.rows import look_across_rows
+
+
+def rings(count=12, sides=600):
+    """A plane as a turning lidar sees it, and its area: rings 8 to 19 times as far apart as their points."""
+    radius = 10.0 * 1.15 ** np.arange(count)
+    angle = np.arange(sides) * 2.0 * np.pi / sides
+    flat = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    area = np.pi * (radius[-1] ** 2 - radius[0] ** 2)
+    return np.concatenate([flat.reshape(-1, 2), np.zeros((count * sides, 1))], axis=1), area
+
+
+def torus_of_circles(circles=30, sides=170):
+    """A torus in circles that are fourteen times as far apart as their points."""
+    u, v = np.meshgrid(np.arange(circles) * 2.0 * np.pi / circles, np.arange(sides) * 2.0 * np.pi / sides)
+    radius = 1.0 + 0.4 * np.cos(v)
+    points = np.stack([radius * np.cos(u), radius * np.sin(u), 0.4 * np.sin(v)], axis=2)
+    return points.reshape(-1, 3), 1.6 * np.pi**2
+
+
+def helix():
+    angle = np.linspace(0.0, 10.0 * np.pi, 3000)
+    return np.column_stack([np.cos(angle), np.sin(angle), 0.05 * angle])
+
+
+def circle():
+    angle = np.arange(900) * np.pi / 450.0
+    return np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+
+
+def noisy_line():
+    return np.arange(2000.0)[:, None] * [1.0, 0.0, 0.0] + 0.2 * np.random.default_rng(0).standard_normal((2000, 3))
+
+
+@pytest.mark.parametrize(("cloud", "at_boundary"), [(rings(), 1200), (torus_of_circles(), 0)], ids=["rings", "torus"])
+def test_a_surface_in_rows_is_measured(cloud, at_boundary):
+    points, area = cloud
+    laplacian = core.build_laplacian(points)
+    assert laplacian.areas.sum() == pytest.approx(area, rel=2e-3)
+    assert np.all(laplacian.component == 0)
+    assert np.count_nonzero(laplacian.boundary) == at_boundary
+
+
+def test_eigenvalues_of_a_rectangle_in_rows():
+    # They are twenty times as far apart as their points, and leave the last gap of the unit square out.
+    points = grid_points(np.arange(600) / 600.0, np.arange(30) / 30.0, [0.0])
+    values = core.build_laplacian(points).eigenpairs(6).eigenvalues
+    exact = np.sort([(i * i + (j * 30.0 / 29.0) ** 2) * np.pi**2 for i in range(4) for j in range(4)])[1:6]
+    np.testing.assert_allclose(values[1:], exact, rtol=3e-2)
+
+
+@pytest.mark.parametrize("points", [helix(), circle(), noisy_line()], ids=["helix", "circle", "noisy line"])
+def test_a_curve_is_refused(points):
+    with pytest.raises(core.NotASurfaceError, match="along a curve"):
+        core.build_laplacian(points)
+
+
+def test_neighbors_lie_all_around():
+    points = grid_points(np.arange(400.0), 50.0 * np.arange(9), [0.0])
+    middle = 4 * 400 + 200 if points[1, 0] == 1.0 else 200 * 9 + 4
+    nearest = look_across_rows(find_nearest(points))
+    offset = points[nearest.index[middle]] - points[middle]
+    assert np.all(np.diff(nearest.distance[middle]) >= 0.0)
+    np.testing.assert_allclose(np.linalg.norm(offset, axis=1), nearest.distance[middle])
+    assert [np.count_nonzero(offset[:, 1] == row) for row in (-50.0, 0.0, 50.0)] == [15, 11, 15]
+    assert len(np.unique(nearest.index[middle])) == len(offset)
+    assert np.all(nearest.in_row)
+
+
+def test_nothing_changes_where_points_lie_in_no_rows():
+    nearest = find_nearest(random_sphere(1500))
+    assert look_across_rows(nearest) is nearest
+
+
+def test_a_curve_keeps_its_neighbors():
+    nearest = find_nearest(circle())
+    np.testing.assert_array_equal(look_across_rows(nearest).index, nearest.index)
+    assert not np.any(look_across_rows(nearest).in_row)
