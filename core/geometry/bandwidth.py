@@ -14,7 +14,9 @@ from .nearest import ROUNDS, Nearest
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
-_FEWEST = 24  # neighbours inside the kernel, so that weights are left to choose where five moments of a point are met
+_FEWEST = (
+    24  # cells inside the kernel at least, so that weights are left to choose where five moments of a point are met
+)
 _WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
 _MET = 3e-3  # relative error of the moments that no wider kernel is tried for
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
@@ -63,7 +65,8 @@ def smoothing_lengths(
     """
     if options.bandwidth == "adaptive":
         lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, _POWER)
-        lengths = np.maximum(lengths, nearest.distance[:, : _FEWEST + 1][:, -1] / SUPPORT)
+        cell = _repeat(nearest.averaging(), cells.areas, ROUNDS)
+        lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(_FEWEST / np.pi * cell) / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":

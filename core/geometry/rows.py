@@ -32,6 +32,8 @@ def look_across_rows(nearest: Nearest) -> Nearest:
     Nearest
         The same one where points nowhere lie along rows.
     """
+    if nearest.index.shape[1] <= _NEXT:
+        return nearest
     rows = np.flatnonzero((nearest.quadrics.roundness < _ROW) & ~nearest.in_row)
     rows = rows[_round(nearest, rows) < _ROW]
     if not len(rows):
@@ -59,12 +61,16 @@ def look_across_rows(nearest: Nearest) -> Nearest:
         distance[some] = np.take_along_axis(far, chosen, axis=1)[found]
 
     on_all_cores(find, blocks(len(rows), _BLOCK))
-    in_row[rows[alone]] = False
-    rows = rows[~alone]
-    weight[rows] = fading_weights(distance[rows])
-    fitted = fit_quadrics(nearest.points, index[rows], weight[rows], rows)
+    found = rows[~alone]
+    weight[found] = fading_weights(distance[found])
+    fitted = fit_quadrics(nearest.points, index[found], weight[found], found)
+    rounder = fitted.roundness > nearest.quadrics.roundness[found]  # others may be a narrow strip
+    back = np.setdiff1d(rows, found[rounder])
+    for values, before in (index, nearest.index), (distance, nearest.distance), (weight, nearest.weight):
+        values[back] = before[back]
+    in_row[back] = False
     result = replace(nearest, index=index, distance=distance, weight=weight, in_row=in_row)
-    return result.with_quadrics(nearest.quadrics.put(rows, fitted))
+    return result.with_quadrics(nearest.quadrics.put(found[rounder], fitted.take(np.flatnonzero(rounder))))
 
 
 def _round(nearest: Nearest, rows: Ints) -> Floats:

@@ -65,7 +65,7 @@ def test_results_colors_and_groups_are_on_the_vertices(obj):
     made = make(obj)
     places = local_points(made)
     names = {item.name for item in obj.data.attributes if item.name.startswith("lb_")}
-    assert len(names) == 16
+    assert len(names) == 17
     assert names <= {item.name for item in made.data.attributes}
     assert_allclose(attribute(made, "lb_normal"), places, atol=0.02)
     for name in ("lb_normal", "lb_direction_1"):  # the latter has no sign to interpolate

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.awkward import box, globe
+from benchmarks.awkward import box
 from benchmarks.samplings import fibonacci_sphere, noisy_sphere, random_sphere, torus_points
 from core import Doubt
+from core.geometry.boundary import no_boundary
+from core.geometry.cells import measure_cells
+from core.geometry.doubt import likely_causes
+from core.geometry.nearest import find_nearest
+from core.geometry.rows import look_across_rows
 
 
 def ball():
@@ -24,7 +29,6 @@ CLOUDS = {
     Doubt.FEW: lambda: box([1.0, 1.0, 1.0], 300),
     Doubt.VOLUME: ball,
     Doubt.NOISE: lambda: noisy_sphere(4000, 1.2),
-    Doubt.ROWS: lambda: globe(30, 300),  # on circles of latitude, five times denser along than across and more
     Doubt.SHEETS: two_spheres,
 }
 SAID = {
@@ -104,3 +108,13 @@ def test_a_width_of_the_callers_choice_is_not_blamed():
     laplacian = core.build_laplacian(ball(), options=options)
     assert laplacian.doubt.any()
     assert not any("lb_doubt" in notice for notice in laplacian.notices)
+
+
+@pytest.mark.parametrize(("across", "cause"), [(1.0, Doubt.FEW), (8.0, Doubt.ROWS)])
+def test_cells_are_long_where_points_lie_in_rows(across, cause):
+    along, row = np.meshgrid(np.arange(160.0), across * np.arange(21.0))
+    points = np.stack([along.ravel(), row.ravel(), np.zeros(along.size)], axis=1)
+    nearest, normals = look_across_rows(find_nearest(points)), np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    cells = measure_cells(nearest, normals, np.zeros(len(points)), no_boundary(len(points)))
+    inner = (np.abs(points[:, 0] - 80.0) < 40.0) & (np.abs(points[:, 1] - 10.0 * across) < 5.0 * across)
+    assert np.all(likely_causes(nearest, normals, cells, np.zeros((2, len(points))))[inner] == cause)

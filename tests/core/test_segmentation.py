@@ -209,7 +209,7 @@ class TestNodalDomains:
 
     @pytest.mark.parametrize("bent", [False, True])
     def test_the_second_mode_halves_a_sausage(self, bent):
-        points, along = sausage(1000, bent)
+        points, along = sausage(2000, bent)
         laplacian = core.build_laplacian(points)
         domains = core.nodal_domains(laplacian.eigenpairs(2).eigenvectors[:, 1], laplacian)
         assert domains.max() == 1

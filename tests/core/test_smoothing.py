@@ -212,7 +212,7 @@ class TestBoundary:
         moved = core.smooth_points(laplacian, response, dirichlet=True)
         np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
         corner = np.all(np.abs(laplacian.points[:, :2] - 0.5) > 0.2, axis=1)
-        np.testing.assert_allclose(moved[~corner], laplacian.points[~corner], atol=2e-3)
+        np.testing.assert_allclose(moved[~corner], laplacian.points[~corner], atol=4e-3)
         np.testing.assert_allclose(moved[corner], laplacian.points[corner], atol=2e-2)
 
     def test_a_flat_disc_of_random_points_stays(self):
