@@ -60,7 +60,7 @@ def smoothing_lengths(
         and the shape let it be. It starts from 1.08 times the radius of the cells around, in the eighth mean, times the
         factor: the width of a gap in one direction decides, not the number of points in the others. Where a wider
         kernel would meet its moments better by more than the bend of the surface costs it, it is up to 2.2 times as
-        wide. Even points have some 15 others inside it then, random ones 55. A larger factor leaves fewer points that
+        wide. Even points have some 22 others inside it then, random ones 55. A larger factor leaves fewer points that
         ask for more, so that h varies less.
     """
     if options.bandwidth == "adaptive":
