@@ -23,7 +23,7 @@ _SQUARE = 0.1  # cosine of two normals below which they are nearly perpendicular
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 _WITHIN = (1.5, 6.0, np.inf)  # straight distances within which a path between two points is searched, one by one
 _ENOUGH = 90  # pairs of a point, of which there are straight paths in all directions
-_WIDEST = 1.6  # reach of pairs that are added where there are fewer, over that of the operator's
+_WIDEST = 1.4  # reach of pairs that are added where there are fewer, over that of the operator's
 _GAP = 0.9  # spacings between the middle of a pair next to a boundary and the nearest point, if a surface is there
 
 
@@ -57,7 +57,7 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
     Notes
     -----
     The shortest path (Dijkstra, 1959) over all pairs of the operator, each as long as the circular arc through both
-    points with their normals. Where these are few, those within up to 1.6 times the kernel's reach join them, if their
+    points with their normals. Where these are few, those within up to 1.4 times the kernel's reach join them, if their
     normals say that they lie on one sheet. A path may then choose among some 35 to 90 neighbours, so that it is hardly
     longer than the true one: by 0.08 to 0.2 % on the unit sphere with 8,000 points, where the heat method (Crane,
     Weischedel, Wardetzky, 2013) on the same operator has errors of 0.2 to 0.4 % from one source, and of 4 % from five,

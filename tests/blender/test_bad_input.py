@@ -31,7 +31,7 @@ CLOUDS = {
     "collinear": (lambda points: points * (1, 0, 0), "1000 points.*line"),
     "all at one place": (lambda points: 0 * points, "there are 1 among 1000"),
     "far from the origin": (far_away, "from the origin.*Shift"),
-    "lone points only": (scattered, "of 630 points the neighbors lie along a curve.*Use points of a surface"),
+    "lone points only": (scattered, "of 1000 points are in components of too few points.*delete"),
 }
 
 

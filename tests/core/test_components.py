@@ -64,9 +64,9 @@ class TestLabels:
             assert apart.max() == 1
             assert near.max() == 0
 
-    @pytest.mark.parametrize(("count", "joined"), [(12, True), (13, False)])
-    def test_the_spacing_is_that_to_the_twelfth_neighbor(self, count, joined):
-        # Clumps in a row: the twelfth neighbour of a point is in the next clump, or still in its own.
+    @pytest.mark.parametrize(("count", "joined"), [(8, True), (9, False)])
+    def test_the_spacing_is_that_to_the_eighth_neighbor(self, count, joined):
+        # Clumps in a row: the eighth neighbour of a point is in the next clump, or still in its own.
         x = np.arange(20.0)[:, None] + np.linspace(-1e-3, 1e-3, count)
         label = label_components(find_nearest(grid_points(x.ravel(), [0.0], [0.0])))
         assert np.all(label == 0) == joined
