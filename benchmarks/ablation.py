@@ -20,6 +20,7 @@ from core.geometry import (
     cloud,
     components,
     distances,
+    moments,
     nearest,
     noise,
     outliers,
@@ -43,12 +44,13 @@ from .samplings import fibonacci_sphere, random_sphere
 from .tables import Table
 
 MODULES = (
-    *(nearest, outliers, components, quadrics, rows, sheets, noise, boundary, cells, bandwidth, distances, cloud),
-    *(areas, weights, images, curvature, stiffness),
+    *(nearest, outliers, components, quadrics, rows, sheets, noise, boundary, cells, moments, bandwidth, distances),
+    *(cloud, areas, weights, images, curvature, stiffness),
 )
 UNTUNED = (  # memory, rounding, counts, and what only notices go by
-    *("_BLOCK", "_SOURCES", "_SAME", "_EVEN", "_SMALLEST", "_TERMS", "_PAIRS", "NO_AREA", "_WIDER", "COUNT"),
-    *("_MEMORY", "_RIDGE", "components._FIRST", "_NARROW", "bandwidth._STEPS", "boundary._REACH", "_AT_BOUNDARY"),
+    *("_BLOCK", "_SOURCES", "_NEARBY", "_SAME", "_EVEN", "_SMALLEST", "TERMS", "_PAIRS", "NO_AREA", "COUNT"),
+    *("_MEMORY", "_RIDGE", "RIDGE", "_NARROW", "_AT_BOUNDARY", "bandwidth._STEPS", "boundary._REACH"),
+    *("cells._MANY", "components._FIRST", "moments._MOST", "rows._WIDER"),
 )
 DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"
 NOTE = """\

@@ -23,10 +23,8 @@ _LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
 _BLOCK = 1 << 11
 _SECTORS = 8  # directions in which a sheet is followed from every point
-_AROUND = (
-    1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an eighth;
-)
-# points that many spacings apart touch
+_AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
+# eighth; points that many spacings apart touch
 _NEARBY, _SOURCES = 1 << 9, 1 << 6  # points that share a neighbourhood; of them, from which paths are followed at once
 
 
