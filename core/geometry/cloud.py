@@ -375,7 +375,8 @@ def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, B
     points, rows = nearest.points.copy(), np.flatnonzero(moving)
     points[rows] = project_points(nearest.tree, rows, noise, sample.component)
     changed = moving | moving[nearest.index].any(axis=1)
-    moved = replace(sample, nearest=look_across_rows(nearest.renewed(points, changed)))
+    nearest = nearest.with_quadrics(surface.mixed).renewed(points, changed)
+    moved = replace(sample, nearest=look_across_rows(nearest))
     return fit_surface(moved, surface.sheets is not None, surface, changed), changed
 
 
@@ -394,8 +395,9 @@ def divide_sheets(surface: Surface, needed: int) -> Surface:
     """
     sample, fitted = surface.sample, surface.sheets
     sheets = label_sheets(sample.nearest, surface.quadrics.normals, sample.component)
-    divided = _regroup(sample, sheets, needed)
-    if divided is sample or fitted is None:
+    whole = replace(sample, nearest=sample.nearest.with_quadrics(surface.mixed))
+    divided = _regroup(whole, sheets, needed)
+    if divided is whole or fitted is None:
         return surface
     kept, changed = sheets >= 0, sample.nearest.across(sheets)
     rows = np.flatnonzero(kept)

@@ -128,10 +128,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
     points, index, whole = nearest.points, nearest.index, nearest.weight
     if before is None or changed is None:
         changed = np.ones(len(points), dtype=bool)
-        mixed = nearest.quadrics
-    else:
-        rows = np.flatnonzero(changed)
-        mixed = before.mixed.put(rows, fit_quadrics(points, index[rows], whole[rows], rows))
+    mixed = nearest.quadrics
     check_surface(mixed.roundness)
     spacing = nearest.spacing
     missed = mixed.misfit > ON * spacing
