@@ -18,7 +18,7 @@ from .components import label_components, move_apart
 from .distances import measure_squared_slope
 from .doubt import likely_causes
 from .nearest import Nearest, find_nearest
-from .noise import FILLING, LEFT, MOST, mean_misfits, near_misfit, noise_level, project_points
+from .noise import FALLING, FILLING, LEFT, MOST, mean_misfits, near_misfit, noise_level, project_points
 from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
@@ -347,19 +347,29 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
     if noisy.mean() < _MANY:
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
+    before = _roughly(surface, noise, filling)
     for _ in range(MOST):
         surface, changed = _project(surface, np.where(filling, first, noise), noisy)
-        nearest, rows = surface.sample.nearest, np.flatnonzero(changed)
-        near[rows] = near_misfit(nearest, rows)
-        noise, missed = _noise(surface, near), surface.quadrics.misfit / nearest.spacing
-        noisy &= np.where(filling, np.median(missed[filling]) if filling.any() else 0.0, noise) > LEFT
+        rows = np.flatnonzero(changed)
+        near[rows] = near_misfit(surface.sample.nearest, rows)
+        noise = _noise(surface, near)
+        left = _roughly(surface, noise, filling)
+        # What does not fall so fast is no noise, such as leaves.
+        noisy &= (left > LEFT) & (left < FALLING * before)
         if not noisy.any():
             break
+        before = left
     return replace(surface, sample=replace(surface.sample, noise=first))
 
 
 def _noise(surface: Surface, near: Floats) -> Floats:
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
+
+
+def _roughly(surface: Surface, noise: Floats, filling: Bools) -> Floats:
+    """Return the noise, (m,), and for points that fill volumes, all alike, what quadrics miss their neighbors by."""
+    missed = surface.quadrics.misfit[filling] / surface.sample.nearest.spacing[filling]
+    return np.where(filling, np.median(missed) if len(missed) else 0.0, noise)
 
 
 def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, Bools]:
