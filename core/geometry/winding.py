@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..algebra import blocks, on_all_cores
 from ..types import Array, Floats, Ints
 from .nearest import Nearest, spacing_of
 from .normals import NEIGHBORS, outer_signs, propagate_signs
@@ -17,7 +18,6 @@ _CLUMPS = 1500  # of points, each a dipole; pairs of them are summed in blocks
 _FINE = 32_000  # clumps that stand for the points where they are near, so that close sheets are separated
 _NEAR = 3.0  # sizes of a clump
 _BLOCK = 250
-_PAIRS = 1_000_000  # of fine clumps that are summed at once
 _COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
 _SAMPLE = 2000  # points whose spacing gives the median one
 
@@ -165,13 +165,14 @@ def _energies(place: Floats, moment: Floats, _: Floats, owner: Ints, width: floa
     """Return the mutual energy of each two patches, (count, count), by dipoles smoothed over a width."""
     result = np.zeros((count, count))
     patches = sparse.csr_array((np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), count))
-    for start in range(0, len(place), _BLOCK):
-        block = slice(start, start + _BLOCK)
-        offset = place[None, :, :] - place[block, None, :]
-        square = np.einsum("ijk,ijk->ij", offset, offset) + width**2
-        here = np.einsum("ik,ijk->ij", moment[block], offset)
-        there = np.einsum("jk,ijk->ij", moment, offset)
-        result += patches[block].T @ (coupling(moment[block] @ moment.T, here * there, square, width**2) @ patches)
+    dipoles = place - place.mean(axis=0), moment
+    parts = blocks(len(place), _BLOCK)
+
+    def sums(part: slice) -> Any:
+        return _between(dipoles[0][part], moment[part], *dipoles, width) @ patches
+
+    for part, energy in zip(parts, on_all_cores(sums, parts), strict=True):
+        result += patches[part].T @ energy
     return result
 
 
@@ -182,31 +183,41 @@ def _corrections(fine: Any, coarse: Any, clump: Any, count: Any) -> Any:
     """
     first, second = cKDTree(coarse[0]).query_pairs(_NEAR * coarse[4], output_type="ndarray").T
     apart = coarse[3][first] != coarse[3][second]
-    first, second = first[apart], second[apart]
+    order = np.argsort(first[apart], kind="stable")
+    first, second = first[apart][order], second[apart][order]
     member, size = np.argsort(clump, kind="stable"), np.bincount(clump)
-    start = np.cumsum(size) - size
-    ends = np.cumsum(size[first] * size[second])
-    result = np.zeros((count, count))
-    for rows in np.split(np.arange(len(first)), np.searchsorted(ends, np.arange(_PAIRS, ends[-1:].sum(), _PAIRS))):
-        one, other = first[rows], second[rows]
-        times = size[one] * size[other]
-        row = np.repeat(np.arange(len(rows)), times)
-        place = np.arange(len(row)) - np.repeat(np.cumsum(times) - times, times)
-        left = member[start[one][row] + place // size[other][row]]
-        right = member[start[other][row] + place % size[other][row]]
-        more = np.bincount(row, _pair_energies(fine, left, right), len(rows)) - _pair_energies(coarse, one, other)
-        np.add.at(result, (coarse[3][one], coarse[3][other]), more)
+    members = np.split(member, np.cumsum(size)[:-1])
+    ones, starts = np.unique(first, return_index=True)
+    others = np.split(second, starts[1:])
+
+    def rows(part: slice) -> Floats:
+        result = np.zeros((count, count))
+        for one, near in zip(ones[part], others[part], strict=True):
+            exact = np.concatenate([members[other] for other in near])
+            energy = np.bincount(fine[3][exact], _between_some(fine, members[one], exact).sum(axis=0), count)
+            rough = _between_some(coarse, np.array([one]), near)[0]
+            result[coarse[3][one]] += energy - np.bincount(coarse[3][near], rough, count)
+        return result
+
+    result = sum(on_all_cores(rows, blocks(len(ones), _BLOCK)), np.zeros((count, count)))
     return result + result.T
 
 
-def _pair_energies(dipoles: Any, first: Any, second: Any) -> Any:
-    """Return the energy of pairs of dipoles."""
+def _between_some(dipoles: Any, first: Ints, second: Ints) -> Floats:
+    """Return the energy of each two of some dipoles and some others, (k, l)."""
     place, moment, _, _, width = dipoles
-    offset = place[second] - place[first]
-    left, right = moment[first], moment[second]
-    along = np.einsum("ij,ij->i", left, offset) * np.einsum("ij,ij->i", right, offset)
-    square = np.einsum("ij,ij->i", offset, offset) + width**2
-    return coupling(np.einsum("ij,ij->i", left, right), along, square, width**2)
+    middle = place[first[0]]
+    return _between(place[first] - middle, moment[first], place[second] - middle, moment[second], width)
+
+
+def _between(place: Floats, moment: Floats, others: Floats, moments: Floats, width: float) -> Floats:
+    """Return the energy of each two of k dipoles and l others, (k, l), smoothed over a width."""
+    here = moment @ others.T - np.einsum("ij,ij->i", moment, place)[:, None]
+    there = np.einsum("ij,ij->i", moments, others) - place @ moments.T
+    square = -2.0 * place @ others.T
+    square += np.einsum("ij,ij->i", place, place)[:, None]
+    square += np.einsum("ij,ij->i", others, others) + width**2
+    return coupling(moment @ moments.T, here * there, np.maximum(square, width**2), width**2)
 
 
 def coupling(alike: Floats, along: Floats, square: Floats, smoothed: float = 0.0) -> Floats:
@@ -216,7 +227,8 @@ def coupling(alike: Floats, along: Floats, square: Floats, smoothed: float = 0.0
     thick. What they do to each other within that thickness is left out: two parallel layers have no energy in common,
     however close, as those that are thin.
     """
-    return (alike * (1.0 - 3.0 * smoothed / square) - 3.0 * along / square) / (4.0 * np.pi * square**1.5)
+    share = 3.0 / square
+    return (alike * (1.0 - smoothed * share) - along * share) / (4.0 * np.pi * square * np.sqrt(square))
 
 
 def _least(energy: Floats) -> Floats:

@@ -145,7 +145,6 @@ def test_clumps_that_are_near_are_taken_finely(monkeypatch):
     weight, patch = np.random.default_rng(0).random(600) + 0.5, (points[:, 2] > 0.0) + 2 * (points[:, 0] > 0.3)
     exact = _patch_energies(points, points, weight, patch)
     monkeypatch.setattr(winding, "_CLUMPS", 150)
-    monkeypatch.setattr(winding, "_PAIRS", 10_000)
     monkeypatch.setattr(winding, "_NEAR", 1e9)
     off = ~np.eye(4, dtype=bool)
     np.testing.assert_allclose(_patch_energies(points, points, weight, patch)[off], exact[off], rtol=1e-9)
