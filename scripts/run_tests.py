@@ -1,7 +1,7 @@
 """Run the tests: core without Blender, the installed extension in Blender's module, and in a window with real keys.
 
 As many suites run side by side as there are processors, while this program makes the environments of the next ones;
-each but the window's in two halves, of every second file, so that no processor waits long for the last. What pytest
+each but the window's in four parts, of every fourth file, so that no processor waits long for the last. What pytest
 prints goes to a file per suite in build/tests/, and from there to the screen where a test fails.
 """
 
@@ -23,6 +23,7 @@ from environments import ROOT, ensure, ensure_blender, isolated, run
 RESULTS = ROOT / "build" / "tests"
 MEASURED = "core-3.13"  # environment whose coverage is measured, at almost no cost
 LIMIT = 2700  # seconds for one run of pytest
+_PARTS = 4  # of the tests of a folder
 _SHOWN = 40  # lines of a run that ended without a word of pytest about what failed
 
 
@@ -49,10 +50,11 @@ class Suites:
         """Run some tests in an environment as soon as a processor is free; see `isolated`."""
         self._runs.append(self._pool.submit(self._run, name, python, tests, variables))
 
-    def start_half(self, number, name, python, folder, *options, **variables):
-        """Run the first or the second half of the tests of a folder, by their files, with these options of pytest."""
+    def start_folder(self, name, python, folder, *options, **variables):
+        """Run the tests of a folder in parts, by their files, with these options of pytest."""
         files = sorted(path.relative_to(ROOT) for path in (ROOT / folder).glob("test_*.py"))
-        self.start(f"{name}-{number}", python, *options, *files[number - 1 :: 2], **variables)
+        for number in range(_PARTS):
+            self.start(f"{name}-{number + 1}", python, *options, *files[number::_PARTS], **variables)
 
     def results(self):
         """Wait for all; return their outcomes by name."""
@@ -166,7 +168,7 @@ def main():
         # Results must not depend on the number of threads: the last one has as many as in Blender.
         threads = {name: {"OPENBLAS_NUM_THREADS": None} for name in list(cores)[-1:] if options.all}
         for name, python in cores.items():
-            suites.start_half(1, name, python, "tests/core", **threads.get(name, {}))
+            suites.start_folder(name, python, "tests/core", **threads.get(name, {}))
         package.build([package.this_platform()])
         if options.gui or options.all:  # the longest: not the last
             start_gui(suites, required=options.gui)
@@ -174,11 +176,8 @@ def main():
         for version, python in found:
             for blender in pythons.BLENDERS[version][: None if options.all else 1]:
                 environment = ensure_blender(blender, python)
-                for number in (1, 2):
-                    suites.start_half(number, f"blender-{blender}", environment, "tests/blender", *narrowed)
+                suites.start_folder(f"blender-{blender}", environment, "tests/blender", *narrowed)
                 narrowed = "-m", "not any_blender"
-        for name, python in cores.items():
-            suites.start_half(2, name, python, "tests/core", **threads.get(name, {}))
         results = suites.results()
     if any(name.startswith(MEASURED) for name in results):
         tell_coverage(ensure(MEASURED, "test", pythons.find()[MEASURED.removeprefix("core-")]))
