@@ -17,6 +17,7 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
+from core.geometry import cloud
 from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
 from core.geometry.noise import near_misfit, noise_level, project_points
@@ -199,3 +200,17 @@ def test_rows_of_a_scan_finer_along_than_across_are_no_curves():
     z = 0.05 * np.random.default_rng(0).standard_normal(x.size)
     laplacian = core.build_laplacian(np.column_stack([x.ravel() / 7.0, y.ravel(), z]))
     assert laplacian.areas.sum() == pytest.approx(19.0 * 139.0 / 7.0, rel=0.2)  # some of the noise counts as shape
+
+
+@pytest.mark.parametrize(("level", "fewest", "most"), [(2.0, 3, 6), (None, 1, 5)], ids=["noise", "volume"])
+def test_rounds_go_on_as_long_as_they_smooth(monkeypatch, level, fewest, most):
+    """Noise is smoothed round by round; points that fill a volume stay as they are, whatever is done."""
+    rounds, project = [], cloud.project_points
+    monkeypatch.setattr(cloud, "project_points", lambda *given: rounds.append(1) or project(*given))
+    rng, points = np.random.default_rng(1), random_sphere(1500)
+    if level is None:
+        points = np.concatenate([points, 3.0 + rng.random((1500, 3))])
+    else:
+        points *= 1.0 + level * np.sqrt(4.0 * np.pi / 1500) * rng.standard_normal((1500, 1))
+    core.build_laplacian(points)
+    assert fewest <= len(rounds) <= most
