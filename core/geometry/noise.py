@@ -15,7 +15,7 @@ _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
-FALLING = 0.9  # share of it that a round leaves, at most: .3 of noise of a spacing, .86 of three; all of leaves that fill a volume
+FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three, all of leaves in a volume
 _NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
 
