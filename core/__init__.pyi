@@ -45,6 +45,8 @@ from .applications.smoothing import fair_points as fair_points
 from .applications.smoothing import roughness as roughness
 from .applications.smoothing import smooth_points as smooth_points
 from .applications.smoothing import smoothing_base as smoothing_base
+from .applications.strays import Strays as Strays
+from .applications.strays import stray_points as stray_points
 from .applications.transport import Transport as Transport
 from .applications.transport import logarithmic_map as logarithmic_map
 from .applications.transport import transport as transport
