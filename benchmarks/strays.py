@@ -24,11 +24,11 @@ TUNED = "rocker-arm", "cat", "arm", "cheburashka", "screwdriver", "fandisk"
 ABOUT = """\
 `core.stray_points` at its defaults. Stray points are added as a share of the points: *box*, all over 1.2 times the
 bounding box; *near*, 2 to 6 spacings off the surface along its normals, to either side; *clumps*, floating heaps of 3
-to 29 points, at least 8 spacings from the surface and 12 from each other, as many as there is room for. Marked are those
-farther than two spacings from the nearest point of the cloud. Each figure: found share of the marked ones, and share of
-the cloud that is taken with them. Alone: share of the cloud that is taken where nothing is added. Constants were chosen
-on rocker-arm, cat, arm, cheburashka, screwdriver and fandisk, and checked on some raw clouds; the other shapes were run
-with the same ones.
+to 29 points, at least 8 spacings from the surface and 12 from each other, as many as there is room for. Marked are
+those farther than two spacings from the nearest point of the cloud. Each figure: found share of the marked ones, and
+share of the cloud that is taken with them. Alone: share of the cloud that is taken where nothing is added. Constants
+were chosen on rocker-arm, cat, arm, cheburashka, screwdriver and fandisk, and checked on some raw clouds; the other
+shapes were run with the same ones.
 
 Made by `MESHFREE_ZOO=folder MESHFREE_RAW=folder python -m benchmarks.strays`; the clouds are not part of the project.
 """

@@ -273,7 +273,7 @@ class MESHFREE_OT_mode_shape(ModeShape, ApplicationOperator, bpy.types.Operator)
 TOOLS = (
     Registration(
         MESHFREE_OT_smooth,
-        panel=Row("Clean", 1, 1),
+        panel=Row("Clean", 2, 1),
         menu=Row("Object", 4, 1),
         quick=Row("Object", 1, 1, "Clean"),
         verb=Smooth,

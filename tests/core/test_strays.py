@@ -1,5 +1,7 @@
 """Stray points: near, far and in clumps they are found; real parts, thin and sparse ones too, are not taken."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -82,7 +84,7 @@ def test_a_stricter_choice_holds_the_milder_one():
     points = np.concatenate([noisy_sphere(COUNT, 0.3), in_box(random_sphere(COUNT), 0.1)])
     strays = core.Strays(points)
     chosen = [strays.chosen(strictness) for strictness in (0.1, 0.3, 1.0, 3.0, 10.0)]
-    for milder, stricter in zip(chosen, chosen[1:], strict=False):
+    for milder, stricter in pairwise(chosen):
         assert not (milder & ~stricter).any()
         assert np.count_nonzero(milder) < np.count_nonzero(stricter)
 
@@ -169,11 +171,16 @@ def test_the_work_can_be_stopped_at_each_stage():
     stages = []
     core.stray_points(random_sphere(200), progress=lambda stage, share: stages.append((stage, share)))
     assert [share for _, share in stages] == sorted(share for _, share in stages)
+    for last in dict(stages):
+        with pytest.raises(core.Cancelled):
+            core.stray_points(random_sphere(200), progress=stopping(last))
 
-    def stop(stage, share):
-        if stage == wanted:
+
+def stopping(last):
+    """A progress callback that stops the work at a stage."""
+
+    def progress(stage, share):
+        if stage == last:
             raise core.Cancelled
 
-    for wanted in dict(stages):
-        with pytest.raises(core.Cancelled):
-            core.stray_points(random_sphere(200), progress=stop)
+    return progress
