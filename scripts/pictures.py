@@ -160,6 +160,20 @@ def smooth(path):
     row(objects, path, legend=None)
 
 
+def stray_points(path):
+    """A scan with stray points, found and deleted."""
+    rng, points = np.random.default_rng(4), demo.Coral().sample(demo.POINTS)
+    low, high = 1.1 * points.min(axis=0), 1.1 * points.max(axis=0)
+    points = np.concatenate([points, rng.uniform(low, high, (len(points) // 25, 3))])
+    found, clean = studio.make_object(points, "Found"), studio.make_object(points, "Clean")
+    for obj, action in ((found, "SHOW"), (clean, "DELETE")):
+        studio.activate(obj)
+        bpy.ops.meshfree.stray_points(action=action)
+        studio.show(obj, "lb_stray", radius=0.35)
+        studio.set_range(obj, 0.0, 1.0)
+    row((found, clean), path, legend=None)
+
+
 def sequence(path):
     """Four frames of the shape as it grows upwards, of other points each, with one mode in one range."""
     random = np.random.default_rng(3)
@@ -310,6 +324,7 @@ PICTURES = {
     "mode": mode,
     "boundary": boundary,
     "smooth": smooth,
+    "stray_points": stray_points,
     "sequence": sequence,
     "mode_shape": mode_shape,
     "segment": segment,

@@ -130,14 +130,14 @@ def test_edit_mode_selects_them():
 
 
 def test_floaters_are_stray_splats():
-    splats = bar_splats()
+    splats = bar_splats(core, degree=0)
+    splats.opacities[7] = 0.01
     obj = add_splats(splats)
-    opacities = attribute(obj, "opacity")
-    floating = core.floaters(splats)
     bpy.ops.meshfree.stray_points()
-    found = attribute(obj, "lb_stray")
-    assert len(opacities) == len(found)
-    assert found[floating].all()
+    np.testing.assert_array_equal(np.flatnonzero(attribute(obj, "lb_stray")), [7])
+    obj.meshfree.leave_out_floaters = False
+    bpy.ops.meshfree.stray_points()
+    assert not attribute(obj, "lb_stray").any()
 
 
 def test_what_cannot_be_done_is_told():
