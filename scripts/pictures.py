@@ -169,7 +169,7 @@ def stray_points(path):
     for obj, action in ((found, "SHOW"), (clean, "DELETE")):
         studio.activate(obj)
         bpy.ops.meshfree.stray_points(action=action)
-        studio.show(obj, "lb_stray", radius=0.35)
+        studio.show(obj, "lb_stray", radius=0.6)
         studio.set_range(obj, 0.0, 1.0)
     row((found, clean), path, legend=None)
 

@@ -29,7 +29,7 @@ class MESHFREE_PT_clean(ToolPanel, bpy.types.Panel):
     def draw(self, context):
         if STRAY in context.object.data.attributes:
             _draw_strays(self.layout)
-        super().draw(context)
+        draw_tools(self.layout, self.bl_label)
 
 
 def _draw_strays(layout):
