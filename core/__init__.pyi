@@ -47,6 +47,7 @@ from .applications.smoothing import smooth_points as smooth_points
 from .applications.smoothing import smoothing_base as smoothing_base
 from .applications.strays import Strays as Strays
 from .applications.strays import stray_points as stray_points
+from .applications.thin_out import thin_out as thin_out
 from .applications.transport import Transport as Transport
 from .applications.transport import logarithmic_map as logarithmic_map
 from .applications.transport import transport as transport

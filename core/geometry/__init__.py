@@ -17,5 +17,5 @@ from .quadrics import check_surface, frames, roundness
 from .rows import look_across_rows
 from .sheets import same_sheet
 from .strays import PARTS, label_parts, stray_scores, without
-from .subset import blue_noise_subset
+from .subset import blue_noise_subset, independent
 from .thinning import nearest_in_blocks, thin
