@@ -174,6 +174,17 @@ def stray_points(path):
     row((found, clean), path, legend=None)
 
 
+def thin_out(path):
+    """A shape four times as dense on one half, and thinned out to one spacing."""
+    points = demo.Coral().sample(4 * demo.POINTS)
+    points = points[(points[:, 0] > 0.0) | (np.arange(len(points)) % 4 == 0)]
+    before, after = studio.make_object(points, "Before"), studio.make_object(points, "After")
+    bpy.ops.meshfree.thin_out(spacing=2.0 * SPACING)
+    for obj in (before, after):
+        studio.show_shape(obj, like=before)
+    row((before, after), path, legend=None)
+
+
 def sequence(path):
     """Four frames of the shape as it grows upwards, of other points each, with one mode in one range."""
     random = np.random.default_rng(3)
@@ -325,6 +336,7 @@ PICTURES = {
     "boundary": boundary,
     "smooth": smooth,
     "stray_points": stray_points,
+    "thin_out": thin_out,
     "sequence": sequence,
     "mode_shape": mode_shape,
     "segment": segment,

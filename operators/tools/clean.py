@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.attributes import read_attribute, tag_changed, write_attribute
-from ..objects.deleting import keep_points
+from ..objects.deleting import check_deletable, keep_points
 from ..objects.quantities import COMPONENT, STRAY, quantity
 from ..objects.reading import read_points
 from ..objects.result import EIGENVALUES, is_analyzed, is_stale
@@ -112,10 +112,7 @@ class StrayPoints(StraySettings, Tool):
         if self.action == "HIDE" and obj.type != "MESH":
             raise PointCloudError(f'Points of the point cloud "{obj.name}" cannot be hidden. Separate them instead.')
         if self.action in {"SEPARATE", "DELETE"}:
-            if obj.meshfree.deform.is_bound:
-                raise PointCloudError(f'"{obj.name}" is bound to handles. Apply or unbind it first.')
-            if obj.type != "MESH" and not obj.visible_get():
-                raise PointCloudError(f'"{obj.name}" is hidden. Show it, so that its points can be deleted.')
+            check_deletable(obj)
 
     def _known(self, obj):
         if STRAY not in obj.data.attributes:

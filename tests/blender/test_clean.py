@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import core
-from tests.blender.clouds import add_object, attribute, local_points, sphere_points
+from tests.blender.clouds import add_group, add_object, attribute, local_points, sphere_points
 from tests.blender.splats import add_splats, bar_splats
 
 SPHERE = sphere_points(600)
@@ -178,3 +178,35 @@ def test_points_left_out_are_selected():
     obj.data.vertices[0].co.x += 0.1
     with pytest.raises(RuntimeError, match="are stale"):
         bpy.ops.meshfree.select_left_out()
+
+
+@pytest.mark.parametrize("kind", clouds())
+def test_thinned_points_are_those_of_core_with_what_they_hold(kind):
+    obj = add_cloud(kind, SPHERE)
+    obj.scale = (2.0, 2.0, 2.0)
+    assert bpy.ops.meshfree.thin_out(spacing=0.6) == {"FINISHED"}
+    np.testing.assert_array_equal(attribute(obj, "number"), core.thin_out(SPHERE, spacing=0.3))
+    count = len(attribute(obj, "number"))
+    assert obj.meshfree.notices[0].text == f"{obj.name}: {count} of 600 points are left, at least 60 cm from each other"
+
+
+def test_thinning_to_a_number_keeps_groups_and_results_and_can_be_undone():
+    obj = add_cloud(points=SPHERE)
+    add_group(obj, "Source", SPHERE[:, 2] > 0.5)
+    bpy.ops.meshfree.analyze()
+    areas = attribute(obj, "lb_area")
+    bpy.ops.ed.undo_push()
+    bpy.ops.meshfree.thin_out("EXEC_DEFAULT", True, by="NUMBER", count=100)
+    kept = attribute(obj, "number")
+    assert 95 <= len(kept) <= 100
+    np.testing.assert_array_equal(attribute(obj, "lb_area"), areas[kept])
+    members = [vertex.index for vertex in obj.data.vertices if len(vertex.groups)]
+    np.testing.assert_array_equal(members, np.flatnonzero(SPHERE[kept, 2] > 0.5))
+    bpy.ops.ed.undo()
+    assert len(bpy.context.object.data.vertices) == 600
+
+
+def test_thinning_by_itself_doubles_the_spacing():
+    obj = add_cloud(points=SPHERE)
+    bpy.ops.meshfree.thin_out()
+    assert 600 / 8 < len(obj.data.vertices) < 600 / 3
