@@ -1,5 +1,6 @@
 """The public names of core, a line each, and where they are: `core/__init__.py` imports them as they are asked for."""
 
+from .applications.cleaning import clean_points as clean_points
 from .applications.coarse_deformation import CoarseDeformer as CoarseDeformer
 from .applications.coarse_deformation import coarse_deformer as coarse_deformer
 from .applications.deformation import Deformation as Deformation
@@ -45,6 +46,9 @@ from .applications.smoothing import fair_points as fair_points
 from .applications.smoothing import roughness as roughness
 from .applications.smoothing import smooth_points as smooth_points
 from .applications.smoothing import smoothing_base as smoothing_base
+from .applications.strays import Strays as Strays
+from .applications.strays import stray_points as stray_points
+from .applications.thin_out import thin_out as thin_out
 from .applications.transport import Transport as Transport
 from .applications.transport import logarithmic_map as logarithmic_map
 from .applications.transport import transport as transport

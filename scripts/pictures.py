@@ -160,6 +160,31 @@ def smooth(path):
     row(objects, path, legend=None)
 
 
+def stray_points(path):
+    """A scan with stray points, found and deleted."""
+    rng, points = np.random.default_rng(4), demo.Coral().sample(demo.POINTS)
+    low, high = 1.1 * points.min(axis=0), 1.1 * points.max(axis=0)
+    points = np.concatenate([points, rng.uniform(low, high, (len(points) // 25, 3))])
+    found, clean = studio.make_object(points, "Found"), studio.make_object(points, "Clean")
+    for obj, action in ((found, "SHOW"), (clean, "DELETE")):
+        studio.activate(obj)
+        bpy.ops.meshfree.stray_points(action=action)
+        studio.show(obj, "lb_stray", radius=0.6)
+        studio.set_range(obj, 0.0, 1.0)
+    row((found, clean), path, legend=None)
+
+
+def thin_out(path):
+    """A shape four times as dense on one half, and thinned out to one spacing."""
+    points = demo.Coral().sample(4 * demo.POINTS)
+    points = points[(points[:, 0] > 0.0) | (np.arange(len(points)) % 4 == 0)]
+    before, after = studio.make_object(points, "Before"), studio.make_object(points, "After")
+    bpy.ops.meshfree.thin_out(spacing=2.0 * SPACING)
+    for obj in (before, after):
+        studio.show_shape(obj, like=before)
+    row((before, after), path, legend=None)
+
+
 def sequence(path):
     """Four frames of the shape as it grows upwards, of other points each, with one mode in one range."""
     random = np.random.default_rng(3)
@@ -310,6 +335,8 @@ PICTURES = {
     "mode": mode,
     "boundary": boundary,
     "smooth": smooth,
+    "stray_points": stray_points,
+    "thin_out": thin_out,
     "sequence": sequence,
     "mode_shape": mode_shape,
     "segment": segment,

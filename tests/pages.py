@@ -26,6 +26,7 @@ NOT_RUN = {
     "MESHFREE_ZOO=folder python -m benchmarks.ablation": SLOW,
     "MESHFREE_ZOO=folder python -m benchmarks.real_shapes": SLOW,
     "MESHFREE_ZOO=folder MESHFREE_RAW=folder python -m benchmarks.meshes": SLOW,
+    "MESHFREE_ZOO=folder MESHFREE_RAW=folder python -m benchmarks.strays": SLOW,
 }
 
 

@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..operators.objects.quantities import STRAY
 from .panel import ReadyPanel, draw_tools
 
 
@@ -21,9 +22,23 @@ class MESHFREE_PT_measure(ToolPanel, bpy.types.Panel):
 
 
 class MESHFREE_PT_clean(ToolPanel, bpy.types.Panel):
-    """Denoising and other filters of the shape, and the orientation of normals"""
+    """Stray points, denoising and other filters of the shape, and the orientation of normals"""
 
     bl_label = "Clean"
+
+    def draw(self, context):
+        if STRAY in context.object.data.attributes:
+            _draw_strays(self.layout)
+        draw_tools(self.layout, self.bl_label)
+
+
+def _draw_strays(layout):
+    """Draw what can be done with the stray points on show."""
+    layout.label(text="Stray Points")
+    row = layout.row(align=True)
+    for action, text in (("SELECT", "Select"), ("HIDE", "Hide"), ("SEPARATE", "Separate"), ("DELETE", "Delete")):
+        button = row.operator("meshfree.stray_points", text=text)
+        button.action, button.as_shown = action, True
 
 
 class MESHFREE_PT_segment(ToolPanel, bpy.types.Panel):

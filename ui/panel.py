@@ -187,6 +187,8 @@ def _draw_result(layout, context, result):
         row = beside_or_below(column, context, name, value)
         row.label(text=name)
         row.label(text=value)
+    if result.left_out_count:
+        layout.operator("meshfree.select_left_out").edit_mode = True
 
 
 def _draw_summary(layout, context, obj):

@@ -11,9 +11,11 @@ from .normals import unit_normals
 from .orientation import orient_normals, toward
 from .pairs import Pairs, find_pairs
 from .patches import Patch
-from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values
+from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values, scale_points
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import check_surface, frames, roundness
+from .rows import look_across_rows
 from .sheets import same_sheet
-from .subset import blue_noise_subset
+from .strays import PARTS, label_parts, stray_scores, without
+from .subset import blue_noise_subset, independent
 from .thinning import nearest_in_blocks, thin

@@ -9,7 +9,7 @@ from .nearest import Nearest
 
 SMALLEST = 50  # points of a component that gets an operator of its own
 _GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap
-_ACROSS = 3.2  # spacings that it is across rows
+ACROSS = 3.2  # spacings that it is across rows
 _FIRST = 8  # neighbours that points are joined to before the others
 
 
@@ -27,7 +27,7 @@ def label_components(nearest: Nearest) -> Ints:
     """
     index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
     reach = _GAP * distance[:, :_FIRST][:, -1]  # of eight points there are seven neighbors
-    reach = np.where(nearest.in_row, _ACROSS * nearest.spacing, reach)
+    reach = np.where(nearest.in_row, ACROSS * nearest.spacing, reach)
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
     close = number_by_size(label_connected(index, strict))
     large = close >= 0

@@ -35,7 +35,7 @@ def find_outliers(nearest: Nearest) -> Bools:
     ndarray, (m,) bool
     """
     surface, result = nearest.quadrics, np.zeros(len(nearest.points), dtype=bool)
-    alone = _Alone(nearest, surface)
+    alone = Alone(nearest, surface)
     # The first search finds most outliers, each further one those that they had hidden.
     while (new := _off_surface(nearest, surface, alone, result) & ~result).any():
         result |= new
@@ -47,7 +47,7 @@ def find_outliers(nearest: Nearest) -> Bools:
     return result
 
 
-class _Alone:
+class Alone:
     """The quadrics of points without the neighbours off them, fitted where they are asked for, and kept."""
 
     def __init__(self, nearest: Nearest, surface: Quadrics) -> None:
@@ -66,42 +66,44 @@ class _Alone:
         self._known[rows] = True
 
 
-def _off_surface(nearest: Nearest, surface: Quadrics, alone: _Alone, known: Bools) -> Bools:
+def _off_surface(nearest: Nearest, surface: Quadrics, alone: Alone, known: Bools) -> Bools:
     """Tell which points lie off the surface, those that are known to among them, (m,) bool."""
     spacing, result = nearest.spacing, known.copy()
-    off = _third(_heights(nearest, surface, np.arange(len(spacing))))
+    off = third_least(heights_over_witnesses(nearest, surface, np.arange(len(spacing))))
     sparse = spacing > _SPARSE * np.median(spacing)
     suspects = np.flatnonzero(~known & ((off > ON * spacing) | (sparse & (surface.misfit > ON * spacing))))
     if not len(suspects):
         return result
-    witnesses = _witnesses(nearest, suspects)
+    witnesses = witnesses_of(nearest, suspects)
     alone.fit(nearest, surface, np.unique(witnesses))
     scatter = alone.scatter[witnesses]
-    height = _heights(nearest, alone.surface, suspects)
+    height = heights_over_witnesses(nearest, alone.surface, suspects)
     height /= ON * spacing[suspects, None] + _SCATTERS * scatter
     height[sparse[suspects, None] & (scatter > FILLING * spacing[witnesses])] = np.inf
     found = -1
     while np.count_nonzero(result) > found:
         found = int(np.count_nonzero(result))
-        result[suspects] = _third(np.where(result[witnesses], np.inf, height)) > 1.0
+        result[suspects] = third_least(np.where(result[witnesses], np.inf, height)) > 1.0
     return result
 
 
-def _witnesses(nearest: Nearest, rows: Ints) -> Ints:
+def witnesses_of(nearest: Nearest, rows: Ints) -> Ints:
+    """Return the witnesses of some points, (k, 12) int."""
     return nearest.index[rows[:, None], np.minimum(_WITNESSES, nearest.index.shape[1] - 1)]
 
 
-def _third(values: Floats) -> Floats:
+def third_least(values: Floats) -> Floats:
+    """Return the third least of each row."""
     return np.partition(values, _AGREEING - 1, axis=1)[:, _AGREEING - 1]
 
 
-def _heights(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:
+def heights_over_witnesses(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:
     """Return how far some points are off the quadrics of their witnesses, (k, 12)."""
     result = np.empty((len(rows), len(_WITNESSES)))
 
     def measure(part: slice) -> None:
         block = rows[part]
-        witnesses = _witnesses(nearest, block)
+        witnesses = witnesses_of(nearest, block)
         result[part] = np.abs(heights_over(surface, nearest.points, witnesses, block[:, None]))
 
     on_all_cores(measure, blocks(len(rows), _BLOCK))

@@ -11,6 +11,7 @@ MEAN_CURVATURE, GAUSSIAN_CURVATURE = "lb_mean_curvature", "lb_gaussian_curvature
 BOUNDARY, COMPONENT = "lb_boundary", "lb_component"
 TRUST, DOUBT = "lb_trust", "lb_doubt"
 SEGMENT = "lb_segment"
+STRAY = "lb_stray"
 SHAPE_INDEX, CURVEDNESS = "lb_shape_index", "lb_curvedness"
 CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_direction_1"
 ROUGHNESS, SURFACE_VARIATION = "lb_roughness", "lb_surface_variation"
@@ -151,6 +152,14 @@ QUANTITIES = (  # in the order of the panel
         left_out=6,
         # As in `core.Doubt`.
         names=("Trusted", "Too Few", "Volume", "Noise", "Rows", "Sheets", "Left Out"),
+    ),
+    Quantity(
+        STRAY,
+        "Stray Points",
+        "True for points off the surface, and for those of small parts beside it",
+        "stray_points",
+        data_type="BOOLEAN",
+        carried="label",
     ),
     Quantity(SEGMENT, "Segment", "Number of the part", "segment", data_type="INT", carried="label"),
     Quantity(

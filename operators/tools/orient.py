@@ -128,5 +128,5 @@ def _vectors(obj, name):
 
 
 TOOLS = (
-    Registration(MESHFREE_OT_orient_normals, panel=Row("Clean", 1, 2), menu=Row("Object", 3, 3), verb=OrientNormals),
+    Registration(MESHFREE_OT_orient_normals, panel=Row("Clean", 2, 2), menu=Row("Object", 3, 3), verb=OrientNormals),
 )

@@ -1,13 +1,13 @@
 """Segmentation into parts, objects of the parts, and heat and wave kernel signatures."""
 
-import bmesh
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ... import core
 from ...core import PointCloudError
-from ..objects.attributes import SELECTION, read_attribute, remove_numbered, tag_changed, write_attribute
+from ..objects.attributes import read_attribute, remove_numbered, tag_changed, write_attribute
+from ..objects.deleting import keep_points
 from ..objects.quantities import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE
 from ..objects.result import EIGENVALUES, check_writable
 from ..registration import Registration, Row
@@ -160,38 +160,9 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
             part.data.name = part.name
             for collection in obj.users_collection:
                 collection.objects.link(part)
-            _keep(context, part, result == number)
-        _keep(context, obj, ~np.isin(result, numbers))
+            keep_points(context, part, result == number)
+        keep_points(context, obj, ~np.isin(result, numbers))
         return [f"{obj.name}: {len(numbers) + 1} parts are objects of their own"]
-
-
-def _keep(context, obj, kept):
-    """Delete the points of an object but those to keep, (n,) bool, with their data."""
-    if obj.type != "MESH":
-        _keep_points(context, obj, kept)
-        return
-    shape = bmesh.new()
-    shape.from_mesh(obj.data)
-    dropped = [vertex for vertex, keep in zip(shape.verts, kept, strict=True) if not keep]
-    bmesh.ops.delete(shape, geom=dropped, context="VERTS")
-    shape.to_mesh(obj.data)
-    shape.free()
-
-
-def _keep_points(context, obj, kept):
-    """Delete points of a point cloud by Blender's operator, which deletes selected ones in Edit Mode."""
-    active, chosen = context.view_layer.objects.active, context.selected_objects
-    for other in chosen:
-        other.select_set(False)
-    context.view_layer.objects.active = obj
-    write_attribute(obj.data, SELECTION, ~kept, "BOOLEAN")
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.pointcloud.delete()
-    bpy.ops.object.mode_set(mode="OBJECT")
-    obj.data.attributes.remove(obj.data.attributes[SELECTION])
-    context.view_layer.objects.active = active
-    for other in chosen:
-        other.select_set(True)
 
 
 class Signature(Tool):

@@ -31,12 +31,13 @@ class Smooth(Tool):
         name="Method",
         description="What is smoothed, and how",
         items=[
-            ("NOISE", "Remove Noise", "Remove the noise of single points and keep the shape"),
+            ("EDGES", "Keep Edges", "Remove noise along the normals, and keep edges"),
+            ("NOISE", "Remove Noise", "Remove the noise of single points and keep the shape, by frequency"),
             ("HEAT", "Soften", "Attenuate details as heat diffusion does, the finer the more"),
             ("MODES", "Keep Modes", "Project the shape onto the lowest vibration modes"),
             ("DETAIL", "Scale Details", "Make details stronger or weaker and keep the coarse shape"),
         ],
-        default="NOISE",
+        default="EDGES",
     )
     wavelength: FloatProperty(
         name="Wavelength",
@@ -77,7 +78,7 @@ class Smooth(Tool):
     @property
     def asks(self):
         """Names of the settings that the method takes."""
-        names = {"MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
+        names = {"EDGES": [], "MODES": ["modes"], "DETAIL": ["wavelength", "gain"]}.get(self.method, ["wavelength"])
         return ["method", *names, "strength", "group", "keep", "keep_boundary", "target"]
 
     @property
@@ -140,8 +141,9 @@ class Smooth(Tool):
     def write(self, context, obj, result):
         reading, points, gradients, discs = result
         write_positions(obj, reading, points, self.target, "Smooth", gradients, discs)
-        moved = np.sqrt(np.mean(np.sum((points - reading.points) ** 2, axis=1)))
-        return [f"{obj.name}: {len(points):,} points moved by {length_text(moved)} on average"]
+        moved = np.linalg.norm(points - reading.points, axis=1)
+        average, most = length_text(np.sqrt(np.mean(moved**2))), length_text(moved.max())
+        return [f"{obj.name}: {len(points):,} points moved by {average} on average, at most by {most}"]
 
 
 class MESHFREE_OT_smooth(Smooth, ApplicationOperator, bpy.types.Operator):
@@ -149,10 +151,13 @@ class MESHFREE_OT_smooth(Smooth, ApplicationOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.smooth"
     bl_label = "Smooth Points"
+    keeps_line = True
 
 
 def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
     """Return the points, (n, 3), by a method at full strength."""
+    if method == "EDGES":
+        return core.clean_points(laplacian, dirichlet=dirichlet, progress=progress)
     base = cache.result(
         laplacian,
         "base",
@@ -273,7 +278,7 @@ class MESHFREE_OT_mode_shape(ModeShape, ApplicationOperator, bpy.types.Operator)
 TOOLS = (
     Registration(
         MESHFREE_OT_smooth,
-        panel=Row("Clean", 1, 1),
+        panel=Row("Clean", 2, 1),
         menu=Row("Object", 4, 1),
         quick=Row("Object", 1, 1, "Clean"),
         verb=Smooth,

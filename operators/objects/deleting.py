@@ -1,0 +1,44 @@
+"""Deleting points with all that they hold."""
+
+import bmesh
+import bpy
+
+from ...core import PointCloudError
+from .attributes import SELECTION, write_attribute
+
+
+def check_deletable(obj):
+    """Refuse an object whose points cannot be deleted, before anything is computed."""
+    if obj.meshfree.deform.is_bound:
+        raise PointCloudError(f'"{obj.name}" is bound to handles. Apply or unbind it first.')
+    if obj.type != "MESH" and not obj.visible_get():
+        raise PointCloudError(f'"{obj.name}" is hidden. Show it, so that its points can be deleted.')
+
+
+def keep_points(context, obj, kept):
+    """Delete the points of an object but those to keep, (n,) bool, with their data."""
+    if obj.type != "MESH":
+        _keep_in_cloud(context, obj, kept)
+        return
+    shape = bmesh.new()
+    shape.from_mesh(obj.data)
+    dropped = [vertex for vertex, keep in zip(shape.verts, kept, strict=True) if not keep]
+    bmesh.ops.delete(shape, geom=dropped, context="VERTS")
+    shape.to_mesh(obj.data)
+    shape.free()
+
+
+def _keep_in_cloud(context, obj, kept):
+    """Delete points of a point cloud by Blender's operator, which deletes selected ones in Edit Mode."""
+    active, chosen = context.view_layer.objects.active, context.selected_objects
+    for other in chosen:
+        other.select_set(False)
+    context.view_layer.objects.active = obj
+    write_attribute(obj.data, SELECTION, ~kept, "BOOLEAN")
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.pointcloud.delete()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    obj.data.attributes.remove(obj.data.attributes[SELECTION])
+    context.view_layer.objects.active = active
+    for other in chosen:
+        other.select_set(True)

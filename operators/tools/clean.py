@@ -1,0 +1,235 @@
+"""Stray points: shown, selected, hidden, separated or deleted; points left out of an analysis, selected."""
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from ... import core
+from ...core import PointCloudError
+from ..objects.attributes import read_attribute, tag_changed, write_attribute
+from ..objects.deleting import check_deletable, keep_points
+from ..objects.quantities import COMPONENT, STRAY, quantity
+from ..objects.reading import read_points
+from ..objects.result import EIGENVALUES, is_analyzed, is_stale
+from ..registration import Registration, Row
+from ..running import cache
+from ..running.application import ShownOperator, Tool
+from ..running.stages import Stages
+from .select import SelectionOperator, select, selection
+
+_DONE = {"SHOW": "", "SELECT": ", selected", "HIDE": ", hidden in Edit Mode", "DELETE": ", deleted"}
+
+
+class StraySettings:
+    """The settings that say which points are stray."""
+
+    strictness: FloatProperty(
+        name="Strictness",
+        description="How near to the surface points may be and still be stray: above 1 more are, below 1 fewer",
+        default=1.0,
+        min=0.01,
+        max=100.0,
+        soft_min=0.25,
+        soft_max=4.0,
+    )
+    smallest: IntProperty(
+        name="Small Parts Below",
+        description="Points of parts with fewer points than this are stray, too; the largest part never is",
+        default=30,
+        min=0,
+        soft_max=1000,
+    )
+    smallest_area: FloatProperty(
+        name="Small Areas Below",
+        description="Points of parts with less area than this are stray, too; the largest part never is",
+        default=0.0,
+        min=0.0,
+        unit="AREA",
+    )
+    only_selected: BoolProperty(name="Among Selected", description="Look among the selected points only", default=False)
+
+    def finder(self, context, obj):
+        """Read an object, and return a function of a progress callback that finds its stray points, (n,) bool."""
+        reading = read_points(context, obj)
+        among = selection(obj) if self.only_selected else np.ones(len(reading.points), dtype=bool)
+        if not among.any():
+            raise PointCloudError(f'No points of "{obj.name}" are selected. Select some, or turn off Among Selected.')
+        strictness, sizes = self.strictness, {"smallest": self.smallest, "smallest_area": self.smallest_area}
+
+        def find(progress):
+            key = cache.content("strays", reading.points)
+            strays = cache.fetch(key, lambda: core.Strays(reading.points, progress=progress))
+            found = strays.chosen(strictness, **sizes)
+            found[cache.floating(reading.splats)] = True
+            return found & among
+
+        return find
+
+
+class StrayPoints(StraySettings, Tool):
+    """The settings and the work of `meshfree.stray_points`."""
+
+    writes = (STRAY,)
+
+    action: EnumProperty(
+        name="Action",
+        description="What happens to the stray points",
+        items=[
+            ("SHOW", "Show", "Color them, and change nothing else"),
+            ("SELECT", "Select", "Select them, and no other points"),
+            ("HIDE", "Hide", "Hide them in Edit Mode"),
+            ("SEPARATE", "Separate", "Move them to an object of their own"),
+            ("DELETE", "Delete", "Delete them"),
+        ],
+        default="SHOW",
+    )
+    as_shown: BoolProperty(
+        name="As Shown",
+        description="Take the stray points that were found last, and do not look again",
+        default=False,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    @property
+    def adjustable(self):
+        """Names of the settings in Adjust Last Operation."""
+        return ("action",) if self.as_shown else ("action", "strictness", "smallest", "smallest_area", "only_selected")
+
+    def plan(self, context, obj):
+        self._check(obj)
+        find = self._known(obj) if self.as_shown else self.finder(context, obj)
+
+        def compute(progress):
+            found = find(progress)
+            if found.all():
+                raise PointCloudError(f"All {len(found):,} points are stray at this strictness. Lower it.")
+            return found
+
+        return compute
+
+    def _check(self, obj):
+        """Refuse objects that the action cannot be done on."""
+        if self.action == "HIDE" and obj.type != "MESH":
+            raise PointCloudError(f'Points of the point cloud "{obj.name}" cannot be hidden. Separate them instead.')
+        if self.action in {"SEPARATE", "DELETE"}:
+            check_deletable(obj)
+
+    def _known(self, obj):
+        if STRAY not in obj.data.attributes:
+            raise PointCloudError(f'No stray points of "{obj.name}" were found yet. Press Stray Points first.')
+        found = read_attribute(obj.data, STRAY).astype(bool)
+        return lambda progress: found
+
+    def write(self, context, obj, result):
+        write_attribute(obj.data, STRAY, result)
+        count = np.count_nonzero(result)
+        done = self._act(context, obj, result) if count else ""
+        tag_changed(obj.data)
+        return [f"{obj.name}: {count:,} of {len(result):,} points are stray ({count / len(result):.2%}){done}"]
+
+    def _act(self, context, obj, found):
+        """Do with the stray points, (n,) bool, what the action says, and return a text on it."""
+        if self.action == "SELECT":
+            select(context, obj, found)
+        elif self.action == "HIDE":
+            obj.data.vertices.foreach_set("hide", found)
+            obj.data.vertices.foreach_set("select", selection(obj) & ~found)
+        elif self.action == "SEPARATE":
+            return f', in "{_separate(context, obj, found)}"'
+        elif self.action == "DELETE":
+            keep_points(context, obj, ~found)
+        return _DONE[self.action]
+
+
+def _separate(context, obj, found):
+    """Move points, (n,) bool, to an object of their own, and return its name."""
+    part = obj.copy()
+    part.name = f"{obj.name} Stray"
+    part.data = obj.data.copy()
+    part.data.name = part.name
+    part.pop(EIGENVALUES, None)
+    for collection in obj.users_collection:
+        collection.objects.link(part)
+    keep_points(context, part, found)
+    keep_points(context, obj, ~found)
+    return part.name
+
+
+class MESHFREE_OT_stray_points(StrayPoints, ShownOperator, bpy.types.Operator):
+    """Find stray points: single ones off the surface, small floating parts, and floaters among splats"""
+
+    bl_idname = "meshfree.stray_points"
+    bl_label = "Stray Points"
+    keeps_line = True
+
+    @classmethod
+    def description(cls, context, properties):
+        """Return the tooltip of a button; empty for that of the class."""
+        return {
+            "SELECT": "Select the stray points that are shown",
+            "HIDE": "Hide the stray points that are shown, in Edit Mode",
+            "SEPARATE": "Move the stray points that are shown to an object of their own",
+            "DELETE": "Delete the stray points that are shown",
+        }.get(properties.action if properties.as_shown else "", "")
+
+    def conclude(self, context, objects):
+        if self.action == "SHOW":
+            super().conclude(context, objects)
+
+
+class MESHFREE_OT_select_strays(SelectionOperator, StraySettings, bpy.types.Operator):
+    """Select stray points: single ones off the surface, small floating parts, and floaters among splats"""
+
+    bl_idname = "meshfree.select_strays"
+    bl_label = "Select Stray Points"
+    needs_selection = False
+    surface = False
+
+    def prepare(self, context, obj):
+        find = self.finder(context, obj)
+        with Stages(context.window_manager, self.bl_label) as stages:
+            found = find(stages)
+        if not found.any():
+            raise PointCloudError(f'No points of "{obj.name}" are stray. Raise Strictness to find more.')
+        return lambda: select(context, obj, found)
+
+
+class MESHFREE_OT_select_left_out(SelectionOperator, bpy.types.Operator):
+    """Select the points that the analysis left out: stray ones, and those of components of too few points"""
+
+    bl_idname = "meshfree.select_left_out"
+    bl_label = "Select Points Left Out"
+    needs_selection = False
+    surface = False
+
+    edit_mode: BoolProperty(
+        name="Edit Mode", description="Switch to Edit Mode, where selected points are seen", default=False
+    )
+
+    def prepare(self, context, obj):
+        if not is_analyzed(obj) or COMPONENT not in obj.data.attributes:
+            raise PointCloudError(f'"{obj.name}" is not analyzed. Press Analyze Points first.')
+        if is_stale(obj):
+            raise PointCloudError(f'The results of "{obj.name}" are stale. Press Analyze Points again.')
+        left_out = read_attribute(obj.data, COMPONENT) == quantity(COMPONENT).left_out
+        if not left_out.any():
+            raise PointCloudError(f'No points of "{obj.name}" were left out.')
+        return lambda: select(context, obj, left_out)
+
+    def execute(self, context):
+        done = super().execute(context)
+        if self.edit_mode and done == {"FINISHED"} and context.object.mode == "OBJECT":
+            bpy.ops.object.mode_set(mode="EDIT")
+        return done
+
+
+TOOLS = (
+    Registration(
+        MESHFREE_OT_stray_points,
+        panel=Row("Clean", 1, 1),
+        menu=Row("Object", 4, 3),
+        verb=StrayPoints,
+    ),
+    Registration(MESHFREE_OT_select_strays, menu=Row("Points", 1, 7)),
+    Registration(MESHFREE_OT_select_left_out, menu=Row("Points", 1, 8)),
+)

@@ -1,0 +1,103 @@
+"""Thinning: to a spacing or a number, evenly, edges first."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import core
+from benchmarks.samplings import noisy_sphere, random_sphere, square_random, uneven_sphere
+
+CLOUDS = {
+    "sphere": lambda: random_sphere(3000),
+    "density jump": lambda: uneven_sphere(3000, ratio=30.0),
+    "noise": lambda: noisy_sphere(3000, 0.5),
+    "square": lambda: square_random(3000),
+    "copies": lambda: np.repeat(random_sphere(100), 30, axis=0),
+}
+
+
+def roof(across=40):
+    """A gable roof on a grid, whose ridge is at x = 0, and which points are on the ridge."""
+    x, y = np.meshgrid(np.linspace(-1.0, 1.0, across + 1), np.linspace(-1.0, 1.0, across + 1))
+    jitter = np.random.default_rng(0).uniform(-0.3, 0.3, (x.size, 2)) * 2.0 / across
+    x, y = x.ravel() + jitter[:, 0] * (x.ravel() != 0.0), y.ravel() + jitter[:, 1]
+    return np.column_stack([x, y, -np.abs(x)]), x == 0.0
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+@pytest.mark.parametrize("spacing", [0.05, 0.3])
+@pytest.mark.parametrize("keep_edges", [True, False])
+def test_none_are_nearer_than_the_spacing_and_none_farther(name, spacing, keep_edges):
+    points = CLOUDS[name]()
+    chosen = core.thin_out(points, spacing=spacing, keep_edges=keep_edges)
+    assert np.all(np.diff(chosen) > 0)
+    tree = cKDTree(points[chosen])
+    assert len(tree.query_pairs(spacing * (1.0 - 1e-12))) == 0
+    assert tree.query(points)[0].max() < spacing
+
+
+@pytest.mark.parametrize("name", ["sphere", "density jump", "noise", "square"])
+@pytest.mark.parametrize("count", [1, 50, 900])
+def test_a_count_is_the_most(name, count):
+    points = CLOUDS[name]()
+    chosen = core.thin_out(points, count=count)
+    assert 0.9 * count <= len(chosen) <= count
+    assert len(np.unique(points[chosen], axis=0)) == len(chosen)
+
+
+def test_enough_stay_all_without_copies():
+    points = CLOUDS["copies"]()
+    assert len(core.thin_out(points, count=100)) == 100
+    assert len(np.unique(points[core.thin_out(points, count=10**6)], axis=0)) == 100
+    assert len(core.thin_out(np.zeros((50, 3)), count=7)) == 1
+
+
+def test_edges_come_first():
+    """Of a roof thinned to a seventh points on the ridge stay along all of it; without the setting gaps are left."""
+    points, ridge = roof()
+    gaps = []
+    for keep_edges in (True, False):
+        chosen = core.thin_out(points, spacing=0.12, keep_edges=keep_edges)
+        gaps.append(cKDTree(points[chosen[ridge[chosen]]]).query(points[ridge])[0])
+    (edges, anyway) = gaps
+    assert edges.max() < 0.15 < 0.25 < anyway.max()
+    assert edges.mean() < 0.8 * anyway.mean()
+
+
+def test_nothing_depends_on_the_order():
+    points = random_sphere(2000)
+    order = np.random.default_rng(1).permutation(2000)
+    for settings in ({"count": 300}, {"spacing": 0.2}):
+        chosen = core.thin_out(points, **settings)
+        np.testing.assert_array_equal(np.sort(order[core.thin_out(points[order], **settings)]), chosen)
+
+
+def test_lengths_scale():
+    points = random_sphere(2000)
+    np.testing.assert_array_equal(core.thin_out(8.0 * points, spacing=1.6), core.thin_out(points, spacing=0.2))
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({}, "needs a count or a spacing"),
+        ({"count": 3, "spacing": 1.0}, "needs a count or a spacing"),
+        ({"count": 0}, "choice of 0 points"),
+        ({"count": 2.5}, "choice of 2.5 points"),
+        ({"spacing": 0.0}, "spacing is 0.0"),
+        ({"spacing": np.inf}, "spacing is inf"),
+        ({"count": 3, "keep_edges": 1}, "keep_edges"),
+    ],
+)
+def test_settings_without_sense_are_refused(settings, text):
+    with pytest.raises(core.PointCloudError, match=text):
+        core.thin_out(random_sphere(100), **settings)
+
+
+def test_the_work_can_be_stopped():
+    def progress(stage, share):
+        if stage == "Thinning":
+            raise core.Cancelled
+
+    with pytest.raises(core.Cancelled):
+        core.thin_out(random_sphere(500), count=100, progress=progress)
