@@ -188,7 +188,7 @@ def match_places(places: ArrayLike, others: ArrayLike, *, scale: bool = False) -
     >>> points = core.example_sphere()
     >>> matrix = core.match_places(points[:3], points[:3] + [2.0, 0.0, 0.0])
     >>> print(np.allclose(matrix[:3, 3], [2.0, 0.0, 0.0]), np.allclose(matrix[:3, :3], np.eye(3)))
-    True
+    True True
     """
     check_switches(scale=scale)
     here = check_array(places, "Places", [(None, 3)], "Give x, y, z for each place.")
