@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +36,9 @@ _FEWEST = 0.05  # share of points that must agree at all
 _SLIDING = 1.0  # squared scatter of the normals: as much is seen of a motion that slides along the surface, or less
 _TURN = np.radians(15.0)  # and a tenth of the size: further starts, where the first one fails
 _SHIFT = 0.1
+_PICKED = 3, 5  # places that are picked on either cloud, at least and at most
+_MATCHING = 3.0  # times the least misfit of pairs, and spacings more, that others may have which are tried as well
+_TRIED = 6  # of them at most
 
 
 class Alignment(NamedTuple):
@@ -48,8 +53,10 @@ class Alignment(NamedTuple):
         its end. Of points far off, about those from its nearest point.
     overlap : float
         Share of the points that lie on the target's surface.
+    fits : bool
+        Whether the surfaces agree where they overlap.
     converged : bool
-        Whether the result can be trusted: where the surfaces overlap they agree, and no motion keeps them so.
+        Whether the result can be trusted: it fits, and no other motion does.
     reason : str
         A sentence on why it cannot; empty where it can.
     """
@@ -57,6 +64,7 @@ class Alignment(NamedTuple):
     matrix: Floats
     residual: Floats
     overlap: float
+    fits: bool
     converged: bool
     reason: str
 
@@ -68,6 +76,7 @@ def align(
     overlap: float = 1.0,
     scale: bool = False,
     start: ArrayLike | None = None,
+    pairs: tuple[ArrayLike, ArrayLike] | None = None,
     progress: Progress | None = None,
 ) -> Alignment:
     """Move a cloud onto another that shows the same surface, or part of it, from nearby.
@@ -76,7 +85,7 @@ def align(
     is; these forces fade faster and faster until what is left is the noise, so that parts that only one of the clouds
     has, and outliers, have no say. Noise is smoothed before. It is found from 20 degrees and a tenth of the size off or
     so; where it fails, it begins again from 12 places around. There is no search of all positions: begin from pairs of
-    points otherwise, by `match_places`.
+    places otherwise.
 
     Parameters
     ----------
@@ -91,6 +100,9 @@ def align(
         Whether to change the size as well.
     start : array_like, (4, 4), optional
         Where to begin: a matrix that maps points to the target, of any rotation, translation and scale.
+    pairs : tuple of two array_like, (k, 3), optional
+        Where to begin, in place of a start: three to five places on each cloud, roughly the same ones, in any order.
+        What belongs together is found by their distances, and by which way fits.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -101,13 +113,13 @@ def align(
     Raises
     ------
     InvalidPointsError
-        Points or a start of a wrong shape, or not finite.
+        Points, a start or places of a wrong shape, not finite, or places on one line.
     PointCloudError
         Points without a surface, fewer than 21 included, or another overlap or scale.
 
     See Also
     --------
-    match_places : A start from pairs of points.
+    match_places : A start from places in the same order.
     surface_deviation : Compares the clouds then, with signs.
 
     Notes
@@ -144,13 +156,16 @@ def align(
     report("Alignment", 0.0)
     moving = _surface_of(points, "points", lambda: report("Alignment", 0.1))
     fixed = _surface_of(check_points(target), "target", lambda: report("Alignment", 0.3))
-    begin = _shift(-fixed.center) @ given @ _shift(moving.center)
     search = _Search(moving, fixed, real(overlap), bool(scale), lambda: report("Alignment", 0.5))
-    found = search.from_all(begin)
+    begin, back = _shift(moving.center), _shift(-fixed.center)
+    if pairs is None:
+        found = search.first(search.around(back @ given @ begin))
+    else:
+        found = search.first(back @ way @ begin for way in _ways(*pairs, fixed.unit, bool(scale)))
     report("Alignment", 0.9)
     matrix = _shift(fixed.center) @ found.matrix @ _shift(-moving.center)
     residual = fixed.distance(_apply(found.matrix, points - moving.center))
-    return Alignment(matrix, residual, found.overlap, not found.reason, found.reason)
+    return Alignment(matrix, residual, found.overlap, found.fits, not found.reason, found.reason)
 
 
 def match_places(places: ArrayLike, others: ArrayLike, *, scale: bool = False) -> Floats:
@@ -198,6 +213,26 @@ def match_places(places: ArrayLike, others: ArrayLike, *, scale: bool = False) -
     rotation = nearest_rotations((right.T @ left)[:, :, None])[:, :, 0]
     size = np.sum(right * (left @ rotation.T)) / np.sum(left**2) if scale else 1.0
     return _shift(centers[1]) @ _linear(size * rotation) @ _shift(-centers[0])
+
+
+def _ways(places: ArrayLike, others: ArrayLike, spacing: float, scale: bool) -> list[Floats]:
+    """Return the motions that match places in some order, those of the least misfit first."""
+    given = [check_array(side, "Places", [(None, 3)], "Give x, y, z for each place.") for side in (places, others)]
+    count, least, most = len(given[0]), *_PICKED
+    if not (least <= count <= most and len(given[1]) == count):
+        raise InvalidPointsError(
+            f"{count} places are given on the points and {len(given[1])} on the target. Give {least} to {most}, as many"
+            " on either."
+        )
+    targets = [given[1][list(order)] for order in permutations(range(count))]
+    ways = [match_places(given[0], target, scale=scale) for target in targets]
+    misfits = [
+        float(np.linalg.norm(_apply(way, given[0]) - target) / np.sqrt(count))
+        for way, target in zip(ways, targets, strict=True)
+    ]
+    limit = _MATCHING * (min(misfits) + spacing)
+    order = np.argsort(misfits, kind="stable")[:_TRIED]
+    return [ways[row] for row in order if misfits[row] <= limit]
 
 
 def _center(places: Floats, count: int) -> Floats:
@@ -307,26 +342,24 @@ class _Search:
         self.moving, self.fixed, self.overlap, self.scale, self.report = moving, fixed, overlap, scale, report
         self.unit = max(fixed.unit, 1e-300)
 
-    def from_all(self, start: Floats) -> _Found:
-        """Search from a start; where that fails from around it, too; return the first that succeeds, or the best."""
-        best = self.from_one(start)
-        if best.fits:
-            return best
+    def first(self, starts: Iterable[Floats]) -> _Found:
+        """Search from some starts; return the first position that fits, or the best."""
+        every = []
+        for start in starts:
+            every.append(self.judge(*self.fine(self.coarse(start))))
+            if every[-1].fits:
+                break
+        return max(every, key=lambda found: (found.fits, found.overlap * found.agreeing))
+
+    def around(self, start: Floats) -> Iterator[Floats]:
+        """Yield a start, then others around it, turned and shifted along the axes of the moving surface."""
+        yield start
         size = np.linalg.norm(np.ptp(self.moving.places, axis=0))
         axes = np.linalg.eigh(self.moving.places.T @ self.moving.places)[1].T
         middle = self.moving.places.mean(axis=0)
         for axis in [*axes, *-axes]:
-            turn = _shift(middle) @ _linear(_rotation(_TURN * axis)) @ _shift(-middle)
-            for around in (turn, _shift(_SHIFT * size * axis)):
-                found = self.from_one(start @ around)
-                if found.fits:
-                    return found
-                best = max(best, found, key=lambda one: one.overlap * one.agreeing)
-        return best
-
-    def from_one(self, start: Floats) -> _Found:
-        """Search from one start."""
-        return self.judge(*self.fine(self.coarse(start)))
+            yield start @ _shift(middle) @ _linear(_rotation(_TURN * axis)) @ _shift(-middle)
+            yield start @ _shift(_SHIFT * size * axis)
 
     def coarse(self, matrix: Floats) -> Floats:
         """Bring the surfaces within a spacing or so, by kernels that narrow."""

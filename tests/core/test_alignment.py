@@ -173,15 +173,47 @@ def test_a_start_that_is_far_is_needed_and_enough(clouds):
     np.testing.assert_allclose(found.matrix @ far, np.eye(4), atol=0.02 * SPACING)
 
 
+@pytest.mark.parametrize("count", [3, 4])
+def test_pairs_in_any_order(clouds, count):
+    far = np.diag([1.0, -1.0, -1.0, 1.0])
+    far[:3, 3] = 3.0, 1.0, -2.0
+    points = moved(far, clouds[1])
+    rows = np.array([7, 400, 900, 1300])[:count]
+    roughly = 0.05 * np.random.default_rng(1).standard_normal((count, 3))
+    found = core.align(points, clouds[0], pairs=(points[rows], np.roll(clouds[1][rows] + roughly, 1, axis=0)))
+    assert found.converged
+    np.testing.assert_allclose(found.matrix @ far, np.eye(4), atol=0.02 * SPACING)
+
+
+def test_pairs_whose_distances_do_not_tell_the_order(clouds):
+    """Three places at equal distances: six ways, of which one fits."""
+    far = np.diag([-1.0, -1.0, 1.0, 1.0])
+    points = moved(far, clouds[1])
+    rows = [np.argmax(clouds[1] @ turned(np.array([0.0, 0.0, 1.0]), angle)[0]) for angle in (0.0, 2.1, 4.2)]
+    middle = clouds[1][rows].mean(axis=0)
+    places = middle + np.array([[1.0, 0.0, 0.0], [-0.5, np.sqrt(0.75), 0.0], [-0.5, -np.sqrt(0.75), 0.0]]) * 0.7
+    for shift in range(3):
+        found = core.align(points, clouds[0], pairs=(moved(far, places), np.roll(places, shift, axis=0)))
+        assert found.converged
+        np.testing.assert_allclose(found.matrix @ far, np.eye(4), atol=0.02 * SPACING)
+
+
+@pytest.mark.parametrize(("here", "there"), [(2, 2), (3, 4), (6, 6), (0, 0)])
+def test_wrong_numbers_of_places(clouds, here, there):
+    with pytest.raises(core.InvalidPointsError, match=f"{here} places are given on the points and {there} on the"):
+        core.align(*clouds, pairs=(clouds[0][:here], clouds[1][:there]))
+
+
 def test_further_starts_are_tried_where_the_first_fails(clouds, monkeypatch):
     points, calls = moved(motion(), clouds[1]), []
-    whole = alignment._Search.from_one
+    whole = alignment._Search.judge
 
-    def counted(self, start):
-        calls.append(start)
-        return whole(self, start) if len(calls) > 2 else whole(self, start)._replace(fits=False, agreeing=0.0)
+    def counted(self, matrix, moved):
+        calls.append(matrix)
+        found = whole(self, matrix, moved)
+        return found if len(calls) > 2 else found._replace(fits=False, agreeing=0.0)
 
-    monkeypatch.setattr(alignment._Search, "from_one", counted)
+    monkeypatch.setattr(alignment._Search, "judge", counted)
     found = core.align(points, clouds[0])
     assert found.converged
     assert len(calls) == 3
