@@ -59,6 +59,8 @@ class Alignment(NamedTuple):
         Whether the result can be trusted: it fits, and no other motion does.
     reason : str
         A sentence on why it cannot; empty where it can.
+    notices : list of str
+        What else there is to know: that only a sample was aligned.
     """
 
     matrix: Floats
@@ -67,6 +69,7 @@ class Alignment(NamedTuple):
     fits: bool
     converged: bool
     reason: str
+    notices: list[str]
 
 
 def align(
@@ -165,7 +168,10 @@ def align(
     report("Alignment", 0.9)
     matrix = _shift(fixed.center) @ found.matrix @ _shift(-moving.center)
     residual = fixed.distance(_apply(found.matrix, points - moving.center))
-    return Alignment(matrix, residual, found.overlap, found.fits, not found.reason, found.reason)
+    sampled = max(len(points), len(np.asarray(target))) > _MOST
+    text = f"Of clouds with more than {_MOST:,} points so many, drawn at random, were aligned: residuals are distances"
+    notices = [f"{text} from the surface through those."] if sampled else []
+    return Alignment(matrix, residual, found.overlap, found.fits, not found.reason, found.reason, notices)
 
 
 def match_places(places: ArrayLike, others: ArrayLike, *, scale: bool = False) -> Floats:

@@ -43,7 +43,7 @@ def clouds():
 def test_a_cloud_is_on_itself(clouds):
     found = core.align(clouds[0], clouds[0])
     assert found.converged
-    assert found.reason == ""
+    assert (found.reason, found.notices) == ("", [])
     assert found.overlap == 1.0
     np.testing.assert_allclose(found.matrix, np.eye(4), atol=1e-9)
     np.testing.assert_allclose(found.residual, 0.0, atol=1e-4)
@@ -224,6 +224,7 @@ def test_of_many_points_a_sample_is_aligned(clouds, monkeypatch):
     found = core.align(moved(motion(), clouds[1]), clouds[0])
     assert found.converged
     assert len(found.residual) == len(clouds[1])
+    assert "more than 800 points" in found.notices[0]
     assert np.linalg.norm(moved(found.matrix @ motion(), clouds[1]) - clouds[1], axis=1).max() < 0.1 * SPACING
 
 
