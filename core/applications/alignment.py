@@ -20,6 +20,7 @@ from ..types import Array, Bools, Floats, Ints, Progress, Report
 
 _MOST = 20_000  # points of a cloud that are aligned: of more a sample drawn at random, whose errors average out
 _NEIGHBORS = 20  # that a point of a surface needs
+_THREADED = 4_000  # places whose closest points several threads search for
 _COARSE = 1_000  # points of a cloud from which closest ones are searched for until both lie a spacing apart
 _WIDEST = 2.0  # median distances: the width of the first kernel
 _NARROWER = 0.85  # each further kernel, down to one spacing
@@ -286,7 +287,7 @@ class _Surface:
 
     def distance(self, places: Floats) -> Floats:
         """Return distances of places, (k, 3), from the surface: across it, or from its end."""
-        reach, row = self.tree.query(places, workers=-1)
+        reach, row = _closest(self.tree, places)
         offset, normals = places - self.places[row], self.normals[row]
         height = np.einsum("ij,ij->i", offset, normals)
         along = offset - height[:, None] * normals
@@ -415,8 +416,8 @@ class _Search:
         size = np.cbrt(np.linalg.det(matrix[:3, :3]))
         places, normals = _apply(matrix, self.moving.places), self.moving.normals @ matrix[:3, :3].T / size
         back = _apply(np.linalg.inv(matrix), self.fixed.places[there])
-        forth_distance, forth = self.fixed.tree.query(places[here], workers=-1)
-        back_distance, back_row = self.moving.tree.query(back, workers=-1)
+        forth_distance, forth = _closest(self.fixed.tree, places[here])
+        back_distance, back_row = _closest(self.moving.tree, back)
         first = np.concatenate([np.arange(len(places))[here], back_row])
         second = np.concatenate([forth, np.arange(len(self.fixed.places))[there]])
         spacing = np.concatenate([self.fixed.spacing[forth], size * self.moving.spacing[back_row]])
@@ -499,6 +500,11 @@ def _pair_up(here: Floats, there: Floats, left: Floats, right: Floats, distance:
     aside = np.sqrt(np.maximum(distance**2 - height**2, 0.0)) / spacing
     scatter = np.einsum("ij,ij->i", apart, apart)
     return _Matches(here, there, mean, scatter, distance, height, aside, np.abs(cosine), spacing)
+
+
+def _closest(tree: cKDTree, places: Floats) -> tuple[Floats, Ints]:
+    """Return distance and row of the closest point to each place; threads are worth it for many."""
+    return tree.query(places, workers=-1 if len(places) > _THREADED else 1)
 
 
 def _kernel(values: Floats, width: float) -> Floats:

@@ -58,6 +58,7 @@ def move_object(context, obj, matrix):
     PointCloudError
         Its channels cannot express it, where its parent is scaled unevenly.
     """
+    before = obj.matrix_basis.copy()
     obj.matrix_world = matrix
     context.view_layer.update()
     wanted, found = np.array(matrix), np.array(obj.matrix_world)
@@ -66,6 +67,8 @@ def move_object(context, obj, matrix):
         np.allclose(found[:3, :3], wanted[:3, :3], rtol=0.0, atol=1e-4 * size)
         and np.allclose(found[:3, 3], wanted[:3, 3], rtol=1e-5, atol=1e-4 * size)
     ):
+        obj.matrix_basis = before
+        context.view_layer.update()
         raise PointCloudError(
             f'The rotation of "{obj.name}" would shear it, since its scale or that of its parent is uneven. Apply the'
             " scale (Ctrl A), or clear the parent."

@@ -147,7 +147,17 @@ class MESHFREE_OT_align_points(Align, ShownOperator, bpy.types.Operator):
         if len(found) != 1:
             many = f"{len(found)} others are" if found else "no other is"
             return f'"{context.object.name}" is aligned with one other cloud, and {many} selected. Select one'
-        return obstacle(found[0])
+        (other,) = found
+        if _moves_with(other, context.object):
+            return f'"{other.name}" moves with "{context.object.name}", its parent. Make it the active one'
+        return obstacle(other)
+
+
+def _moves_with(obj, other):
+    """Whether an object is a child of another, or a child of such."""
+    while obj is not None and obj != other:
+        obj = obj.parent
+    return obj is not None
 
 
 TOOLS = (Registration(MESHFREE_OT_align_points, panel=Row("Measure", 5, 1), menu=Row("Object", 2, 3), verb=Align),)
