@@ -225,7 +225,7 @@ class _AlignWithFile(Align):
 
     reference = None
 
-    def target(self, context, obj):
+    def other(self, context, obj):
         return self.reference.name, self.reference.reading.points, place_of(obj) - self.reference.place, None
 
     def in_file(self, matrix):

@@ -87,7 +87,7 @@ class Align(Tool):
 
     def plan(self, context, obj):
         reading = read_points(context, obj)
-        name, target, shift, other = self.target(context, obj)
+        name, target, shift, other = self.other(context, obj)
         motion, own_name = Motion(obj, shift, other), obj.name
         pairs = self.picked(obj, other, reading.points + shift, target) if self.from_selected else None
         settings = {"overlap": self.overlap, "scale": self.scale, "pairs": pairs}
@@ -99,7 +99,7 @@ class Align(Tool):
 
         return compute
 
-    def target(self, context, obj):
+    def other(self, context, obj):
         """Return name and points of the other cloud, the offset between points as read, and its object."""
         (other,) = others(context)
         with naming(other.name):
