@@ -211,7 +211,16 @@ class _Reference:
         return self._laplacian
 
 
-class _CompareWithFile(Compare):
+class _MovedLast:
+    """A tool that moves its object when all else is written."""
+
+    def write_all(self, context, objects, results):
+        texts = super().write_all(context, objects, results)
+        self._move()
+        return texts
+
+
+class _CompareWithFile(_MovedLast, Compare):
     """The same tool, with a cloud that is not in the scene."""
 
     reference = None
@@ -220,7 +229,7 @@ class _CompareWithFile(Compare):
         return self.reference.name, self.reference.operator, place_of(obj) - self.reference.place, None
 
 
-class _AlignWithFile(Align):
+class _AlignWithFile(_MovedLast, Align):
     """The same tool, with a cloud that is not in the scene."""
 
     reference = None

@@ -50,7 +50,7 @@ def check_movable(obj):
             )
 
 
-def move_object(context, obj, matrix):
+def move_object(obj, matrix):
     """Give an object another matrix in world space; parents and delta transforms stay as they are.
 
     Raises
@@ -58,17 +58,14 @@ def move_object(context, obj, matrix):
     PointCloudError
         Its channels cannot express it, where its parent is scaled unevenly.
     """
-    before = obj.matrix_basis.copy()
+    parent = np.array(obj.matrix_world) @ np.linalg.inv(obj.matrix_basis)
     obj.matrix_world = matrix
-    context.view_layer.update()
-    wanted, found = np.array(matrix), np.array(obj.matrix_world)
-    size = np.abs(wanted).max(axis=0)[:3].max()
+    wanted, found = np.array(matrix), parent @ np.array(obj.matrix_basis)
+    size = np.abs(wanted[:3, :3]).max()
     if not (
         np.allclose(found[:3, :3], wanted[:3, :3], rtol=0.0, atol=1e-4 * size)
         and np.allclose(found[:3, 3], wanted[:3, 3], rtol=1e-5, atol=1e-4 * size)
     ):
-        obj.matrix_basis = before
-        context.view_layer.update()
         raise PointCloudError(
             f'The rotation of "{obj.name}" would shear it, since its scale or that of its parent is uneven. Apply the'
             " scale (Ctrl A), or clear the parent."

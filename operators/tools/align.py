@@ -39,15 +39,18 @@ class Motion:
         self._matrix, self._shift = np.array(obj.matrix_world, dtype=np.float64), shift
         self._other = other and (other.name, other.matrix_world.copy())
 
-    def apply(self, context, obj, matrix):
-        """Move the object by the matrix of an alignment of its points as read, shifted."""
+    def apply(self, obj, matrix):
+        """Move the object by the matrix of an alignment of its points as read, shifted.
+
+        Last of all: the next update of the scene tells others of it.
+        """
         name, place = self._other or ("", None)
         if name and (name not in bpy.data.objects or bpy.data.objects[name].matrix_world != place):
             raise PointCloudError(f'"{name}" was moved meanwhile. Start it again.')
         read, back = self._matrix.copy(), np.eye(4)
         read[:3, 3] = self._shift
         back[:3, 3] = self._matrix[:3, 3] - self._shift
-        move_object(context, obj, Matrix(back @ matrix @ read))
+        move_object(obj, Matrix(back @ matrix @ read))
 
 
 def check_found(found, name, other):
@@ -67,6 +70,7 @@ def doubts(found):
 class Align(Tool):
     """The settings and the work of `meshfree.align_points`."""
 
+    _move = None  # moves the object, when all else is written
     writes = (RESIDUAL,)
     asks = ("overlap", "scale", "from_selected", "show")
 
@@ -122,7 +126,7 @@ class Align(Tool):
 
     def write(self, context, obj, result):
         found, motion, name = result
-        motion.apply(context, obj, found.matrix)
+        self._move = lambda: motion.apply(obj, found.matrix)
         write_attribute(obj.data, RESIDUAL, found.residual)
         tag_changed(obj.data)
         middle = length_text(float(np.quantile(found.residual, 0.5 * found.overlap)))
@@ -137,6 +141,10 @@ class MESHFREE_OT_align_points(Align, ShownOperator, bpy.types.Operator):
     bl_idname = "meshfree.align_points"
     bl_label = "Align Points"
     only_active = keeps_line = True
+
+    def conclude(self, context, objects):
+        super().conclude(context, objects)
+        self._move()
 
     @classmethod
     def obstacle(cls, context):

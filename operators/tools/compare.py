@@ -19,6 +19,7 @@ from .align import Motion, check_found, doubts, others
 class Compare(Tool):
     """The settings and the work of `meshfree.compare`."""
 
+    _move = None  # moves the object, when all else is written
     writes = (DEVIATION, COMPARED)
     asks = ("align_first", "greatest", "show", "hide_reference")
     at_zero = {"greatest": "Any"}
@@ -92,9 +93,9 @@ class Compare(Tool):
 
     def write(self, context, obj, result):
         found, name, motion, aligned = result
-        told = []
+        told, self._move = [], lambda: None
         if aligned is not None:
-            motion.apply(context, obj, aligned.matrix)
+            self._move = lambda: motion.apply(obj, aligned.matrix)
             told = [f"{obj.name} was moved: {aligned.overlap:.0%} of its points lie on {name}.", *doubts(aligned)]
         obj.meshfree.compared_with = bpy.data.objects.get(name)  # None for a file
         obj.meshfree.compared_within = self.greatest
@@ -142,6 +143,7 @@ class CompareOperator(Compare, ShownOperator):
         super().conclude(context, objects)
         if self.hide_reference:
             hide(objects[0].meshfree.compared_with)
+        self._move()
 
 
 class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):

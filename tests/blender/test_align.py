@@ -178,7 +178,7 @@ def test_the_other_one_must_stay_meanwhile(pair):
     plan.location.x = 1.0
     bpy.context.view_layer.update()
     with pytest.raises(ValueError, match='"Plan" was moved meanwhile'):
-        motion.apply(bpy.context, scan, np.eye(4))
+        motion.apply(scan, np.eye(4))
 
 
 def test_needs_one_other_cloud(pair):
