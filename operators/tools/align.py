@@ -10,7 +10,7 @@ from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.place import check_movable, move_object
 from ..objects.quantities import RESIDUAL
-from ..objects.reading import TYPES, obstacle, read_points
+from ..objects.reading import TYPES, find_object, obstacle, read_points
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running.application import ShownOperator, Tool, naming
@@ -31,22 +31,23 @@ class Motion:
     shift : ndarray, (3,)
         From points as read of the object to those of the other cloud.
     other : bpy.types.Object, optional
-        Of the other cloud, which must stay where it is meanwhile; None for a file.
+        Of the other cloud, which must not be moved meanwhile; None for a file.
     """
 
     def __init__(self, obj, shift, other=None):
         check_movable(obj)
         self._matrix, self._shift = np.array(obj.matrix_world, dtype=np.float64), shift
-        self._other = other and (other.name, other.matrix_world.copy())
+        self._other = other and (other.session_uid, other.matrix_world.copy())
 
     def apply(self, obj, matrix):
         """Move the object by the matrix of an alignment of its points as read, shifted.
 
         Last of all: the next update of the scene tells others of it.
         """
-        name, place = self._other or ("", None)
-        if name and (name not in bpy.data.objects or bpy.data.objects[name].matrix_world != place):
-            raise PointCloudError(f'"{name}" was moved meanwhile. Start it again.')
+        uid, place = self._other or (None, None)
+        other = find_object(uid)
+        if other is not None and other.matrix_world != place:
+            raise PointCloudError(f'"{other.name}" was moved meanwhile. Start it again.')
         read, back = self._matrix.copy(), np.eye(4)
         read[:3, 3] = self._shift
         back[:3, 3] = self._matrix[:3, 3] - self._shift
