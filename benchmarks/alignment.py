@@ -1,7 +1,9 @@
-"""How often clouds are aligned, beside Open3D: ``MESHFREE_ZOO=folder python -m benchmarks.alignment [cases [share]]``.
+"""How often clouds are aligned, beside Open3D, if that is installed.
+
+    MESHFREE_ZOO=folder python scripts/environments.py open3d -m benchmarks.alignment [cases [overlap]]
 
 Two samples of one shape that share no point, each cut by a plane, with noise and outliers; one is turned by 10 degrees
-and moved by a tenth of its size. Open3D is measured if it is installed. The table goes to docs/alignment.md.
+and moved by a tenth of its size. The table of all 200 cases goes to docs/alignment.md.
 """
 
 import sys
@@ -32,6 +34,9 @@ called not converged, and of the others, how many converged. Open3D's point-to-p
 through 30 neighbors, outliers removed by its statistical filter, and correspondences within 0.2, 0.1 and 0.05 of the
 diagonal, and at last within 3 spacings, from voxels to all points. The constants were chosen on rocker-arm, cat, arm,
 cheburashka, screwdriver and fandisk. Seconds of processor time, all cores together.
+
+Made by `MESHFREE_ZOO=folder python scripts/environments.py open3d -m benchmarks.alignment`; the shapes are not part of
+the project.
 """
 
 
