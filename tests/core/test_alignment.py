@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.alignment import turned
+from benchmarks.alignment import aligned, case, errors, turned
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
 from core.applications import alignment
 
@@ -328,3 +328,21 @@ def test_pairs_are_matched_by_least_squares_without_mirroring():
 def test_wrong_pairs(places, others, text):
     with pytest.raises(core.InvalidPointsError, match=text):
         core.match_places(places, others)
+
+
+def test_the_cases_of_the_benchmark_are_what_it_says():
+    """On the mesh of a pyramid: how far off, what is shared, and what counts as aligned."""
+    vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.4, 0.5, 0.8]])
+    faces = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    made = case(vertices, faces, 3, count=3000)
+    assert errors(made.matrix, made) == (0.0, 0.0)
+    assert aligned(made.matrix, made)
+    degrees, spacings = errors(np.eye(4), made)
+    assert degrees == pytest.approx(10.0)
+    assert spacings * made.spacing > 0.05
+    assert not aligned(np.eye(4), made)
+    back = moved(made.matrix, made.points)
+    far = np.array(
+        [np.partition(np.linalg.norm(made.target - place, axis=1), 0)[0] for place in back[:: len(back) // 300]]
+    )
+    assert np.mean(far < 1.5 * made.spacing) == pytest.approx(0.6, abs=0.1)
