@@ -155,11 +155,10 @@ def align(
     check_switches(scale=scale)
     if not 0.0 < real(overlap) <= 1.0:
         raise PointCloudError(f"The overlap is {overlap!r}. Use a share above 0, up to 1.")
-    points = check_points(points)
     given = np.eye(4) if start is None else _check_start(start)
     report("Alignment", 0.0)
     moving = _surface_of(points, "points", lambda: report("Alignment", 0.1))
-    fixed = _surface_of(check_points(target), "target", lambda: report("Alignment", 0.3))
+    fixed = _surface_of(target, "target", lambda: report("Alignment", 0.3))
     search = _Search(moving, fixed, real(overlap), bool(scale), lambda: report("Alignment", 0.5))
     begin, back = _shift(moving.center), _shift(-fixed.center)
     if pairs is None:
@@ -168,8 +167,9 @@ def align(
         found = search.first(back @ way @ begin for way in _ways(*pairs, fixed.unit, bool(scale)))
     report("Alignment", 0.9)
     matrix = _shift(fixed.center) @ found.matrix @ _shift(-moving.center)
-    residual = fixed.distance(_apply(found.matrix, points - moving.center))
-    sampled = max(len(points), len(np.asarray(target))) > _MOST
+    places = check_points(points)
+    residual = fixed.distance(_apply(found.matrix, places - moving.center))
+    sampled = max(len(places), len(np.asarray(target))) > _MOST
     text = f"Of clouds with more than {_MOST:,} points so many, drawn at random, were aligned: residuals are distances"
     notices = [f"{text} from the surface through those."] if sampled else []
     return Alignment(matrix, residual, found.overlap, found.fits, not found.reason, found.reason, notices)
@@ -298,13 +298,14 @@ class _Surface:
         return np.minimum(beside, reach)
 
 
-def _surface_of(points: Floats, name: str, report: Report) -> _Surface:
+def _surface_of(given: ArrayLike, name: str, report: Report) -> _Surface:
     """Read the surface of a cloud, of at most so many points of it."""
-    rows = np.arange(len(points))
-    if len(points) > _MOST:  # by the places, so that the order of the points does not matter
-        rows = np.lexsort(points.T)[np.random.default_rng(0).permutation(len(points))[:_MOST]]
     options = LaplacianOptions(bandwidth="local", neighbors=_NEIGHBORS)
     try:
+        points = check_points(given)
+        rows = np.arange(len(points))
+        if len(points) > _MOST:  # by the places, so that the order of the points does not matter
+            rows = np.lexsort(points.T)[np.random.default_rng(0).permutation(len(points))[:_MOST]]
         scaled, surface = read_surface(points[rows], options, lambda stage, fraction: report())
     except PointCloudError as error:
         raise type(error)(f"In the {name}: {error}") from error

@@ -141,6 +141,7 @@ class MESHFREE_OT_align_points(Align, ShownOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.align_points"
     bl_label = "Align Points"
+    adjustable = ()  # a repetition would compute it again
     only_active = keeps_line = True
 
     def conclude(self, context, objects):

@@ -251,8 +251,8 @@ def test_it_can_be_cancelled(clouds):
     ("points", "error", "text"),
     [
         (np.eye(3)[:2], core.TooFewPointsError, "In the points: .* need 21 different points, and there are 2"),
-        (np.full((40, 3), np.nan), core.InvalidPointsError, "40 of 40 points are not finite"),
-        (np.zeros((40, 2)), core.InvalidPointsError, r"shape \(n, 3\)"),
+        (np.full((40, 3), np.nan), core.InvalidPointsError, "In the points: 40 of 40 points are not finite"),
+        (np.zeros((40, 2)), core.InvalidPointsError, r"In the points: .*shape \(n, 3\)"),
         (np.linspace(0, 1, 40)[:, None] * [1.0, 2.0, 3.0], core.NotASurfaceError, "In the points: .*straight line"),
     ],
 )
@@ -264,6 +264,8 @@ def test_points_without_a_surface(clouds, points, error, text):
 def test_a_target_without_a_surface_is_named(clouds):
     with pytest.raises(core.TooFewPointsError, match="In the target"):
         core.align(clouds[0], np.eye(3))
+    with pytest.raises(core.InvalidPointsError, match="In the target: 1 of 1500 points are not finite"):
+        core.align(clouds[0], np.where(np.arange(1500)[:, None] == 7, np.inf, clouds[1]))
 
 
 @pytest.mark.parametrize("overlap", [0.0, -1.0, 1.5, np.nan, "half"])
