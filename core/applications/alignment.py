@@ -88,8 +88,8 @@ def align(
     Each point is drawn to the closest one of the other cloud, across the surface only, and the less the further off it
     is; these forces fade faster and faster until what is left is the noise, so that parts that only one of the clouds
     has, and outliers, have no say. Noise is smoothed before. It is found from 20 degrees and a tenth of the size off or
-    so; where it fails, it begins again from 12 places around. There is no search of all positions: begin from pairs of
-    places otherwise.
+    so; where it fails, the best is taken of 12 further starts around that one. There is no search of all positions:
+    begin from pairs of places otherwise.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ def align(
     search = _Search(moving, fixed, real(overlap), bool(scale), lambda: report("Alignment", 0.5))
     begin, back = _shift(moving.center), _shift(-fixed.center)
     if pairs is None:
-        found = search.first(search.around(back @ given @ begin))
+        found = search.best(search.around(back @ given @ begin))
     else:
-        found = search.first(back @ way @ begin for way in _ways(*pairs, fixed.unit, bool(scale)))
+        found = search.best(back @ way @ begin for way in _ways(*pairs, fixed.unit, bool(scale)))
     report("Alignment", 0.9)
     matrix = _shift(fixed.center) @ found.matrix @ _shift(-moving.center)
     places = check_points(points)
@@ -350,12 +350,12 @@ class _Search:
         self.moving, self.fixed, self.overlap, self.scale, self.report = moving, fixed, overlap, scale, report
         self.unit = max(fixed.unit, 1e-300)
 
-    def first(self, starts: Iterable[Floats]) -> _Found:
-        """Search from some starts; return the first position that fits, or the best."""
-        every = []
+    def best(self, starts: Iterable[Floats]) -> _Found:
+        """Search from some starts; return what the first gives if that fits, or the best of all."""
+        every: list[_Found] = []
         for start in starts:
             every.append(self.judge(*self.fine(self.coarse(start))))
-            if every[-1].fits:
+            if every[0].fits:
                 break
         return max(every, key=lambda found: (found.fits, found.overlap * found.agreeing))
 

@@ -211,12 +211,14 @@ def test_further_starts_are_tried_where_the_first_fails(clouds, monkeypatch):
     def counted(self, matrix, moved):
         calls.append(matrix)
         found = whole(self, matrix, moved)
-        return found if len(calls) > 2 else found._replace(fits=False, agreeing=0.0)
+        return found if len(calls) == 4 else found._replace(fits=len(calls) == 3, agreeing=0.3)
 
     monkeypatch.setattr(alignment._Search, "judge", counted)
     found = core.align(points, clouds[0])
     assert found.converged
-    assert len(calls) == 3
+    assert found.fits
+    assert len(calls) == 13  # the third fits, and the fourth better
+    np.testing.assert_allclose(found.matrix @ motion(), np.eye(4), atol=0.02 * SPACING)
 
 
 def test_of_many_points_a_sample_is_aligned(clouds, monkeypatch):
