@@ -1,6 +1,9 @@
 """The public names of core, a line each, and where they are: `core/__init__.py` imports them as they are asked for."""
 
 from .applications.cleaning import clean_points as clean_points
+from .applications.alignment import Alignment as Alignment
+from .applications.alignment import align as align
+from .applications.alignment import match_places as match_places
 from .applications.coarse_deformation import CoarseDeformer as CoarseDeformer
 from .applications.coarse_deformation import coarse_deformer as coarse_deformer
 from .applications.deformation import Deformation as Deformation

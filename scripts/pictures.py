@@ -11,6 +11,7 @@ from time import perf_counter
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 import demo
 import package
@@ -79,6 +80,26 @@ def compare(path):
     studio.show(after, "lb_deviation")
     studio.show_shape(before)
     row((before, after), path, legend=after)
+
+
+def align(path):
+    """Two parts of a shape, one of them off, and both after they were aligned."""
+    first, second = (demo.Coral().sample(demo.POINTS, seed=seed) for seed in (0, 5))
+    parts = first[first[:, 0] - first[:, 2] < 0.4], second[second[:, 0] - second[:, 2] > -0.4]
+    across = Vector(studio.picture_axes(studio.VIEW)[0])
+    for place in (0.0, 1.3 * float(np.ptp(first @ across))):
+        stays, moves = (studio.make_object(points, "Part") for points in parts)
+        moves.location, moves.rotation_euler = (0.15, -0.12, 0.2), (0.15, -0.1, 0.15)
+        if place:
+            stays.select_set(True)
+            moves.select_set(True)
+            bpy.ops.meshfree.align_points(show=False)
+        for obj, color in ((stays, studio.CLAY), (moves, studio.HANDLES)):
+            display = studio.add_display(obj, 1.1 * SPACING)
+            part("operators.objects.modifiers").set_input(display, "Material", studio.paint("Part", color))
+            obj.location += place * across
+    bpy.context.view_layer.update()
+    studio.take(path, legend=None)
 
 
 def shape_index(path):
@@ -342,6 +363,7 @@ PICTURES = {
     "segment": segment,
     "surface": surface,
     "mesh": mesh,
+    "align": align,
     "compare": compare,
     "shape_index": shape_index,
     "curvature_direction": curvature_direction,

@@ -1,7 +1,7 @@
 """Measurements on the points: neighbourhoods, components, normals, boundary, pairs; `cloud` runs the stages."""
 
 from .boundary import Boundary
-from .cloud import Cloud, Discs, estimate_normals, read_cloud, surface_discs
+from .cloud import Cloud, Discs, estimate_normals, read_cloud, read_surface, surface_discs
 from .components import SMALLEST, move_apart
 from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights
 from .doubt import Doubt

@@ -9,8 +9,11 @@ from ... import core
 from ...core.files import MESHES, READABLE, read_points, write_mesh
 from ..objects.attributes import point_count
 from ..objects.groups import assign
+from ..objects.options import laplacian_options
 from ..objects.place import offset_of, place_of
-from ..running.application import naming, operator_reader
+from ..objects.reading import read_points as seen_points
+from ..running.application import build_operator, naming
+from ..tools.align import Align
 from ..tools.along import SignedDistance
 from ..tools.compare import Compare, distances
 from ..tools.mesh import MeshSurface
@@ -114,23 +117,19 @@ class Mesh(Apply):
         return {"vertices": len(mesh.vertices), "faces": len(mesh.polygons), "open_edges": opened}
 
 
-class CompareWith(Apply):
-    """The verb `compare`: all inputs with one other file."""
+class WithReference(Apply):
+    """A tool on all inputs with one other file, in the coordinates of their files."""
 
     reads = ("reference",)
+    use = ""  # what the reference is for, for the help
 
-    def __init__(self):
-        super().__init__("compare", _CompareWithFile)
-        self.help = "signed distance of points from the surface of those of another file"
+    def __init__(self, operator, tool):
+        super().__init__(operator, tool)
         self._reference = None
 
     def add_options(self, parser):
         parser.add_argument(
-            "--reference",
-            type=Path,
-            required=True,
-            metavar="FILE",
-            help="point cloud from whose surface distances are measured, of the kinds of inputs",
+            "--reference", type=Path, required=True, metavar="FILE", help=f"{self.use}, of the kinds of inputs"
         )
         parser.add_argument(
             "--reference-object",
@@ -148,15 +147,27 @@ class CompareWith(Apply):
 
     def _read(self, arguments):
         obj, notices = self.open(arguments.reference, "reference_object", arguments)
-        with naming(str(arguments.reference)):
-            _, build = operator_reader(bpy.context, obj)
-        return _Reference(str(arguments.reference), place_of(obj), build, notices)
+        name = str(arguments.reference)
+        with naming(name):
+            return _Reference(
+                name, place_of(obj), seen_points(bpy.context, obj), laplacian_options(obj.meshfree), notices
+            )
 
     def prepare(self, tool, obj, path, arguments):
         tool.reference = self._reference
 
+
+class CompareWith(WithReference):
+    """The verb `compare`."""
+
+    use = "point cloud from whose surface distances are measured"
+
+    def __init__(self):
+        super().__init__("compare", _CompareWithFile)
+        self.help = "signed distance of points from the surface of those of another file"
+
     def figures(self, tool, result):
-        found, _ = result
+        found, *_ = result
         mean, within, most = distances(found)
         return {
             "compared_count": int(np.count_nonzero(found.known)),
@@ -166,26 +177,71 @@ class CompareWith(Apply):
         }
 
 
-class _Reference:
-    """A cloud that others are compared with: its operator is built once, for the first of them."""
+class AlignWith(WithReference):
+    """The verb `align`, whose outputs are in the coordinates of the reference."""
 
-    def __init__(self, name, place, build, notices):
-        self.name, self.place, self.notices = name, place, notices
-        self._build, self._laplacian = build, None
+    left_out = LEFT_OUT | {"from_selected"}
+    use = "point cloud that the points are moved onto"
+
+    def __init__(self):
+        super().__init__("align_points", _AlignWithFile)
+        self.name = "align"
+        self.help = "move points onto the surface of those of another file, from nearby"
+
+    def figures(self, tool, result):
+        found, *_ = result
+        return {
+            "converged": found.converged,
+            "overlap": found.overlap,
+            "median_residual": float(np.quantile(found.residual, 0.5 * found.overlap)),
+            "matrix": tool.in_file(found.matrix).tolist(),
+        }
+
+
+class _Reference:
+    """A cloud that others are held against: its operator is built once, for the first of them."""
+
+    def __init__(self, name, place, reading, options, notices):
+        self.name, self.place, self.reading, self.notices = name, place, reading, notices
+        self._options, self._laplacian = options, None
 
     def operator(self, progress):
         if self._laplacian is None:
-            self._laplacian = self._build(progress)
+            self._laplacian = build_operator(self.reading, self._options, progress).laplacian
         return self._laplacian
 
 
-class _CompareWithFile(Compare):
-    """The same tool, with a cloud that is not in the scene, both in the coordinates of their files."""
+class _MovedLast:
+    """A tool that moves its object when all else is written."""
+
+    def write_all(self, context, objects, results):
+        texts = super().write_all(context, objects, results)
+        self._move()
+        return texts
+
+
+class _CompareWithFile(_MovedLast, Compare):
+    """The same tool, with a cloud that is not in the scene."""
 
     reference = None
 
     def other(self, context, obj):
-        return self.reference.name, self.reference.operator, place_of(obj) - self.reference.place
+        return self.reference.name, self.reference.operator, place_of(obj) - self.reference.place, None
+
+
+class _AlignWithFile(_MovedLast, Align):
+    """The same tool, with a cloud that is not in the scene."""
+
+    reference = None
+
+    def other(self, context, obj):
+        return self.reference.name, self.reference.reading.points, place_of(obj) - self.reference.place, None
+
+    def in_file(self, matrix):
+        """Return a matrix between points as read as one between coordinates of the files."""
+        there, back = np.eye(4), np.eye(4)
+        there[:3, 3], back[:3, 3] = self.reference.place, -self.reference.place
+        return there @ matrix @ back
 
 
 class Orient(Apply):

@@ -59,7 +59,7 @@ class _State:
 
     def __init__(self, obj):
         self._obj, self._data = obj, obj.data
-        self._place = obj.matrix_basis.copy()
+        self._place, self._world = obj.matrix_basis.copy(), obj.matrix_world.copy()
         self._modifiers = {item.name: inputs_of(item) if is_own(item) else {} for item in obj.modifiers}
         self._own = {name: _plain(obj[name]) for name in _own_names(obj)}
         self._settings = _values(obj.meshfree)
@@ -70,6 +70,7 @@ class _State:
         if obj.data != self._data:
             obj.data = self._data
         if obj.matrix_basis != self._place:
+            obj.matrix_world = self._world  # which the other leaves as it is until the next update
             obj.matrix_basis = self._place
         for item in [item for item in obj.modifiers if item.name not in self._modifiers]:
             obj.modifiers.remove(item)

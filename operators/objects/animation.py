@@ -23,6 +23,12 @@ def moves_by_keys(obj) -> bool:
     return any(curve.data_path in _PATHS for curve in curves(obj))
 
 
+def moves_by_driver(obj) -> bool:
+    """Whether drivers move an object."""
+    animation = obj.animation_data
+    return animation is not None and any(curve.data_path in _PATHS for curve in animation.drivers)
+
+
 def stop_moving(obj):
     """Remove the keyframes that move an object, not those of other users of its action; it keeps its transform."""
     animation = obj.animation_data

@@ -1,9 +1,11 @@
-"""The offset of an object's coordinates from those of its file; hiding and selecting objects."""
+"""The offset of an object's coordinates from those of its file; moving, hiding and selecting objects."""
 
 import json
 
 import numpy as np
 
+from ...core import PointCloudError
+from .animation import moves_by_driver, moves_by_keys
 from .attributes import point_count
 
 OFFSET = "lb_offset"  # custom property of an object: coordinates in its file less those after import
@@ -31,6 +33,43 @@ def place_of(obj):
 def known_offset(scene):
     """Return the offset of the first object of a scene that has one, to be shared where possible; or None."""
     return next((offset_of(obj) for obj in scene.objects if OFFSET in obj), None)
+
+
+def check_movable(obj):
+    """Refuse an object whose transform something else decides, before anything is computed."""
+    causes = {
+        "keyframes": moves_by_keys(obj),
+        "drivers": moves_by_driver(obj),
+        "constraints": any(not item.mute and item.influence > 0.0 for item in obj.constraints),
+    }
+    for cause, holds in causes.items():
+        if holds:
+            raise PointCloudError(
+                f'"{obj.name}" is moved by its {cause}, which would undo the alignment. Remove them, or make the other'
+                " object the active one."
+            )
+
+
+def move_object(obj, matrix):
+    """Give an object another matrix in world space; parents and delta transforms stay as they are.
+
+    Raises
+    ------
+    PointCloudError
+        Its channels cannot express it, where its parent is scaled unevenly.
+    """
+    parent = np.array(obj.matrix_world) @ np.linalg.inv(obj.matrix_basis)
+    obj.matrix_world = matrix
+    wanted, found = np.array(matrix), parent @ np.array(obj.matrix_basis)
+    size = np.abs(wanted[:3, :3]).max()
+    if not (
+        np.allclose(found[:3, :3], wanted[:3, :3], rtol=0.0, atol=1e-4 * size)
+        and np.allclose(found[:3, 3], wanted[:3, 3], rtol=1e-5, atol=1e-4 * size)
+    ):
+        raise PointCloudError(
+            f'The rotation of "{obj.name}" would shear it, since its scale or that of its parent is uneven. Apply the'
+            " scale (Ctrl A), or clear the parent."
+        )
 
 
 def hide(obj, hidden=True):

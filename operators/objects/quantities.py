@@ -17,6 +17,7 @@ CURVATURE_1, CURVATURE_2, DIRECTION_1 = "lb_curvature_1", "lb_curvature_2", "lb_
 ROUGHNESS, SURFACE_VARIATION = "lb_roughness", "lb_surface_variation"
 FIELD = "lb_field"
 DISTANCE, SIGNED_DISTANCE, DEVIATION = "lb_distance", "lb_signed_distance", "lb_deviation"
+RESIDUAL = "lb_residual"
 CELL, DIRECTION, UV = "lb_cell", "lb_direction", "lb_uv"
 DISPLACEMENT = "lb_displacement"
 EIGENVECTOR = "lb_eigenvector_"
@@ -235,6 +236,14 @@ QUANTITIES = (  # in the order of the panel
         "compare",
         power=1,
         color_range="symmetric",
+    ),
+    Quantity(
+        RESIDUAL,
+        "Residual",
+        "Distance of each point of an aligned cloud from the surface of the other one",
+        "align_points",
+        power=1,
+        color_range="positive",
     ),
     Quantity(CELL, "Cell", "Number of the nearest source", "nearest_source", data_type="INT", carried="label"),
     Quantity(

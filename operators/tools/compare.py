@@ -9,19 +9,26 @@ from ...core import PointCloudError
 from ..objects.attributes import COMPARED, tag_changed, write_attribute
 from ..objects.place import activate, hide
 from ..objects.quantities import DEVIATION
-from ..objects.reading import TYPES, obstacle
+from ..objects.reading import obstacle
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running.application import ShownOperator, Tool, naming, operator_reader
+from .align import Motion, check_found, doubts, others
 
 
 class Compare(Tool):
     """The settings and the work of `meshfree.compare`."""
 
+    _move = None  # moves the object, when all else is written
     writes = (DEVIATION, COMPARED)
-    asks = ("greatest", "show", "hide_reference")
+    asks = ("align_first", "greatest", "show", "hide_reference")
     at_zero = {"greatest": "Any"}
 
+    align_first: BoolProperty(
+        name="Align First",
+        description="Move the object onto the other cloud before it is compared, as Align Points does",
+        default=False,
+    )
     greatest: FloatProperty(
         name="Greatest Distance",
         description="Points farther from the other surface are not compared; 0 for any distance",
@@ -37,15 +44,22 @@ class Compare(Tool):
 
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)
-        name, other_operator, shift = self.other(context, obj)
+        name, other_operator, shift, other = self.other(context, obj)
         greatest, own_name = self.greatest or None, obj.name
+        motion = Motion(obj, shift, other) if self.align_first else None
 
         def compute(progress):
             normals = operator(lambda stage, fraction: progress(stage, 0.4 * fraction)).normals
             with naming(name):
                 laplacian = other_operator(lambda stage, fraction: progress(stage, 0.4 + 0.4 * fraction))
+            points, aligned = reading.points + shift, None
+            if motion is not None:
+                aligned = core.align(points, laplacian.points, progress=lambda stage, _: progress(stage, 0.8))
+                check_found(aligned, own_name, name)
+                linear = aligned.matrix[:3, :3]
+                points, normals = points @ linear.T + aligned.matrix[:3, 3], normals @ linear.T
             found = core.surface_deviation(
-                reading.points + shift,
+                points,
                 normals,
                 laplacian,
                 greatest,
@@ -56,28 +70,33 @@ class Compare(Tool):
                     f'No point of "{own_name}" has the surface of "{name}" above or below it. Move the objects onto'
                     " each other, or raise Greatest Distance."
                 )
-            return found, name
+            return found, name, motion, aligned
 
         return compute
 
     def other(self, context, obj):
-        """Return name and operator function of the other cloud, and the offset between points as read."""
+        """Return name and operator function of the other cloud, the offset between points as read, and its object."""
         other = self.reference_of(context)
         with naming(other.name):
             _, operator = operator_reader(context, other)
         # Points are read without the location of their objects.
-        return other.name, operator, np.array(obj.matrix_world.translation) - np.array(other.matrix_world.translation)
+        shift = np.array(obj.matrix_world.translation) - np.array(other.matrix_world.translation)
+        return other.name, operator, shift, other
 
     @classmethod
     def reference_of(cls, context):
         """Return the other cloud: the selected one, else that of the last comparison; None without one."""
-        selected = _others(context)
+        selected = others(context)
         if len(selected) == 1:
             return selected[0]
         return None if selected else _compared(context)
 
     def write(self, context, obj, result):
-        found, name = result
+        found, name, motion, aligned = result
+        told, self._move = [], lambda: None
+        if aligned is not None:
+            self._move = lambda: motion.apply(obj, aligned.matrix)
+            told = [f"{obj.name} was moved: {aligned.overlap:.0%} of its points lie on {name}.", *doubts(aligned)]
         obj.meshfree.compared_with = bpy.data.objects.get(name)  # None for a file
         obj.meshfree.compared_within = self.greatest
         write_attribute(obj.data, DEVIATION, found.distance)
@@ -87,12 +106,12 @@ class Compare(Tool):
         line = f"{obj.name}: {mean} from {name} on average, 95 % within {within}, {most} at most"
         left = np.count_nonzero(~found.known)
         if not left:
-            return [line]
+            return [*told, line]
         notice = (
             f"{left:,} of {len(found.known):,} points lie beside the surface of {name}, or too far from it: they are"
             f" not compared, and {COMPARED} is false there."
         )
-        return [notice, line]
+        return [*told, notice, line]
 
 
 def distances(found):
@@ -114,7 +133,7 @@ class CompareOperator(Compare, ShownOperator):
             return reason
         other = cls.reference_of(context)
         if other is None:
-            count = len(_others(context))
+            count = len(others(context))
             many = f"{count} others are" if count else "no other is"
             return f'"{context.object.name}" is compared with one other cloud, and {many} selected. Select one'
         return obstacle(other)
@@ -124,6 +143,7 @@ class CompareOperator(Compare, ShownOperator):
         super().conclude(context, objects)
         if self.hide_reference:
             hide(objects[0].meshfree.compared_with)
+        self._move()
 
 
 class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):
@@ -167,12 +187,7 @@ def _compared(context):
     return other if other is not None and other.name in context.view_layer.objects else None
 
 
-def _others(context):
-    """Return the other selected objects that hold points."""
-    return [other for other in context.selected_objects if other != context.object and other.type in TYPES]
-
-
 TOOLS = (
-    Registration(MESHFREE_OT_compare, panel=Row("Measure", 5, 1), menu=Row("Object", 2, 3), verb=Compare),
-    Registration(MESHFREE_OT_compare_swap, menu=Row("Object", 2, 4)),
+    Registration(MESHFREE_OT_compare, panel=Row("Measure", 5, 2), menu=Row("Object", 2, 4), verb=Compare),
+    Registration(MESHFREE_OT_compare_swap, menu=Row("Object", 2, 5)),
 )

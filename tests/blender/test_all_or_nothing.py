@@ -194,6 +194,7 @@ def bound():
 
 
 FIRST = {  # what is there before tools that a sphere with groups is not enough for, and what they have to be told
+    "align_points": (compared, {}),
     "compare": (compared, {}),
     "compare_swap": (compared_before, {}),
     "deform_update": (bound, {}),

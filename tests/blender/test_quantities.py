@@ -19,11 +19,11 @@ CALLS = {  # of tools that need arguments, or write more in several calls
 
 
 def add_scene(size, tool):
-    """Add a dented ellipsoid with what tools ask for: groups, a curve, and for comparisons a larger one, selected."""
+    """Add a dented ellipsoid with what tools ask for: groups, a curve, and a larger one where two are needed."""
     points = size * sphere_points(400) * [1.0, 0.8, 0.6]
     points[::20] *= 0.98
-    if tool == "compare":
-        add_object(1.1 * points, "Plan").select_set(True)
+    if tool in ("align_points", "compare"):
+        add_object((1.02 if tool == "align_points" else 1.1) * points, "Plan").select_set(True)
     line = bpy.data.curves.new("Line", "CURVE")
     line.splines.new("POLY").points.add(1)
     line.splines[0].points.foreach_set("co", [*points[0], 1.0, *points[1], 1.0])

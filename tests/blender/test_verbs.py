@@ -202,6 +202,50 @@ class TestCompare:
         assert plan.read_bytes() == before
 
 
+def body(count, seed=0):
+    """Points of an ellipsoid with a dent, which no motion maps onto itself."""
+    points = sphere_points(count, seed)
+    return (
+        points * [1.0, 0.8, 0.6] * (1.0 - 0.2 * np.exp(-6.0 * ((points - [0.6, 0.6, 0.5]) ** 2).sum(axis=1)))[:, None]
+    )
+
+
+@pytest.mark.any_blender
+class TestAlign:
+    def test_files_in_a_national_grid_leave_in_the_coordinates_of_the_reference(self, run, read, tmp_path):  # noqa: F811
+        turn = np.array([[0.995, -0.0998, 0.0], [0.0998, 0.995, 0.0], [0.0, 0.0, 1.0]])
+        turn, _ = np.linalg.qr(turn)
+        turn *= np.sign(np.diag(turn))
+        wanted = body(1500)
+        write(tmp_path / "plan.csv", body(1400, seed=1) + FAR)
+        inputs = write(tmp_path / "a.csv", (wanted - [0.1, 0.0, -0.05]) @ turn + FAR)
+        code, [line] = run("align", inputs, "--reference", tmp_path / "plan.csv", "--out", tmp_path / "a.ply")
+        assert code == 0, line
+        assert line["converged"]
+        assert line["overlap"] > 0.95
+        table = read(tmp_path / "a.ply")
+        assert_allclose(table.points, wanted + FAR, rtol=0, atol=5e-3)
+        assert np.median(table.attributes["lb_residual"]) == pytest.approx(line["median_residual"], abs=1e-3)
+        assert_allclose(np.array(line["matrix"])[:3, :3], turn, atol=5e-3)
+
+    def test_another_shape_is_an_error(self, run, tmp_path):  # noqa: F811
+        write(tmp_path / "plan.csv", grid_points()[0])
+        code, [line] = run("align", write(tmp_path / "a.csv", 0.3 * body(800)), "--reference", tmp_path / "plan.csv")
+        assert code == 1
+        assert "could not be aligned with" in line["error"]
+
+    def test_it_comes_before_a_comparison(self, run, tmp_path):  # noqa: F811
+        write(tmp_path / "plan.csv", body(1400, seed=1))
+        given = write(tmp_path / "a.csv", body(1500) + [0.08, 0.0, -0.05]), "--reference", tmp_path / "plan.csv"
+        figures = {}
+        for first in ((), ("--align-first",)):
+            code, [line] = run("compare", *given, *first)
+            assert code == 0, line
+            figures[first] = line["mean_distance"]
+        assert figures[()] > 0.02
+        assert figures["--align-first",] < 0.003
+
+
 @pytest.mark.any_blender
 class TestOrient:
     @pytest.mark.parametrize("flip", [False, True])
@@ -395,6 +439,7 @@ class TestSources:
 
 
 VERBS = {
+    "align": ("--reference", "plan.csv"),
     "mesh": (),
     "smooth": (),
     "orient": (),
@@ -443,6 +488,8 @@ def test_files_that_cannot_be_read(run, tmp_path, monkeypatch, verb):  # noqa: F
         ("mesh", "a.csv", "--out-dir", "out", "--format", "npz"),
         ("segment", "a.csv", "--out", "a.stl"),
         ("deform", "a.csv", "--handles", "a.json", "--out", "a.npz"),
+        ("align", "a.csv"),
+        ("align", "a.csv", "--reference", "b.csv", "--overlap", "0"),
         ("compare", "a.csv"),
         ("orient", "a.csv", "--viewpoint", "0,0,1", "--method", "winding"),
         ("orient", "a.csv", "--source", "normal", "--method", "viewpoint"),
@@ -462,7 +509,9 @@ def test_wrong_usage(run, tmp_path, monkeypatch, arguments):  # noqa: F811
 
 
 @pytest.mark.any_blender
-@pytest.mark.parametrize("verb", ["mesh", "compare", "orient", "geodesic-distance", "harmonic-field", "deform"])
+@pytest.mark.parametrize(
+    "verb", ["mesh", "align", "compare", "orient", "geodesic-distance", "harmonic-field", "deform"]
+)
 def test_help(command, capfd, verb):
     assert command.run([verb, "--help"]) == 0
     shown = capfd.readouterr().out
