@@ -34,6 +34,8 @@ from .applications.minimal_surface import MinimalSurface as MinimalSurface
 from .applications.minimal_surface import minimal_surface as minimal_surface
 from .applications.paths import geodesic_path as geodesic_path
 from .applications.paths import polygon_length as polygon_length
+from .applications.regions import Region as Region
+from .applications.regions import measure_region as measure_region
 from .applications.segmentation import modes_needed as modes_needed
 from .applications.segmentation import nodal_domains as nodal_domains
 from .applications.segmentation import segment as segment

@@ -128,6 +128,7 @@ SIDEWAYS = {  # applications that build on others
     ("transport", "geodesics"),
     ("minimal_surface", "boundary_curve"),
     ("paths", "geodesics"),
+    ("regions", "graph"),
     ("segmentation", "graph"),
     ("selection", "geodesics"),
     ("selection", "graph"),
