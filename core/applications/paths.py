@@ -123,8 +123,8 @@ def _checked(laplacian: LaplaceBeltrami, start: Any, end: Any) -> tuple[int, int
     one, other = laplacian.component[first], laplacian.component[last]
     if min(one, other) < 0:
         raise InvalidPointsError(
-            f"{(one < 0) + (other < 0)} of the 2 ends of the path are points that the operator left out, because they"
-            " are outliers. Choose points of the surface."
+            f"{int(one < 0) + int(other < 0)} of the 2 ends of the path are points that the operator left out, because"
+            " they are outliers. Choose points of the surface."
         )
     if one != other:
         raise ComponentError(

@@ -24,15 +24,17 @@ _STRIP = 2.0  # spacings from the line between them within which points tell whe
 _WINDOWS = 4.0, 9.0  # spacings along the line over which a parabola is fitted: at first, and at most
 _TURN = 0.7  # radii of the line's curvature within which a parabola is close to it
 _SHORTEST = 3.0  # spacings of such a window at least
-_BLUR = 0.3  # spacings over which the chance to be a member falls, in the fit
+_BLUR = 0.2  # spacings over which the chance to be a member falls, in the fit
 _PRIOR = np.array([1e-3, 0.05, 1.0])  # how much the fit resists an offset, a slope and a curvature
 _LARGEST = np.array([1.0, 1.0, 0.5])  # change of each in a step, and in all
 _ROUNDS = 8  # of Newton's iteration
 _WIDE = 4.0  # spacings on both sides of the line over which areas are summed to its length
+_NARROW = 3.0  # spacings from the boundary of the surface over which areas are summed to its length, and twice that
 _THIN = 0.7  # of the depth of a thin part that may be taken for that
+_TURNS = 0.06, 0.09  # by which the line turns along a spacing, until plain sums are nearer to the area
 _VARIANCE = 1.0 / 7.0  # of the derivative of the step
-_AREA_OFF = 0.7  # of the area of a square of one spacing: what each such piece of the line leaves open, two deviations
-_LENGTH_OFF = 0.01  # of the length of the line
+_AREA_OFF = 1.0  # of the area of a square of one spacing: what each such piece of the line leaves open, two deviations
+_LENGTH_OFF = 0.01, 0.05  # of the length of the line, and of the boundary of the surface
 _NEAREST = 24  # pieces of the line by which the distance of a point is measured
 _PARALLEL = 0.3  # cosine between the directions across the line at two points, at least, if it is one line
 _SURE = 1.0 - 1e-9  # of the smoothed step
@@ -117,19 +119,22 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
     report("Areas", 0.9)
     areas = np.where(laplacian.component >= 0, laplacian.areas, 0.0)
     inside, width = _from_line(laplacian, line, share > 0.5, spacing)
-    step = _step(inside / width)
-    binary = bool(np.all((share == 0.0) | (share == 1.0)))
-    area = float(areas @ step - 0.5 * _VARIANCE * (areas @ _second(inside / width))) if binary else float(areas @ share)
+    step, second = _step(inside / width), float(areas @ (_second(inside / width) / width**2))
     length = float(areas @ (_slope(inside / width) / width))
-    own = areas @ (step * _edge(laplacian.boundary_distance / (_WIDE * spacing)) / (_WIDE * spacing))
-    weight = areas * (step if binary else share)
+    plain, smooth = float(areas @ share), float(areas @ step - 0.5 * _VARIANCE * (areas @ _second(inside / width)))
+    # Where the line turns within a few spacings, the parabolas are off by more than the cells.
+    turn = abs(second) / max(length, 1e-300) * float(np.median(spacing))
+    fine = np.clip((_TURNS[1] - turn) / (_TURNS[1] - _TURNS[0]), 0.0, 1.0) if np.all(share % 1.0 == 0.0) else 0.0
+    area = fine * smooth + (1.0 - fine) * plain
+    own = _along_boundary(areas * step, laplacian.boundary_distance, spacing)
+    weight = areas * (fine * step + (1.0 - fine) * share)
     squared = areas @ (_slope(inside / width) / width * spacing**3)
     return Region(
         area=area,
-        boundary_length=length + float(own),
+        boundary_length=length + own,
         centroid=weight @ laplacian.surface_points / max(weight.sum(), 1e-300),
         area_uncertainty=_AREA_OFF * float(np.sqrt(squared)),
-        length_uncertainty=_LENGTH_OFF * (length + float(own)),
+        length_uncertainty=float(np.dot(_LENGTH_OFF, (length, own))),
     )
 
 
@@ -185,9 +190,14 @@ def _second(x: Floats) -> Floats:
 
 
 def _edge(x: Floats) -> Floats:
-    """Return a kernel on 0 to 1, zero at both ends, whose integral is 1 and whose first moment vanishes."""
-    x = np.clip(x, 0.0, 1.0)
-    return x * (1.0 - x) * (36.0 - 60.0 * x)
+    """Return a kernel that falls smoothly from 0 to 1, with the integral 1 there."""
+    return 2.0 * _slope(np.maximum(x, 0.0))
+
+
+def _along_boundary(areas: Floats, distance: Floats, spacing: Floats) -> float:
+    """Return the length of the surface's boundary by areas within two distances from it, extrapolated to none."""
+    narrow, wide = (areas @ (_edge(distance / width) / width) for width in (_NARROW * spacing, 2.0 * _NARROW * spacing))
+    return float(2.0 * narrow - wide)
 
 
 class _Line(NamedTuple):
@@ -335,8 +345,10 @@ def _newton(found: Floats, row: Ints, weight: Floats, terms: Floats, across: Flo
     miss = expit(-sign * (np.einsum("pa,pa->p", terms, found[row]) + across) / _BLUR)
     slope = -weight * sign * miss / _BLUR
     curve = weight * miss * (1.0 - miss) / _BLUR**2
-    gradient = np.stack([np.bincount(row, slope * term, count) for term in terms.T], axis=1)
-    gradient = gradient + np.array([0.0, *_PRIOR[1:]]) * found
-    hessian = np.array([[np.bincount(row, curve * a * b, count) for a in terms.T] for b in terms.T])
-    step: Floats = np.linalg.solve(np.moveaxis(hessian, 2, 0) + np.diag(_PRIOR), gradient[:, :, None])[:, :, 0]
-    return step / np.maximum(np.abs(step / _LARGEST).max(axis=1, keepdims=True), 1.0)
+    first = [np.bincount(row, slope * term, count) for term in terms.T]
+    gradient = np.array(first, dtype=np.float64).T + np.append(0.0, _PRIOR[1:]) * found
+    second = [[np.bincount(row, curve * a * b, count) for a in terms.T] for b in terms.T]
+    hessian = np.moveaxis(np.array(second, dtype=np.float64), 2, 0) + np.diag(_PRIOR)
+    step: Floats = np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0]
+    result: Floats = step / np.maximum(np.abs(step / _LARGEST).max(axis=1, keepdims=True), 1.0)
+    return result
