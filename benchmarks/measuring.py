@@ -105,10 +105,12 @@ def regions():
 
 
 def on_sphere(one, other):
+    """Length of a great circle between two points."""
     return np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other)
 
 
 def on_cylinder(one, other):
+    """Length of a helix between two points."""
     across = np.arctan2(one[1], one[0]) - np.arctan2(other[1], other[0])
     return np.hypot((across + np.pi) % (2.0 * np.pi) - np.pi, one[2] - other[2])
 
