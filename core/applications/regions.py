@@ -37,6 +37,8 @@ _AREA_OFF = 1.0  # of the area of a square of one spacing: what each such piece 
 _LENGTH_OFF = 0.01, 0.05  # of the length of the line, and of the boundary of the surface
 _NEAREST = 24  # pieces of the line by which the distance of a point is measured
 _PARALLEL = 0.3  # cosine between the directions across the line at two points, at least, if it is one line
+_STEEP = 1.5  # length of a chord over that in the tangent plane, at most, on one sheet
+_LEAST = 1e-6  # weight of the pieces near a point, relative to that of one beside it
 _SURE = 1.0 - 1e-9  # of the smoothed step
 _BLOCK = 1 << 11  # windows at one time
 
@@ -134,7 +136,7 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
         boundary_length=length + own,
         centroid=weight @ laplacian.surface_points / max(weight.sum(), 1e-300),
         area_uncertainty=_AREA_OFF * float(np.sqrt(squared)),
-        length_uncertainty=float(np.dot(_LENGTH_OFF, (length, own))),
+        length_uncertainty=float(np.dot(_LENGTH_OFF, (length * (_WIDE * spacing / width).max() ** 1.5, own))),
     )
 
 
@@ -164,12 +166,12 @@ def _from_line(laplacian: LaplaceBeltrami, line: _Line, members: Bools, spacing:
     far = np.where(members, np.inf, -np.inf)
     if not len(line.feet):
         return far, _WIDE * spacing
-    inside, width = line.distances(laplacian)
-    deep = inside / width
-    split = np.isin(laplacian.component, line.component)
-    inside = np.where(split & (np.abs(deep) < 2.0 * _WIDE), inside, far)
-    thin = min(float(deep[members & split].max()), float(-deep[~members & split].min()))
-    return inside, width * min(_WIDE, max(_THIN * thin, 1.0))
+    rows, signed, width = line.distances(laplacian)
+    inside, used = far, spacing.copy()
+    inside[rows], used[rows] = signed, width
+    deep = np.where(np.isin(laplacian.component, line.component), inside / used, 0.0)
+    thin = min(float(deep[members].max(initial=0.0)), float(-deep[~members].min(initial=0.0)))
+    return inside, used * min(_WIDE, max(_THIN * thin, 1.0))
 
 
 def _step(x: Floats) -> Floats:
@@ -223,22 +225,39 @@ class _Line(NamedTuple):
     spacing: Floats
     component: Ints
 
-    def distances(self, laplacian: LaplaceBeltrami) -> tuple[Floats, Floats]:
-        """Return the distances of points from the line, positive inside, and the spacing at it, (n,) each."""
+    def distances(self, laplacian: LaplaceBeltrami) -> tuple[Ints, Floats, Floats]:
+        """Measure the points near the line, on its sheet.
+
+        Returns
+        -------
+        rows : ndarray, (r,) int
+        signed : ndarray, (r,)
+            Their distances from the line, positive on the side of members.
+        spacing : ndarray, (r,)
+            At the line.
+        """
         count = len(laplacian.points)
         places = np.concatenate([laplacian.surface_points, self.feet])
         apart = move_apart(places, np.concatenate([laplacian.component, self.component]))
-        near = cKDTree(apart[count:]).query(apart[:count], k=np.arange(1, min(_NEAREST, len(self.feet)) + 1))[1]
-        offset = laplacian.surface_points[:, None] - self.feet[near]
+        tree = cKDTree(apart[count:])
+        reach = 2.0 * _WIDE * float(self.spacing.max())
+        rows = np.flatnonzero(np.isfinite(tree.query(apart[:count], distance_upper_bound=reach, workers=-1)[0]))
+        near = tree.query(apart[rows], k=np.arange(1, min(_NEAREST, len(self.feet)) + 1), workers=-1)[1]
+        offset = laplacian.surface_points[rows, None] - self.feet[near]
         across = np.einsum("nkc,nkc->nk", offset, self.inward[near])
         along = np.einsum("nkc,nkc->nk", offset, np.cross(self.normals[near], self.inward[near]))
-        stretch = np.linalg.norm(offset, axis=2) / np.maximum(np.hypot(across, along), 1e-300)
+        length = np.linalg.norm(offset, axis=2)
+        stretch = length / np.maximum(np.hypot(across, along), 1e-300)
         signed = stretch * across - 0.5 * self.bend[near] * along**2
-        facing = np.abs(np.einsum("nkc,nc->nk", self.normals[near], laplacian.normals)) > SMOOTH
-        one = np.einsum("nkc,nc->nk", self.inward[near], self.inward[near[:, 0]]) > _PARALLEL
-        weight = np.where(facing & one, np.exp(-((along / self.spacing[near]) ** 2)), 0.0) + 1e-12
-        weight /= weight.sum(axis=1, keepdims=True)
-        return np.einsum("nk,nk->n", weight, signed), np.einsum("nk,nk->n", weight, self.spacing[near])
+        facing = np.einsum("nkc,nc->nk", self.normals[near], laplacian.normals[rows]) > SMOOTH
+        facing &= np.einsum("nkc,nc->nk", self.inward[near], self.inward[near[:, 0]]) > _PARALLEL
+        facing &= (stretch < _STEEP) | (length < self.spacing[near])
+        weight = np.where(facing, np.exp(-((along / self.spacing[near]) ** 2)), 0.0)
+        total = weight.sum(axis=1)
+        weight /= np.maximum(total, 1e-300)[:, None]
+        mean = np.einsum("nk,nk->n", weight, signed), np.einsum("nk,nk->n", weight, self.spacing[near])
+        known = (total > _LEAST) & (np.abs(mean[0]) < 2.0 * _WIDE * mean[1])
+        return rows[known], mean[0][known], mean[1][known]
 
 
 def _find_line(laplacian: LaplaceBeltrami, members: Bools, spacing: Floats, report: Callable[[float], None]) -> _Line:
@@ -314,7 +333,7 @@ class _Strip:
         frame = np.stack([self._along[rows], self._rise[rows], self._normals[rows]], axis=1)
         offset = (self._points[other] - self._points[rows][row]) / self._spacing[rows][row, None]
         t, n, _ = np.einsum("pac,pc->ap", frame[row], offset)
-        same = np.einsum("pc,pc->p", self._normals[other], frame[row, 2]) ** 2 > SMOOTH**2
+        same = np.einsum("pc,pc->p", self._normals[other], frame[row, 2]) > SMOOTH
         same &= np.einsum("pc,pc->p", self._rise[other], frame[row, 1]) > _PARALLEL
         same &= np.abs(t) < window[row]
         row, other, t, n = row[same], other[same], t[same], n[same]

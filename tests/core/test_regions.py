@@ -38,6 +38,19 @@ def test_a_band_has_two_circles(operators):
     assert found.boundary_length == pytest.approx(2.0 * np.pi * (np.sqrt(0.84) + np.sqrt(0.75)), rel=0.01)
 
 
+def test_the_other_side_of_a_thin_wall_is_no_part():
+    """A plate of two sheets three spacings apart, with half of one of them chosen."""
+    u, v = np.meshgrid(np.arange(60.0), np.arange(40.0), indexing="ij")
+    sheet = np.column_stack([u.ravel(), v.ravel(), 0.0 * u.ravel()])
+    points = np.concatenate([sheet, sheet + [0.0, 0.0, 3.0]])
+    up = np.repeat([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], len(sheet), axis=0)
+    laplacian = core.build_laplacian(points, up)
+    members = (points[:, 2] > 1.0) & (points[:, 0] < 29.6)
+    found = core.measure_region(laplacian, members)
+    assert found.area == pytest.approx(laplacian.areas[members].sum(), rel=0.01)
+    assert found.boundary_length == pytest.approx(40.0 + 2.0 * 30.0 + 40.0, rel=0.03)
+
+
 def test_areas_of_a_part_and_of_the_rest_add_up(operators):
     laplacian = operators("random sphere")
     members = cap(laplacian.points, 50.0)
