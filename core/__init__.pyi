@@ -36,6 +36,10 @@ from .applications.meshing import mesh_surface as mesh_surface
 from .applications.meshing import values_on_mesh as values_on_mesh
 from .applications.minimal_surface import MinimalSurface as MinimalSurface
 from .applications.minimal_surface import minimal_surface as minimal_surface
+from .applications.paths import geodesic_path as geodesic_path
+from .applications.paths import polygon_length as polygon_length
+from .applications.regions import Region as Region
+from .applications.regions import measure_region as measure_region
 from .applications.segmentation import modes_needed as modes_needed
 from .applications.segmentation import nodal_domains as nodal_domains
 from .applications.segmentation import segment as segment
@@ -56,6 +60,8 @@ from .applications.transport import Transport as Transport
 from .applications.transport import logarithmic_map as logarithmic_map
 from .applications.transport import transport as transport
 from .applications.variation import surface_variation as surface_variation
+from .applications.volume import EnclosedVolume as EnclosedVolume
+from .applications.volume import enclosed_volume as enclosed_volume
 from .errors import AreaError as AreaError
 from .errors import BrokenLibraryError as BrokenLibraryError
 from .errors import Cancelled as Cancelled

@@ -256,6 +256,20 @@ def distance(path):
     single(obj, "lb_distance", path)
 
 
+def path(path):
+    """The shortest path between the tips of two arms, over the distances from one of them."""
+    obj = coral()
+    obj.meshfree.coverage = 100.0
+    studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
+    bpy.ops.meshfree.geodesic_distance()
+    positions = np.array([vertex.co for vertex in obj.data.vertices])
+    ends = [int((positions @ direction).argmax()) for direction in ((1.0, -1.0, 0.0), (0.0, 0.0, 1.0))]
+    obj.data.vertices.foreach_set("select", np.isin(np.arange(len(positions)), ends))
+    bpy.ops.meshfree.geodesic_path(thickness=0.4 * SPACING)
+    bpy.data.objects[f"{obj.name} Path"].data.materials.append(studio.paint("Path", studio.CLAY))
+    single(obj, "lb_distance", path)
+
+
 def iso_lines(path):
     """Lines of equal height of a mode, shown on discs and as tubes of their own."""
     shown, made = coral(), coral()
@@ -372,6 +386,7 @@ PICTURES = {
     "orient": orient,
     "signature": signature,
     "distance": distance,
+    "path": path,
     "iso_lines": iso_lines,
     "signed_distance": signed_distance,
     "nearest_source": nearest_source,

@@ -220,31 +220,50 @@ class Geodesics:
         result[path] = 0.0
         return result
 
+    def corners(self, first: int, last: int) -> Ints:
+        """Find the shortest path over pairs of points; see `geodesic_path`.
+
+        Parameters
+        ----------
+        first, last : int
+            Two points of one component.
+
+        Returns
+        -------
+        ndarray, (m,) int
+            All points of the path in their order, its ends included.
+
+        Raises
+        ------
+        InvalidPointsError
+            No path along the surface connects them.
+        """
+        row = self._graph.indices[self._graph.indptr[first] : self._graph.indptr[first + 1]]
+        if last in row:
+            return np.array([first, last])
+        # Points farther away than the end do not matter; its distance along the surface is not known yet.
+        points = self._laplacian.surface_points
+        apart = max(float(np.linalg.norm(points[last] - points[first])), 1e-300)
+        for times in _WITHIN:
+            before = dijkstra(self._graph, indices=first, return_predecessors=True, limit=times * apart)[1]
+            if before[last] >= 0:
+                break
+        else:
+            raise InvalidPointsError(
+                f"No path along the surface connects the points {first} and {last}. Leave one out."
+            )
+        backwards = [last]
+        while backwards[-1] != first:
+            backwards.append(before[backwards[-1]])
+        return np.array(backwards[::-1])
+
     def _path(self, curve: Ints, closed: bool, report: Callable[[float], None]) -> Ints:
         """Join points by shortest paths, and return all points of these in their order, (m,), the first one twice."""
         ends = np.append(curve, curve[0]) if closed else curve
-        points = self._laplacian.surface_points
         path = [int(ends[0])]
         for number, (first, last) in enumerate(pairwise(ends)):
             report(number / len(ends))
-            row = self._graph.indices[self._graph.indptr[first] : self._graph.indptr[first + 1]]
-            if last in row:
-                path.append(last)
-                continue
-            # Points farther away than the end do not matter; its distance along the surface is not known yet.
-            apart = max(float(np.linalg.norm(points[last] - points[first])), 1e-300)
-            for times in _WITHIN:
-                before = dijkstra(self._graph, indices=first, return_predecessors=True, limit=times * apart)[1]
-                if before[last] >= 0:
-                    break
-            else:
-                raise InvalidPointsError(
-                    f"No path along the surface connects the points {first} and {last} of the curve. Leave one out."
-                )
-            backwards = [last]
-            while before[backwards[-1]] != first:
-                backwards.append(before[backwards[-1]])
-            path += backwards[::-1]
+            path += self.corners(first, last).tolist()[1:]
         return np.array(path)
 
     def _beside(self, path: Ints) -> tuple[Ints, Floats, Floats]:

@@ -159,6 +159,11 @@ def length_text(length: float) -> str:
     return _in_units("LENGTH", length, 1)
 
 
+def volume_text(volume: float) -> str:
+    """Write a volume in the units of the scene."""
+    return _in_units("VOLUME", volume, 3)
+
+
 def _in_units(kind, value, power):
     units = bpy.context.scene.unit_settings
     return bpy.utils.units.to_string(units.system, kind, value * units.scale_length**power, precision=_DIGITS).strip()

@@ -127,12 +127,15 @@ SIDEWAYS = {  # applications that build on others
     ("meshing", "sides"),
     ("transport", "geodesics"),
     ("minimal_surface", "boundary_curve"),
+    ("paths", "geodesics"),
+    ("regions", "graph"),
     ("segmentation", "graph"),
     ("selection", "geodesics"),
     ("selection", "graph"),
     ("slopes", "gradients"),
     ("smoothing", "filters"),
     ("smoothing", "sizes"),
+    ("volume", "meshing"),
 }
 
 

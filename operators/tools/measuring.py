@@ -1,0 +1,123 @@
+"""Measures of selected points: area, boundary, sizes, curvature and volume; the shortest path between two points."""
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, FloatProperty
+
+from ... import core
+from ...core import PointCloudError
+from ..objects.place import copy_place
+from ..objects.result import area_text, length_text, volume_text
+from ..registration import Registration, Row
+from ..running import cache
+from .select import SelectionOperator, analyzed, selected
+
+
+class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
+    """Measure the selected points: area, boundary, size, curvature, and the volume of the whole surface"""
+
+    bl_idname = "meshfree.measure_selection"
+    bl_label = "Measure Selection"
+
+    volume: BoolProperty(
+        name="Volume",
+        description="Measure the volume within the whole surface, too, its openings closed. It takes longer",
+        default=False,
+    )
+
+    def prepare(self, context, obj):
+        chosen = selected(obj)
+        _, laplacian = analyzed(context, obj)
+        region = cache.result(laplacian, "region", chosen, compute=lambda: core.measure_region(laplacian, chosen))
+        lines, notices = _texts(laplacian, region, chosen), []
+        if self.volume:
+            found = cache.result(laplacian, "volume", compute=lambda: core.enclosed_volume(laplacian))
+            lines.append(f"Volume {_within(volume_text, found.volume, found.uncertainty)}")
+            notices = found.notices
+        left = np.count_nonzero(chosen & (laplacian.component < 0))
+        if left:
+            notices = [f"{left:,} selected points are left out of the Laplacian, and not measured.", *notices]
+
+        def keep():
+            self.begin_notices([obj])
+            for line in lines:
+                self.note(f"{obj.name}: {line}", obj)
+            for notice in notices:
+                self.warn(notice, obj)
+            return f"{np.count_nonzero(chosen):,} points are measured"
+
+        return keep
+
+
+def _texts(laplacian, region, chosen):
+    """Return the figures of a part as lines."""
+    known = chosen & (laplacian.component >= 0)
+    sizes = np.ptp(laplacian.surface_points[known], axis=0)
+    curvature = core.mean_curvature(laplacian)[known]
+    areas = laplacian.areas[known]
+    mean, most = areas @ curvature / areas.sum(), curvature[np.abs(curvature).argmax()]
+    return [
+        f"Area {_within(area_text, region.area, region.area_uncertainty)}",
+        f"Boundary {_within(length_text, region.boundary_length, region.length_uncertainty)}",
+        f"Size {' x '.join(map(length_text, sizes))} along the axes of the world",
+        f"Mean curvature {mean:.4g} on average, {most:.4g} at most, in 1 / length",
+    ]
+
+
+def _within(text, value, off):
+    """Return a number with its uncertainty, as texts of the scene's units."""
+    return f"{text(value)} +- {text(off)}"
+
+
+class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
+    """Draw the shortest path along the surface between the two selected points, and measure it"""
+
+    bl_idname = "meshfree.geodesic_path"
+    bl_label = "Geodesic Path"
+
+    thickness: FloatProperty(
+        name="Thickness",
+        description="Radius of a tube along the path; with 0 it is seen in viewports only",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+
+    def prepare(self, context, obj):
+        ends = np.flatnonzero(selected(obj))
+        if len(ends) != 2:
+            raise PointCloudError(
+                f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
+            )
+        reading, laplacian = analyzed(context, obj)
+        path = cache.result(laplacian, "path", ends, compute=lambda: core.geodesic_path(laplacian, *ends.tolist()))
+        straight = length_text(core.polygon_length(laplacian.points[ends]))
+        line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
+
+        def draw():
+            made = _curve(f"{obj.name} Path", reading.local(path), self.thickness)
+            for collection in obj.users_collection:
+                collection.objects.link(made)
+            made.matrix_world = obj.matrix_world
+            copy_place(made, obj)
+            self.begin_notices([obj])
+            self.note(f"{obj.name}: {line}", obj)
+            return f"{made.name} is {line}"
+
+        return draw
+
+
+def _curve(name, places, thickness):
+    """Return a curve object along places, (k, 3)."""
+    curve = bpy.data.curves.new(name, "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", thickness
+    spline = curve.splines.new("POLY")
+    spline.points.add(len(places) - 1)
+    spline.points.foreach_set("co", np.column_stack([places, np.ones(len(places))]).astype(np.float32).reshape(-1))
+    return bpy.data.objects.new(name, curve)
+
+
+TOOLS = (
+    Registration(MESHFREE_OT_measure_selection, panel=Row("Points and Groups", 2, 1), menu=Row("Points", 2, 1)),
+    Registration(MESHFREE_OT_geodesic_path, panel=Row("Points and Groups", 2, 2), menu=Row("Points", 2, 2)),
+)
