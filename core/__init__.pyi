@@ -32,6 +32,11 @@ from .applications.meshing import mesh_surface as mesh_surface
 from .applications.meshing import values_on_mesh as values_on_mesh
 from .applications.minimal_surface import MinimalSurface as MinimalSurface
 from .applications.minimal_surface import minimal_surface as minimal_surface
+from .applications.motion import Heat as Heat
+from .applications.motion import Wave as Wave
+from .applications.motion import WaveState as WaveState
+from .applications.reaction import Mixture as Mixture
+from .applications.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.segmentation import modes_needed as modes_needed
 from .applications.segmentation import nodal_domains as nodal_domains
 from .applications.segmentation import segment as segment
@@ -49,6 +54,7 @@ from .applications.transport import Transport as Transport
 from .applications.transport import logarithmic_map as logarithmic_map
 from .applications.transport import transport as transport
 from .applications.variation import surface_variation as surface_variation
+from .applications.wave_modes import wave_modes as wave_modes
 from .errors import AreaError as AreaError
 from .errors import BrokenLibraryError as BrokenLibraryError
 from .errors import Cancelled as Cancelled
