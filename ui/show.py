@@ -23,7 +23,7 @@ from ..operators.objects.groups import (
 )
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
-from ..operators.objects.quantities import MEAN_CURVATURE, quantity
+from ..operators.objects.quantities import MEAN_CURVATURE, MOTION, quantity
 from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
 from . import colormaps, legend, smooth, solid
@@ -142,6 +142,12 @@ def recolor(obj):
     reshape(obj)
     if in_solid and not is_in_solid(obj):  # such as with iso lines
         use_material_preview(bpy.context)
+
+
+def follow_frame(obj):
+    """Follow an attribute that was written for another frame where viewports in Solid would show earlier colors."""
+    if shown_attribute(obj) == MOTION and is_in_solid(obj):
+        recolor(obj)
 
 
 def show_groups(obj):
@@ -503,6 +509,7 @@ _HANDLERS = {
     "splats_found": show_splats,
     "result_written": show_result,
     "mesh_made": show_alike,
+    "frame_shown": follow_frame,
     "sequence_written": show_sequence,
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,

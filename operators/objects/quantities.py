@@ -18,6 +18,7 @@ FIELD = "lb_field"
 DISTANCE, SIGNED_DISTANCE, DEVIATION = "lb_distance", "lb_signed_distance", "lb_deviation"
 CELL, DIRECTION, UV = "lb_cell", "lb_direction", "lb_uv"
 DISPLACEMENT = "lb_displacement"
+MOTION = "lb_motion"
 EIGENVECTOR = "lb_eigenvector_"
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"
 
@@ -247,6 +248,7 @@ QUANTITIES = (  # in the order of the panel
         data_type="FLOAT_VECTOR",
         power=1,
     ),
+    Quantity(MOTION, "Motion", "Heat, wave, reaction or front at the frame on show", "simulate"),
     Quantity(EIGENVECTOR, "Mode", "Vibration mode of the surface", "spectrum", power=-1, numbered=True),
     Quantity(
         HEAT_SIGNATURE, "Heat Signature", "Heat that is left after some time", "signature", power=-2, numbered=True

@@ -354,3 +354,23 @@ NOTHING = np.zeros(800)
 def test_errors_say_what_is_wrong(call, text):
     with pytest.raises(core.PointCloudError, match=text):
         call(sphere())
+
+
+@pytest.mark.parametrize("pattern", ["spots", "stripes"])
+def test_patterns_have_the_size_that_was_asked_for(pattern):
+    """The mean of the squared wavenumber, by Rayleigh's quotient, is near that of the pattern."""
+    laplacian, size = sphere(), 1.4
+    near = laplacian.points @ laplacian.points[400] > np.cos(0.4 * size)
+    reaction = core.ReactionDiffusion.of_pattern(laplacian, 5.0, pattern, size)
+    state = core.Mixture(1.0 - near, 1.0 * near)
+    for _ in range(500):
+        state = reaction.advance(state)
+    ripple = state.eater - laplacian.areas @ state.eater / laplacian.areas.sum()
+    square = ripple @ (laplacian.stiffness @ ripple) / (laplacian.areas @ ripple**2)
+    assert 2.0 * np.pi / np.sqrt(square) == pytest.approx(size, rel=0.25)
+    assert ripple.max() > 0.1
+
+
+def test_an_unknown_pattern_is_refused():
+    with pytest.raises(core.PointCloudError, match="pattern is 'dots'. Choose one of 'spots', 'stripes'"):
+        core.ReactionDiffusion.of_pattern(sphere(), 1.0, "dots", 1.0)
