@@ -269,8 +269,8 @@ def _heat(laplacian, chosen, progress):
 def _wave(laplacian, chosen, progress):
     """Return the frames of a wave, without end, and how far it runs."""
     distance, width = chosen.distance or _size(laplacian), _width(laplacian, chosen)
-    pulse = core.Heat(laplacian, 0.25 * width * width, progress=progress).advance(chosen.sources)
-    pulse /= pulse.max()
+    away = cache.geodesics(laplacian, progress).distance(chosen.sources, progress=progress)
+    pulse = np.exp(-((away / width) ** 2))
     wave = core.Wave(laplacian, chosen.share, distance, progress=progress)
     return _advance(wave, (pulse, np.zeros_like(pulse)), lambda state: state[0]), distance
 
