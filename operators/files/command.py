@@ -11,10 +11,16 @@ from ...core.files import numbered_files
 from .. import registration
 from ..objects.groups import SOURCE
 from .bending import Deform, SplatInfo
-from .tool_verbs import AlongCurve, CompareWith, FromSources, Mesh, Orient
+from .tool_verbs import AlongCurve, CompareWith, Frames, FromSources, Mesh, Orient
 from .verbs import Analyze, Apply
 
-_OWN = {"signed_distance": AlongCurve, "mesh_surface": Mesh, "compare": CompareWith, "orient_normals": Orient}
+_OWN = {
+    "signed_distance": AlongCurve,
+    "mesh_surface": Mesh,
+    "compare": CompareWith,
+    "orient_normals": Orient,
+    "simulate": Frames,
+}
 _handles = []
 
 

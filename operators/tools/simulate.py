@@ -39,8 +39,8 @@ class Simulated(NamedTuple):
     ----------
     path : Path
         Of the frames.
-    step : int
-        Frames of the scene from one to the next.
+    frames, step : int
+        Frames of the scene, and how many are from one on disk to the next.
     low, high, last : float
         Range of all values, and the highest one of the last frame.
     reached : ndarray, (n,) bool
@@ -52,6 +52,7 @@ class Simulated(NamedTuple):
     """
 
     path: Path
+    frames: int
     step: int
     low: float
     high: float
@@ -174,7 +175,7 @@ class Simulate(Tool):
             component = laplacian.component
             reached = np.isin(component, component[sources]) & (component >= 0)
             normals = reading.local_normals(laplacian.normals)
-            return Simulated(path, step, low, high, seen[-1][1], reached, distance, normals)
+            return Simulated(path, count, step, low, high, seen[-1][1], reached, distance, normals)
 
         return compute
 
@@ -196,15 +197,20 @@ class Simulate(Tool):
             settings.range_mode = "LOCKED"
             settings.range_low, settings.range_high = (-bound, bound) if self.kind == "WAVE" else (0.0, result.high)
         _remove_old(obj, before, result.path)
-        return [*self._notices(obj, result), self._line(obj, result)]
+        return [*self.about(obj, result), *self._about_files(result), self._line(obj, result)]
 
-    def _notices(self, obj, result):
+    def about(self, obj, result) -> list:
+        """Return notices about what was simulated."""
         notices = unreached(obj, result.reached, "Nothing moves there.")
         if self.kind == "REACTION" and result.last < _DEAD:
             notices.append(
                 f"The reaction has died out. Patterns need a Distance of {_SPOT:g} smoothing lengths of the points or"
                 " more, and sources that are single points or small groups."
             )
+        return notices
+
+    def _about_files(self, result):
+        notices = []
         if result.step > 1:
             notices.append(
                 f"One of {result.step} frames is kept, since all take more than the Disk Budget of {self.budget} MB;"
