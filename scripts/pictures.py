@@ -354,7 +354,7 @@ PICTURES = {
     "field": field,
     "deform": deform,
     "minimal": minimal,
-    "motion_heat": motion("HEAT", (2, 10, 40, 100)),
+    "motion_heat": motion("HEAT", (1, 15, 40, 100), width=1.0, distance=2.5),
     "motion_wave": motion("WAVE", (1, 25, 50, 80), width=0.5, distance=6.0),
     "motion_reaction": motion("REACTION", (1, 25, 50, 100), distance=0.55),
     "motion_front": motion("FRONT", (15, 40, 65, 90), width=0.4),

@@ -23,7 +23,7 @@ from ..operators.objects.groups import (
 )
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
-from ..operators.objects.quantities import MEAN_CURVATURE, MOTION, quantity
+from ..operators.objects.quantities import MEAN_CURVATURE, quantity
 from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
 from . import colormaps, legend, smooth, solid
@@ -146,7 +146,7 @@ def recolor(obj):
 
 def follow_frame(obj):
     """Follow an attribute that was written for another frame where viewports in Solid would show earlier colors."""
-    if shown_attribute(obj) == MOTION and is_in_solid(obj):
+    if is_in_solid(obj):
         recolor(obj)
 
 

@@ -55,7 +55,7 @@ class FromSources(Apply):
 class Frames(FromSources):
     """The verb `simulate`, whose output holds the last frame."""
 
-    left_out = LEFT_OUT | {"height", "budget", "folder"}
+    left_out = LEFT_OUT | {"height", "keep", "modes", "budget", "folder"}
 
     def __init__(self):
         super().__init__("simulate", _SimulateInFile)
@@ -69,7 +69,7 @@ class _SimulateInFile(Simulate):
         settings = obj.meshfree
         context.scene.frame_set(settings.motion_first + result.frames - 1)
         settings.motion_file = ""
-        result.path.unlink()
+        result.motion.path.unlink()
         return [*self.about(obj, result), line]
 
 

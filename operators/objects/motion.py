@@ -79,7 +79,12 @@ def _frames(path, obj):
 
 def show_frame(obj, frame: float):
     """Write the values at a frame of the scene to the attribute of an object, and show them."""
-    write_attribute(obj.data, MOTION, frame_of(obj, frame))
+    show_values(obj, frame_of(obj, frame))
+
+
+def show_values(obj, values):
+    """Write the values of a motion, (n,), to the attribute of an object, and show them."""
+    write_attribute(obj.data, MOTION, values)
     tag_changed(obj.data)
     notify("frame_shown", obj)
 

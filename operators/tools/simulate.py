@@ -12,8 +12,8 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.groups import SOURCE
-from ..objects.motion import show_frame, write_frames
-from ..objects.motion_nodes import displace
+from ..objects.motion import show_frame, show_values, write_frames
+from ..objects.motion_nodes import Formula, forget_groups, mode_name, show_motion
 from ..objects.quantities import MOTION, NORMAL
 from ..objects.result import length_text
 from ..registration import Registration, Row
@@ -29,6 +29,8 @@ _SEED = 0.4  # of that size, around the sources: where a reaction starts
 _PATTERN_TIME = 5000.0  # units of time in which patterns cover the surface, over all frames
 _LONGEST = 5.0  # of these, in one step of a reaction
 _DEAD = 0.05  # highest concentration where a reaction has ended
+_IN_MODES = ("HEAT", "WAVE")
+_BLURRED = 0.99  # share of a pulse that the modes should hold
 _MEGABYTE = 1 << 20
 
 
@@ -37,29 +39,50 @@ class Simulated(NamedTuple):
 
     Attributes
     ----------
-    path : Path
-        Of the frames.
+    motion : _Frames or _Modes
     frames, step : int
         Frames of the scene, and how many are from one on disk to the next.
-    low, high, last : float
-        Range of all values, and the highest one of the last frame.
     reached : ndarray, (n,) bool
         Points of components with sources.
-    distance : float
-        How far it went, or the size of a pattern.
     normals : ndarray, (n, 3)
         In local space.
     """
 
-    path: Path
+    motion: "_Frames | _Modes"
     frames: int
     step: int
+    reached: np.ndarray
+    normals: np.ndarray
+
+
+class _Frames(NamedTuple):
+    """A motion as frames on disk, with the range of all values, and the highest one of the last frame."""
+
+    path: Path
     low: float
     high: float
     last: float
-    reached: np.ndarray
+    distance: float  # how far it went, or the size of a pattern
+
+    @property
+    def size(self) -> str:
+        """What it takes."""
+        return f"{self.path.stat().st_size / _MEGABYTE:.1f} MB"
+
+
+class _Modes(NamedTuple):
+    """A motion as modes, with the range of its first frame, and the share of the pulse that they hold."""
+
+    formula: Formula
+    low: float
+    high: float
+    held: float
     distance: float
-    normals: np.ndarray
+
+    @property
+    def size(self) -> str:
+        """What it takes."""
+        return f"{len(self.formula.rates)} modes"
 
 
 class Simulate(Tool):
@@ -102,7 +125,8 @@ class Simulate(Tool):
     )
     width: FloatProperty(
         name="Width",
-        description="Width of the pulse of a wave, or of the edge of a front; 0 for as narrow as the points resolve",
+        description="Width of the pulse from which heat or a wave starts, or of the edge of a front; 0 for as narrow as"
+        " the points resolve",
         default=0.0,
         min=0.0,
         subtype="DISTANCE",
@@ -114,6 +138,27 @@ class Simulate(Tool):
         min=0,
         soft_max=1000,
         max=10000,
+    )
+    keep: EnumProperty(
+        name="Kept",
+        description="How the motion is kept",
+        items=[
+            ("FRAMES", "As Frames", "Frames on disk, which the extension plays"),
+            (
+                "MODES",
+                "As Modes",
+                "Heat or a wave as a few modes and a formula of the time, by nodes: plays and renders anywhere",
+            ),
+        ],
+        default="FRAMES",
+    )
+    modes: IntProperty(
+        name="Modes",
+        description="How many modes, each a number at every point: the more, the narrower a pulse they hold",
+        default=30,
+        min=2,
+        soft_max=100,
+        max=300,
     )
     height: FloatProperty(
         name="Height",
@@ -140,42 +185,39 @@ class Simulate(Tool):
     @property
     def asks(self):
         """Names of the settings that the motion has."""
-        own = {"REACTION": ("pattern",), "HEAT": (), "WAVE": ("width",), "FRONT": ("width",)}[self.kind]
-        return "kind", "group", *own, "distance", "frames", "height", "budget", "folder", "show"
+        own = {"REACTION": ("pattern",), "HEAT": ("width",), "WAVE": ("width",), "FRONT": ("width",)}[self.kind]
+        kept = ("modes",) if self._as_modes else ("budget", "folder")
+        how = ("keep", *kept) if self.kind in _IN_MODES else kept
+        return "kind", "group", *own, "distance", "frames", "height", *how, "show"
+
+    @property
+    def _as_modes(self):
+        return self.keep == "MODES" and self.kind in _IN_MODES
 
     @property
     def writes(self):
         """Names of the attributes: normals only where points are displaced along them."""
-        return (MOTION, NORMAL) if self.height else (MOTION,)
+        modes = map(mode_name, range(1, self.modes + 1)) if self._as_modes else ()
+        return MOTION, *([NORMAL] if self.height else []), *modes
 
     def plan(self, context, obj):
         sources = read_sources(obj, self.group)
         reading, operator = operator_reader(context, obj)
         count = self.frames or context.scene.frame_end - context.scene.frame_start + 1
-        step = self._step(count, len(sources))
-        path = _new_path(obj, self.folder)
-        make = {"HEAT": _heat, "WAVE": _wave, "REACTION": _reaction, "FRONT": _front}[self.kind]
-        chosen = _Chosen(sources, count, step, self.distance, self.width, self.pattern.lower())
         if not all(map(math.isfinite, (self.distance, self.width, self.height))):
             raise PointCloudError("Distance, Width and Height must be numbers. Set them again.")
+        step = 1 if self._as_modes else self._step(count, len(sources))
+        chosen = _Chosen(sources, count, step, self.distance, self.width, self.pattern.lower())
+        path = Path() if self._as_modes else _new_path(obj, self.folder)
+        kind, modes = self.kind, self.modes if self._as_modes else 0
 
         def compute(progress):
             laplacian = operator(progress)
-            rows, distance = make(laplacian, chosen, progress)
-            seen = []
-
-            def watched():
-                for number, row in enumerate(rows):
-                    progress("Frames", min(number / chosen.kept, 1.0))
-                    seen.append((row.min(), row.max()))
-                    yield row
-
-            write_frames(path, chosen.kept, len(sources), watched())
-            low, high = np.min(seen, axis=0)[0], np.max(seen, axis=0)[1]
+            make = _modes(kind, modes) if modes else _frames(kind, path)
+            motion = make(laplacian, chosen, progress)
             component = laplacian.component
             reached = np.isin(component, component[sources]) & (component >= 0)
-            normals = reading.local_normals(laplacian.normals)
-            return Simulated(path, count, step, low, high, seen[-1][1], reached, distance, normals)
+            return Simulated(motion, count, step, reached, reading.local_normals(laplacian.normals))
 
         return compute
 
@@ -185,38 +227,51 @@ class Simulate(Tool):
         return max(1, math.ceil((count - 1) / (fitting - 1)))
 
     def write(self, context, obj, result):
-        settings, scene = obj.meshfree, context.scene
-        before = settings.motion_file
-        kept = bpy.path.relpath(str(result.path)) if self.folder.startswith("//") and bpy.data.filepath else ""
-        settings.motion_file = kept or str(result.path)
-        settings.motion_first, settings.motion_step = scene.frame_start, result.step
-        show_frame(obj, scene.frame_current_final)
-        displace(obj, self.height, result.normals)
+        settings, scene, motion = obj.meshfree, context.scene, result.motion
+        before, first = settings.motion_file, scene.frame_start
+        settings.motion_first, settings.motion_step = first, result.step
+        formula = motion if isinstance(motion, _Modes) else None
+        if formula is None:
+            settings.motion_file = _as_kept(motion.path, self.folder)
+            show_frame(obj, scene.frame_current_final)
+        else:
+            settings.motion_file = ""
+            time = (scene.frame_current_final - first) / max(result.frames - 1, 1)
+            show_values(obj, formula.formula.at(time))
+        show_motion(obj, self.height, result.normals, formula and formula.formula, first, result.frames)
+        forget_groups()
         if self.show:
-            bound = max(-result.low, result.high)
+            bound = max(-motion.low, motion.high)
             settings.range_mode = "LOCKED"
-            settings.range_low, settings.range_high = (-bound, bound) if self.kind == "WAVE" else (0.0, result.high)
-        _remove_old(obj, before, result.path)
-        return [*self.about(obj, result), *self._about_files(result), self._line(obj, result)]
+            settings.range_low, settings.range_high = (-bound, bound) if self.kind == "WAVE" else (0.0, motion.high)
+        if formula is None:
+            _remove_old(obj, before, motion.path)
+        return [*self.about(obj, result), *self._about_kept(result), self._line(obj, result)]
 
     def about(self, obj, result) -> list:
         """Return notices about what was simulated."""
         notices = unreached(obj, result.reached, "Nothing moves there.")
-        if self.kind == "REACTION" and result.last < _DEAD:
+        if self.kind == "REACTION" and result.motion.last < _DEAD:
             notices.append(
                 f"The reaction has died out. Patterns need a Distance of {_SPOT:g} smoothing lengths of the points or"
                 " more, and sources that are single points or small groups."
             )
         return notices
 
-    def _about_files(self, result):
-        notices = []
+    def _about_kept(self, result):
+        motion, notices = result.motion, []
+        if isinstance(motion, _Modes):
+            if motion.held < _BLURRED:
+                notices.append(
+                    f"The modes hold {motion.held:.0%} of the pulse, which is blurred by that. Raise Modes or Width."
+                )
+            return notices
         if result.step > 1:
             notices.append(
                 f"One of {result.step} frames is kept, since all take more than the Disk Budget of {self.budget} MB;"
                 " those between are interpolated."
             )
-        if result.path.is_relative_to(bpy.app.tempdir):
+        if motion.path.is_relative_to(bpy.app.tempdir):
             notices.append(
                 "The frames are in a temporary folder, which Blender empties when it quits. Save the file, and simulate"
                 " again to keep them."
@@ -230,9 +285,9 @@ class Simulate(Tool):
             "REACTION": f"{self.pattern.lower()} at a distance of",
             "FRONT": "the front travels",
         }[self.kind]
-        size = result.path.stat().st_size / _MEGABYTE
-        span = f"values {result.low:.3g} to {result.high:.3g}"
-        return f"{obj.name}: {done} {length_text(result.distance)}, {span}, {size:.1f} MB"
+        motion = result.motion
+        span = f"values {motion.low:.3g} to {motion.high:.3g}"
+        return f"{obj.name}: {done} {length_text(motion.distance)}, {span}, {motion.size}"
 
 
 class _Chosen(NamedTuple):
@@ -256,6 +311,51 @@ class _Chosen(NamedTuple):
         return self.step / max(self.count - 1, 1)
 
 
+def _frames(kind, path):
+    """Return a function that simulates and writes frames, and returns `_Frames`."""
+    make = {"HEAT": _heat, "WAVE": _wave, "REACTION": _reaction, "FRONT": _front}[kind]
+
+    def run(laplacian, chosen, progress):
+        rows, distance = make(laplacian, chosen, progress)
+        seen = []
+
+        def watched():
+            for number, row in enumerate(rows):
+                progress("Frames", min(number / chosen.kept, 1.0))
+                seen.append((row.min(), row.max()))
+                yield row
+
+        write_frames(path, chosen.kept, len(chosen.sources), watched())
+        return _Frames(path, np.min(seen, axis=0)[0], np.max(seen, axis=0)[1], seen[-1][1], distance)
+
+    return run
+
+
+def _modes(kind, count):
+    """Return a function that computes modes, and returns `_Modes`."""
+
+    def run(laplacian, chosen, progress):
+        pulse, areas = _pulse(laplacian, chosen, progress), laplacian.areas
+        spectrum = cache.lowest_modes(laplacian, count, progress)
+        shares = (areas * pulse) @ spectrum.eigenvectors
+        held = float(np.sum(shares**2) / np.sum(areas * pulse**2))
+        distance = _reach(kind, laplacian, chosen)
+        if kind == "WAVE":
+            formula = "COSINE", distance * np.sqrt(spectrum.eigenvalues)
+        else:
+            formula = "EXPONENT", -0.25 * distance * distance * spectrum.eigenvalues
+        formula = Formula(*formula, shares * spectrum.eigenvectors)
+        first = formula.at(0.0)
+        return _Modes(formula, first.min(), first.max(), held, distance)
+
+    return run
+
+
+def _reach(kind, laplacian, chosen):
+    """Return how far heat spreads, or waves run, within all frames."""
+    return chosen.distance or {"HEAT": 0.5, "WAVE": 1.0}[kind] * _size(laplacian)
+
+
 def _size(laplacian):
     known = laplacian.component >= 0
     return float(np.linalg.norm(np.ptp(laplacian.points[known], axis=0)))
@@ -265,18 +365,22 @@ def _width(laplacian, chosen):
     return chosen.width or _WIDTH * float(np.median(laplacian.smoothing_lengths))
 
 
+def _pulse(laplacian, chosen, progress):
+    """Return 1 at the sources, and less around them: a single point alone would be less than the points resolve."""
+    away = cache.geodesics(laplacian, progress).distance(chosen.sources, progress=progress)
+    return np.exp(-((away / _width(laplacian, chosen)) ** 2))
+
+
 def _heat(laplacian, chosen, progress):
     """Return the frames of heat, without end, and how far it spreads."""
-    distance = chosen.distance or 0.5 * _size(laplacian)
+    distance = _reach("HEAT", laplacian, chosen)
     heat = core.Heat(laplacian, 0.25 * distance * distance * chosen.share, progress=progress)
-    return _advance(heat, chosen.sources.astype(np.float64), lambda state: state), distance
+    return _advance(heat, _pulse(laplacian, chosen, progress), lambda state: state), distance
 
 
 def _wave(laplacian, chosen, progress):
     """Return the frames of a wave, without end, and how far it runs."""
-    distance, width = chosen.distance or _size(laplacian), _width(laplacian, chosen)
-    away = cache.geodesics(laplacian, progress).distance(chosen.sources, progress=progress)
-    pulse = np.exp(-((away / width) ** 2))
+    distance, pulse = _reach("WAVE", laplacian, chosen), _pulse(laplacian, chosen, progress)
     wave = core.Wave(laplacian, chosen.share, distance, progress=progress)
     return _advance(wave, (pulse, np.zeros_like(pulse)), lambda state: state[0]), distance
 
@@ -288,7 +392,8 @@ def _reaction(laplacian, chosen, progress):
     automatic = max(resolved, math.sqrt(float(laplacian.areas[known].sum())) / _ACROSS)
     size, time = chosen.distance or automatic, _PATTERN_TIME * chosen.share
     steps = math.ceil(time / _LONGEST)
-    reaction = core.ReactionDiffusion.of_pattern(laplacian, time / steps, chosen.pattern, size, progress=progress)
+    kind = core.ReactionDiffusion
+    reaction = kind.of_pattern(laplacian, time / steps, chosen.pattern, size, progress=progress)
     # A single point would fade before it reacts.
     near = cache.geodesics(laplacian, progress).distance(chosen.sources, limit=_SEED * size, progress=progress)
     eater = (near <= _SEED * size).astype(np.float64)
@@ -323,6 +428,12 @@ def _new_path(obj, folder) -> Path:
         folder = ""
     home = bpy.path.abspath(folder) if folder else bpy.app.tempdir
     return Path(home) / f"{_stem(obj)}-{uuid.uuid4().hex[:8]}.npy"
+
+
+def _as_kept(path, folder) -> str:
+    """Return a path as it is kept: relative where the folder is."""
+    relative = folder.startswith("//") and bpy.data.filepath
+    return bpy.path.relpath(str(path)) if relative else str(path)
 
 
 def _stem(obj):

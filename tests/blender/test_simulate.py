@@ -32,13 +32,11 @@ def laplacian_of(core, obj):
     return core.build_laplacian(local_points(obj))
 
 
-def source(obj):
-    return np.eye(len(obj.data.vertices))[7]
-
-
 def test_frames_of_heat_are_those_of_core(cloud, core):
-    assert bpy.ops.meshfree.simulate(kind="HEAT", distance=1.5) == {"FINISHED"}
-    heat, state = core.Heat(laplacian_of(core, cloud), (0.5 * 1.5) ** 2 / (FRAMES - 1)), source(cloud)
+    assert bpy.ops.meshfree.simulate(kind="HEAT", distance=1.5, width=0.5) == {"FINISHED"}
+    laplacian = laplacian_of(core, cloud)
+    heat = core.Heat(laplacian, (0.5 * 1.5) ** 2 / (FRAMES - 1))
+    state = np.exp(-((core.geodesic_distance(laplacian, [7]) / 0.5) ** 2))
     for row in frames(cloud):
         assert_allclose(row, state, atol=1e-6)
         state = heat.advance(state)
@@ -178,3 +176,52 @@ def test_undo_takes_the_motion_back(cloud):
 def test_without_sources_it_is_refused(cloud):
     with refused(cloud, "has no vertex group named"):
         bpy.ops.meshfree.simulate(group="Missing")
+
+
+def evaluated_motion(obj):
+    layer = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes["lb_motion"]
+    values = np.empty(len(layer.data), np.float32)
+    layer.data.foreach_get("value", values)
+    return values
+
+
+@pytest.mark.parametrize("kind", ["HEAT", "WAVE"])
+def test_modes_are_the_formula_of_core_at_any_frame(cloud, core, kind):
+    bpy.ops.meshfree.simulate(kind=kind, keep="MODES", modes=20, distance=2.0, width=0.8, show=False)
+    assert cloud.meshfree.motion_file == ""
+    laplacian = laplacian_of(core, cloud)
+    pairs, areas = laplacian.eigenpairs(20), laplacian.areas
+    pulse = np.exp(-((core.geodesic_distance(laplacian, [7]) / 0.8) ** 2))
+    wave = core.wave_modes(pairs, areas, pulse, 0.0, speed=2.0)
+    for frame in (9, 3, 2 + FRAMES, 1):
+        bpy.context.scene.frame_set(frame)
+        time = max(frame - 3, 0) / (FRAMES - 1)
+        heat = core.spectral_filter(pulse, pairs, areas, lambda values, time=time: np.exp(-time * values))
+        assert_allclose(evaluated_motion(cloud), heat if kind == "HEAT" else wave(time), atol=2e-4)
+
+
+def test_modes_say_how_much_of_the_pulse_they_hold_and_displace_too(cloud):
+    bpy.ops.meshfree.simulate(kind="WAVE", keep="MODES", modes=4, width=0.4, height=0.2, show=False)
+    assert any("The modes hold" in notice.text for notice in cloud.meshfree.notices)
+    evaluated = cloud.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    positions = np.empty(3 * 600, np.float32)
+    evaluated.data.attributes["position"].data.foreach_get("vector", positions)
+    expected = 1.0 + 0.2 * evaluated_motion(cloud)
+    assert_allclose(np.linalg.norm(positions.reshape(-1, 3), axis=1), expected, atol=2e-3)
+    bpy.ops.meshfree.simulate(kind="FRONT", show=False)
+    assert not cloud.modifiers
+    assert "lb_motion_001" not in cloud.data.attributes
+    assert not [group for group in bpy.data.node_groups if "meshfree_motion" in group]
+
+
+def test_modes_play_without_the_extension(cloud, extension):
+    bpy.ops.meshfree.simulate(kind="WAVE", keep="MODES", modes=10, width=0.8, show=False)
+    handler = part("operators.objects.motion")
+    handler.detach()
+    try:
+        bpy.context.scene.frame_set(3)
+        first = evaluated_motion(cloud)
+        bpy.context.scene.frame_set(8)
+        assert np.abs(evaluated_motion(cloud) - first).max() > 0.1
+    finally:
+        handler.attach()
