@@ -357,7 +357,7 @@ PICTURES = {
     "motion_heat": motion("HEAT", (1, 15, 40, 100), width=1.0, distance=2.5),
     "motion_wave": motion("WAVE", (1, 25, 50, 80), width=0.5, distance=6.0),
     "motion_reaction": motion("REACTION", (1, 25, 50, 100), distance=0.55),
-    "motion_front": motion("FRONT", (15, 40, 65, 90), width=0.4),
+    "motion_front": motion("FRONT", (10, 25, 40, 60), width=0.4),
     **paper_pictures.PICTURES,
     **scan_pictures.PICTURES,
 }

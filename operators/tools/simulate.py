@@ -30,6 +30,7 @@ _PATTERN_TIME = 5000.0  # units of time in which patterns cover the surface, ove
 _LONGEST = 5.0  # of these, in one step of a reaction
 _DEAD = 0.05  # highest concentration where a reaction has ended
 _IN_MODES = ("HEAT", "WAVE")
+_FADED = 0.4  # height of a wave that has left its pulse, over that
 _BLURRED = 0.99  # share of a pulse that the modes should hold
 _MEGABYTE = 1 << 20
 
@@ -56,7 +57,7 @@ class Simulated(NamedTuple):
 
 
 class _Frames(NamedTuple):
-    """A motion as frames on disk, with the range of all values, and the highest one of the last frame."""
+    """A motion as frames on disk, with the range of all values, and the largest size on show in the end."""
 
     path: Path
     low: float
@@ -71,13 +72,21 @@ class _Frames(NamedTuple):
 
 
 class _Modes(NamedTuple):
-    """A motion as modes, with the range of its first frame, and the share of the pulse that they hold."""
+    """A motion as modes, with the range of its first frame, and the share of the pulse that they hold.
+
+    Waves are lower once they have left their pulse.
+    """
 
     formula: Formula
     low: float
     high: float
     held: float
     distance: float
+
+    @property
+    def last(self) -> float:
+        """The largest size on show in the end, about."""
+        return (_FADED if self.formula.function == "COSINE" else 1.0) * self.high
 
     @property
     def size(self) -> str:
@@ -88,6 +97,7 @@ class _Modes(NamedTuple):
 class Simulate(Tool):
     """The settings and the work of `meshfree.simulate`."""
 
+    adjustable = ()  # everything but Show changes the frames
     at_zero = {"distance": "Automatic", "width": "Automatic", "frames": "Scene", "height": "None"}
 
     kind: EnumProperty(
@@ -186,18 +196,14 @@ class Simulate(Tool):
     def asks(self):
         """Names of the settings that the motion has."""
         own = {"REACTION": ("pattern",), "HEAT": ("width",), "WAVE": ("width",), "FRONT": ("width",)}[self.kind]
-        kept = ("modes",) if self._as_modes else ("budget", "folder")
+        kept = ("modes",) if _as_modes(self) else ("budget", "folder")
         how = ("keep", *kept) if self.kind in _IN_MODES else kept
         return "kind", "group", *own, "distance", "frames", "height", *how, "show"
 
     @property
-    def _as_modes(self):
-        return self.keep == "MODES" and self.kind in _IN_MODES
-
-    @property
     def writes(self):
         """Names of the attributes: normals only where points are displaced along them."""
-        modes = map(mode_name, range(1, self.modes + 1)) if self._as_modes else ()
+        modes = map(mode_name, range(1, self.modes + 1)) if _as_modes(self) else ()
         return MOTION, *([NORMAL] if self.height else []), *modes
 
     def plan(self, context, obj):
@@ -206,10 +212,10 @@ class Simulate(Tool):
         count = self.frames or context.scene.frame_end - context.scene.frame_start + 1
         if not all(map(math.isfinite, (self.distance, self.width, self.height))):
             raise PointCloudError("Distance, Width and Height must be numbers. Set them again.")
-        step = 1 if self._as_modes else self._step(count, len(sources))
+        step = 1 if _as_modes(self) else self._step(count, len(sources))
         chosen = _Chosen(sources, count, step, self.distance, self.width, self.pattern.lower())
-        path = Path() if self._as_modes else _new_path(obj, self.folder)
-        kind, modes = self.kind, self.modes if self._as_modes else 0
+        path = Path() if _as_modes(self) else _new_path(obj, self.folder)
+        kind, modes = self.kind, self.modes if _as_modes(self) else 0
 
         def compute(progress):
             laplacian = operator(progress)
@@ -241,9 +247,7 @@ class Simulate(Tool):
         show_motion(obj, self.height, result.normals, formula and formula.formula, first, result.frames)
         forget_groups()
         if self.show:
-            bound = max(-motion.low, motion.high)
-            settings.range_mode = "LOCKED"
-            settings.range_low, settings.range_high = (-bound, bound) if self.kind == "WAVE" else (0.0, motion.high)
+            _lock_range(settings, self.kind, motion)
         if formula is None:
             _remove_old(obj, before, motion.path)
         return [*self.about(obj, result), *self._about_kept(result), self._line(obj, result)]
@@ -290,6 +294,11 @@ class Simulate(Tool):
         return f"{obj.name}: {done} {length_text(motion.distance)}, {span}, {motion.size}"
 
 
+def _as_modes(tool) -> bool:
+    """Whether a motion is kept as modes, by the settings of a tool."""
+    return tool.keep == "MODES" and tool.kind in _IN_MODES
+
+
 class _Chosen(NamedTuple):
     """The settings of a motion, with zero for automatic lengths."""
 
@@ -326,7 +335,9 @@ def _frames(kind, path):
                 yield row
 
         write_frames(path, chosen.kept, len(chosen.sources), watched())
-        return _Frames(path, np.min(seen, axis=0)[0], np.max(seen, axis=0)[1], seen[-1][1], distance)
+        low, high = np.min(seen, axis=0)[0], np.max(seen, axis=0)[1]
+        last = {"WAVE": np.abs(seen[len(seen) // 2 :]).max(), "REACTION": seen[-1][1]}.get(kind, high)
+        return _Frames(path, low, high, last, distance)
 
     return run
 
@@ -428,6 +439,14 @@ def _new_path(obj, folder) -> Path:
         folder = ""
     home = bpy.path.abspath(folder) if folder else bpy.app.tempdir
     return Path(home) / f"{_stem(obj)}-{uuid.uuid4().hex[:8]}.npy"
+
+
+def _lock_range(settings, kind, motion):
+    """Show all frames in one range of colors: that of the last ones, which waves and reactions grow or fade to."""
+    settings.range_mode = "LOCKED"
+    settings.range_low, settings.range_high = (-motion.last, motion.last) if kind == "WAVE" else (0.0, motion.last)
+    if kind == "WAVE" and settings.color_map == "AUTO":
+        settings.color_map = "COOL_WARM"
 
 
 def _as_kept(path, folder) -> str:
