@@ -55,7 +55,7 @@ class FromSources(Apply):
 class Frames(FromSources):
     """The verb `simulate`, whose output holds the last frame."""
 
-    left_out = LEFT_OUT | {"height", "keep", "modes", "budget", "folder"}
+    left_out = LEFT_OUT | {"height", "toucher", "keep", "modes", "budget", "folder"}
 
     def __init__(self):
         super().__init__("simulate", _SimulateInFile)

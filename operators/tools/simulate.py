@@ -16,6 +16,7 @@ from ..objects.motion import show_frame, show_values, write_frames
 from ..objects.motion_nodes import Formula, forget_groups, mode_name, show_motion
 from ..objects.quantities import MOTION, NORMAL
 from ..objects.result import length_text
+from ..objects.touching import places_of
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
@@ -28,6 +29,8 @@ _ACROSS = 12.0  # patterns of automatic size across the root of the area, at mos
 _SEED = 0.4  # of that size, around the sources: where a reaction starts
 _PATTERN_TIME = 5000.0  # units of time in which patterns cover the surface, over all frames
 _LONGEST = 5.0  # of these, in one step of a reaction
+_EDGE = math.exp(-1.0)  # of a pulse, at its width
+_FAR = 6.0  # widths from which a pulse is nothing
 _DEAD = 0.05  # highest concentration where a reaction has ended
 _IN_MODES = ("HEAT", "WAVE")
 _FADED = 0.4  # height of a wave that has left its pulse, over that
@@ -116,6 +119,11 @@ class Simulate(Tool):
         description="Vertex group of the sources; where there is none of that name, the points selected in Edit Mode",
         default=SOURCE,
     )
+    toucher: StringProperty(
+        name="Touching Object",
+        description="Object of the scene that starts the motion at each frame where its vertices touch the points, in"
+        " place of the sources; not for fronts and modes",
+    )
     pattern: EnumProperty(
         name="Pattern",
         description="What the reaction makes",
@@ -198,7 +206,8 @@ class Simulate(Tool):
         own = {"REACTION": ("pattern",), "HEAT": ("width",), "WAVE": ("width",), "FRONT": ("width",)}[self.kind]
         kept = ("modes",) if _as_modes(self) else ("budget", "folder")
         how = ("keep", *kept) if self.kind in _IN_MODES else kept
-        return "kind", "group", *own, "distance", "frames", "height", *how, "show"
+        touched = () if self.kind == "FRONT" or _as_modes(self) else ("toucher",)
+        return "kind", "group", *touched, *own, "distance", "frames", "height", *how, "show"
 
     @property
     def writes(self):
@@ -207,22 +216,29 @@ class Simulate(Tool):
         return MOTION, *([NORMAL] if self.height else []), *modes
 
     def plan(self, context, obj):
-        sources = read_sources(obj, self.group)
         reading, operator = operator_reader(context, obj)
+        touches = bool(self.toucher) and self.kind != "FRONT" and not _as_modes(self)
+        sources = np.zeros(len(reading.points), dtype=bool) if touches else read_sources(obj, self.group)
         count = self.frames or context.scene.frame_end - context.scene.frame_start + 1
         if not all(map(math.isfinite, (self.distance, self.width, self.height))):
             raise PointCloudError("Distance, Width and Height must be numbers. Set them again.")
         step = 1 if _as_modes(self) else self._step(count, len(sources))
         chosen = _Chosen(sources, count, step, self.distance, self.width, self.pattern.lower())
+        if touches:
+            first = context.scene.frame_start
+            numbers = range(first, first + chosen.kept * step, step)
+            chosen = chosen._replace(places=places_of(context, obj, self.toucher, numbers))
         path = Path() if _as_modes(self) else _new_path(obj, self.folder)
         kind, modes = self.kind, self.modes if _as_modes(self) else 0
 
         def compute(progress):
-            laplacian = operator(progress)
+            laplacian, motion_of = operator(progress), chosen
+            if touches:
+                motion_of = _find_touched(laplacian, chosen)
             make = _modes(kind, modes) if modes else _frames(kind, path)
-            motion = make(laplacian, chosen, progress)
+            motion = make(laplacian, motion_of, progress)
             component = laplacian.component
-            reached = np.isin(component, component[sources]) & (component >= 0)
+            reached = np.isin(component, component[motion_of.sources]) & (component >= 0)
             return Simulated(motion, count, step, reached, reading.local_normals(laplacian.normals))
 
         return compute
@@ -248,8 +264,7 @@ class Simulate(Tool):
         forget_groups()
         if self.show:
             _lock_range(settings, self.kind, motion)
-        if formula is None:
-            _remove_old(obj, before, motion.path)
+        _remove_old(obj, before, self.folder)
         return [*self.about(obj, result), *self._about_kept(result), self._line(obj, result)]
 
     def about(self, obj, result) -> list:
@@ -308,6 +323,8 @@ class _Chosen(NamedTuple):
     distance: float
     width: float
     pattern: str
+    places: list | None = None  # of what touches the points, for each frame on disk
+    touched: list | None = None  # and the points there, (n,) bool
 
     @property
     def kept(self) -> int:
@@ -376,24 +393,66 @@ def _width(laplacian, chosen):
     return chosen.width or _WIDTH * float(np.median(laplacian.smoothing_lengths))
 
 
+def _find_touched(laplacian, chosen):
+    """Return the settings with the points that are touched: the nearest ones of places that are not too far off."""
+    points, reach, touched = laplacian.points, _width(laplacian, chosen), []
+    for places in chosen.places:
+        rows = core.geometry.nearest_rows(points, places)
+        near = np.linalg.norm(points[rows] - places, axis=1) <= reach
+        mask = np.zeros(len(points), dtype=bool)
+        mask[rows[near]] = True
+        touched.append(mask & (laplacian.component >= 0))
+    union = np.any(touched, axis=0)
+    if not union.any():
+        raise PointCloudError(
+            f"The Touching Object comes within {length_text(reach)} of no point in any frame. Move it nearer, or raise"
+            " Width."
+        )
+    return chosen._replace(sources=union, touched=touched)
+
+
 def _pulse(laplacian, chosen, progress):
     """Return 1 at the sources, and less around them: a single point alone would be less than the points resolve."""
-    away = cache.geodesics(laplacian, progress).distance(chosen.sources, progress=progress)
-    return np.exp(-((away / _width(laplacian, chosen)) ** 2))
+    return _pulse_at(laplacian, chosen, chosen.sources, progress)
+
+
+def _pulse_at(laplacian, chosen, rows, progress):
+    width = _width(laplacian, chosen)
+    away = cache.geodesics(laplacian, progress).distance(rows, limit=_FAR * width, progress=progress)
+    return np.exp(-((away / width) ** 2))
+
+
+def _start_at(number, laplacian, chosen, progress):
+    """Return the pulse that starts at a frame: of the sources at the first one, of what is touched at each."""
+    if chosen.touched is None:
+        return _pulse(laplacian, chosen, progress) if number == 0 else None
+    rows = chosen.touched[number] if number < len(chosen.touched) else np.zeros(1, dtype=bool)
+    return _pulse_at(laplacian, chosen, rows, progress) if rows.any() else None
 
 
 def _heat(laplacian, chosen, progress):
     """Return the frames of heat, without end, and how far it spreads."""
     distance = _reach("HEAT", laplacian, chosen)
     heat = core.Heat(laplacian, 0.25 * distance * distance * chosen.share, progress=progress)
-    return _advance(heat, _pulse(laplacian, chosen, progress), lambda state: state), distance
+
+    def begin(state, number):
+        pulse = _start_at(number, laplacian, chosen, progress)
+        return state if pulse is None else np.maximum(state, pulse)
+
+    return _advance(heat, np.zeros(len(laplacian.points)), begin, lambda state: state), distance
 
 
 def _wave(laplacian, chosen, progress):
     """Return the frames of a wave, without end, and how far it runs."""
-    distance, pulse = _reach("WAVE", laplacian, chosen), _pulse(laplacian, chosen, progress)
+    distance = _reach("WAVE", laplacian, chosen)
     wave = core.Wave(laplacian, chosen.share, distance, progress=progress)
-    return _advance(wave, (pulse, np.zeros_like(pulse)), lambda state: state[0]), distance
+
+    def begin(state, number):
+        pulse = _start_at(number, laplacian, chosen, progress)
+        return state if pulse is None else (np.maximum(state[0], pulse), state[1])
+
+    nothing = np.zeros(len(laplacian.points))
+    return _advance(wave, (nothing, nothing), begin, lambda state: state[0]), distance
 
 
 def _reaction(laplacian, chosen, progress):
@@ -405,17 +464,28 @@ def _reaction(laplacian, chosen, progress):
     steps = math.ceil(time / _LONGEST)
     kind = core.ReactionDiffusion
     reaction = kind.of_pattern(laplacian, time / steps, chosen.pattern, size, progress=progress)
-    # A single point would fade before it reacts.
-    near = cache.geodesics(laplacian, progress).distance(chosen.sources, limit=_SEED * size, progress=progress)
-    eater = (near <= _SEED * size).astype(np.float64)
-    return _advance(reaction, (1.0 - eater, eater), lambda state: state[1], steps), size
+    chosen = chosen._replace(width=_SEED * size)  # a single point would fade before it reacts
+
+    def begin(state, number):
+        pulse = _start_at(number, laplacian, chosen, progress)
+        if pulse is None:
+            return state
+        inside = pulse > _EDGE
+        return np.where(inside, 0.0, state[0]), np.where(inside, 1.0, state[1])
+
+    start = np.ones(len(laplacian.points)), np.zeros(len(laplacian.points))
+    return _advance(reaction, start, begin, lambda state: state[1], steps), size
 
 
-def _advance(motion, state, part, steps=1):
+def _advance(motion, state, begin, part, steps=1):
+    """Yield a part of the state at each frame, after what begins there."""
+    number = 0
     while True:
+        state = begin(state, number)
         yield part(state)
         for _ in range(steps):
             state = motion.advance(state)
+        number += 1
 
 
 def _front(laplacian, chosen, progress):
@@ -433,12 +503,16 @@ def _front(laplacian, chosen, progress):
     return frames(), far
 
 
-def _new_path(obj, folder) -> Path:
-    """Return a new path for the frames of an object."""
+def _home(folder) -> Path:
+    """Return the folder of frames: a temporary one for a file that is not saved yet."""
     if folder.startswith("//") and not bpy.data.filepath:
         folder = ""
-    home = bpy.path.abspath(folder) if folder else bpy.app.tempdir
-    return Path(home) / f"{_stem(obj)}-{uuid.uuid4().hex[:8]}.npy"
+    return Path(bpy.path.abspath(folder) if folder else bpy.app.tempdir)
+
+
+def _new_path(obj, folder) -> Path:
+    """Return a new path for the frames of an object."""
+    return _home(folder) / f"{_stem(obj)}-{uuid.uuid4().hex[:8]}.npy"
 
 
 def _lock_range(settings, kind, motion):
@@ -459,11 +533,11 @@ def _stem(obj):
     return bpy.path.clean_name(obj.name)
 
 
-def _remove_old(obj, before, path):
-    """Remove the earlier frames of an object beside the new ones, if no other object plays them."""
-    old = Path(bpy.path.abspath(before)) if before else path
-    used = any(other.meshfree.motion_file == before for other in bpy.data.objects if other != obj)
-    if old != path and old.parent == path.parent and old.match(f"{_stem(obj)}-????????.npy") and not used:
+def _remove_old(obj, before, folder):
+    """Remove the earlier frames of an object where the new ones would be, if no other object plays them."""
+    old = Path(bpy.path.abspath(before))
+    used = any(other.meshfree.motion_file == before for other in bpy.data.objects)
+    if before and not used and old.parent == _home(folder) and old.match(f"{_stem(obj)}-????????.npy"):
         old.unlink(missing_ok=True)
 
 

@@ -225,3 +225,30 @@ def test_modes_play_without_the_extension(cloud, extension):
         assert np.abs(evaluated_motion(cloud) - first).max() > 0.1
     finally:
         handler.attach()
+
+
+def test_an_object_that_touches_the_surface_starts_heat_where_it_is(cloud):
+    cloud.location, cloud.scale = (1.0, 2.0, 3.0), (2.0, 2.0, 2.0)
+    ball = bpy.data.objects.new("Ball", None)
+    bpy.context.scene.collection.objects.link(ball)
+    for frame, side in ((5, 1.0), (7, 8.0), (9, -1.0)):  # it touches, leaves, and touches on the other side
+        ball.location = (1.0 + 2.0 * side, 2.0, 3.0)
+        ball.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(4)
+    cloud.vertex_groups.clear()
+    bpy.ops.meshfree.simulate(kind="HEAT", toucher="Ball", width=0.8, distance=1.0, folder="")
+    assert bpy.context.scene.frame_current == 4
+    kept, x = frames(cloud), local_points(cloud)[:, 0]
+    assert kept[2][x > 0.95].max() > 0.9
+    assert kept[5][x < 0.0].max() < 0.01
+    assert kept[6][x < -0.95].max() > 0.9
+    assert 0.0 < kept[6][x > 0.95].max() < 0.9
+
+
+def test_an_object_that_touches_nothing_is_refused(cloud):
+    far = add_object(sphere_points(10) + 50.0, "Far")
+    bpy.context.view_layer.objects.active = cloud
+    for name, text in {"Far": "comes within .* of no point", "Cloud": "is the object itself", "X": "not in"}.items():
+        with refused(cloud, text):
+            bpy.ops.meshfree.simulate(kind="WAVE", toucher=name)
+    assert far.name == "Far"
