@@ -100,9 +100,14 @@ def _on_frame_change(scene, _depsgraph):
             keep(obj, TOOL, str(error))
 
 
+def close_frames():
+    """Close the files of frames, which are opened again as they are needed."""
+    _open.clear()
+
+
 @persistent
 def _forget(*_):
-    _open.clear()
+    close_frames()
 
 
 _HANDLERS = {"frame_change_post": _on_frame_change, "load_pre": _forget}
@@ -116,4 +121,4 @@ def attach():
 def detach():
     """Remove the handlers, and close the files."""
     remove_handlers(_HANDLERS)
-    _open.clear()
+    close_frames()

@@ -12,7 +12,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.groups import SOURCE
-from ..objects.motion import show_frame, show_values, write_frames
+from ..objects.motion import close_frames, show_frame, show_values, write_frames
 from ..objects.motion_nodes import Formula, forget_groups, mode_name, show_motion
 from ..objects.quantities import MOTION, NORMAL
 from ..objects.result import length_text
@@ -255,13 +255,13 @@ class Simulate(Tool):
         formula = motion if isinstance(motion, _Modes) else None
         if formula is None:
             settings.motion_file = _as_kept(motion.path, self.folder)
+            scene.render.use_lock_interface = True  # for each frame an attribute is written
             show_frame(obj, scene.frame_current_final)
         else:
             settings.motion_file = ""
             time = (scene.frame_current_final - first) / max(result.frames - 1, 1)
             show_values(obj, formula.formula.at(time))
         show_motion(obj, self.height, result.normals, formula and formula.formula, first, result.frames)
-        forget_groups()
         if self.show:
             _lock_range(settings, self.kind, motion)
         _remove_old(obj, before, self.folder)
@@ -538,6 +538,7 @@ def _remove_old(obj, before, folder):
     old = Path(bpy.path.abspath(before))
     used = any(other.meshfree.motion_file == before for other in bpy.data.objects)
     if before and not used and old.parent == _home(folder) and old.match(f"{_stem(obj)}-????????.npy"):
+        close_frames()  # Windows removes no open file
         old.unlink(missing_ok=True)
 
 
@@ -546,6 +547,10 @@ class MESHFREE_OT_simulate(Simulate, ShownOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.simulate"
     bl_label = "Simulate Along Surface"
+
+    def conclude(self, context, objects):
+        super().conclude(context, objects)
+        forget_groups()
 
 
 TOOLS = (Registration(MESHFREE_OT_simulate, panel=Row("Simulate", 1, 1), menu=Row("Object", 6, 3), verb=Simulate),)

@@ -164,6 +164,21 @@ def test_height_displaces_along_the_normals(cloud, scale):
     assert not cloud.modifiers
 
 
+def test_a_failure_at_the_end_leaves_an_earlier_motion_as_it_was(cloud, monkeypatch):
+    bpy.ops.meshfree.simulate(kind="WAVE", keep="MODES", modes=6, width=0.8, height=0.1, show=False)
+    before = evaluated_motion(cloud)
+    tool = part("operators.tools.simulate")
+
+    def fail(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(tool, "_remove_old", fail)
+    with refused(cloud, "memory is used up"):
+        bpy.ops.meshfree.simulate(kind="HEAT", keep="MODES", modes=9, width=0.8, show=False)
+    assert_allclose(evaluated_motion(cloud), before, atol=1e-6)
+    assert cloud.modifiers[0].node_group is not None
+
+
 def test_undo_takes_the_motion_back(cloud):
     bpy.ops.ed.undo_push(message="Made")
     bpy.ops.meshfree.simulate(kind="FRONT")
