@@ -74,7 +74,8 @@ class _State:
             obj.matrix_basis = self._place
         for item in [item for item in obj.modifiers if item.name not in self._modifiers]:
             obj.modifiers.remove(item)
-        _put_values(obj.meshfree, self._settings)  # before inputs, which follow settings
+        for _ in range(2):  # again, for update functions of some may change others
+            _put_values(obj.meshfree, self._settings)  # before inputs, which follow settings
         there = [name for name in self._modifiers if name in obj.modifiers]
         for name in self._groups.keys() & set(there):
             if obj.modifiers[name].node_group != self._groups[name]:
