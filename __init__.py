@@ -16,7 +16,7 @@ def _modules():
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
-    from .operators.objects import counting, notices, settings
+    from .operators.objects import counting, motion, notices, settings
     from .operators.running import cache, job
     from .ui import (
         applications,
@@ -41,6 +41,7 @@ def _modules():
         notices,
         cache,
         counting,
+        motion,
         job,
         *_within(tools),
         deform,

@@ -40,6 +40,11 @@ from .applications.paths import geodesic_path as geodesic_path
 from .applications.paths import polygon_length as polygon_length
 from .applications.regions import Region as Region
 from .applications.regions import measure_region as measure_region
+from .applications.motion import Heat as Heat
+from .applications.motion import Wave as Wave
+from .applications.motion import WaveState as WaveState
+from .applications.reaction import Mixture as Mixture
+from .applications.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.segmentation import modes_needed as modes_needed
 from .applications.segmentation import nodal_domains as nodal_domains
 from .applications.segmentation import segment as segment
@@ -62,6 +67,7 @@ from .applications.transport import transport as transport
 from .applications.variation import surface_variation as surface_variation
 from .applications.volume import EnclosedVolume as EnclosedVolume
 from .applications.volume import enclosed_volume as enclosed_volume
+from .applications.wave_modes import wave_modes as wave_modes
 from .errors import AreaError as AreaError
 from .errors import BrokenLibraryError as BrokenLibraryError
 from .errors import Cancelled as Cancelled

@@ -34,6 +34,34 @@ def whole(given: Any) -> float:
     return int(number) if np.isfinite(number) and number == np.floor(number) else np.nan
 
 
+def positive(given: Any, name: str) -> float:
+    """Return a finite number above zero as a float.
+
+    Raises
+    ------
+    PointCloudError
+        It is something else.
+    """
+    number = real(given)
+    if not 0.0 < number < np.inf:
+        raise PointCloudError(f"The {name} is {given!r}. Use a number above zero.")
+    return number
+
+
+def not_negative(given: Any, name: str) -> float:
+    """Return a finite number that is not negative as a float.
+
+    Raises
+    ------
+    PointCloudError
+        It is something else.
+    """
+    number = real(given)
+    if not 0.0 <= number < np.inf:
+        raise PointCloudError(f"The {name} is {given!r}. Use a number that is not negative.")
+    return number
+
+
 def check_switches(**switches: Any) -> None:
     """Check that arguments are truth values.
 

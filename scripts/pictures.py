@@ -25,6 +25,7 @@ OUTPUT = package.ROOT / "docs" / "pictures"
 CUT = 0.45  # height at which the shape is cut open for the picture of a boundary
 SPACING = 0.038  # of the points of the demonstration's shape
 LINES = 15
+FRAMES = 100  # of motions
 
 
 def coral(noise=0.0):
@@ -362,6 +363,28 @@ def minimal(path):
     studio.take(path, legend=objects[0])
 
 
+def motion(kind, shown, **settings):
+    """Return a function that renders a motion from the tip of an arm, at some of its frames."""
+
+    def take(path):
+        scene, first = bpy.context.scene, coral()
+        scene.frame_start, scene.frame_end = 1, FRAMES
+        studio.group(first, studio.tip(first, (1.0, -1.0, 0.0)), "SOURCE")
+        bpy.ops.meshfree.simulate(kind=kind, **settings)
+        objects = [first]
+        for frame in shown:
+            obj = first if frame == shown[0] else first.copy()
+            if obj != first:
+                obj.data = first.data.copy()
+                scene.collection.objects.link(obj)
+                objects.append(obj)
+            part("operators.objects.motion").show_frame(obj, frame)
+            obj.meshfree.motion_file = "" if obj != first else obj.meshfree.motion_file
+        row(objects, path, legend=first)
+
+    return take
+
+
 PICTURES = {
     "area": result("lb_area"),
     "normal": result("lb_normal"),
@@ -395,6 +418,10 @@ PICTURES = {
     "field": field,
     "deform": deform,
     "minimal": minimal,
+    "motion_heat": motion("HEAT", (1, 15, 40, 100), width=1.0, distance=2.5),
+    "motion_wave": motion("WAVE", (1, 25, 50, 80), width=0.5, distance=6.0),
+    "motion_reaction": motion("REACTION", (1, 25, 50, 100), distance=0.55),
+    "motion_front": motion("FRONT", (10, 25, 40, 60), width=0.4),
     **paper_pictures.PICTURES,
     **scan_pictures.PICTURES,
 }

@@ -41,6 +41,12 @@ def _draw_strays(layout):
         button.action, button.as_shown = action, True
 
 
+class MESHFREE_PT_simulate(ToolPanel, bpy.types.Panel):
+    """Heat, waves, patterns and fronts along the surface, frame by frame"""
+
+    bl_label = "Simulate"
+
+
 class MESHFREE_PT_segment(ToolPanel, bpy.types.Panel):
     """Parts of the surface"""
 
@@ -60,4 +66,11 @@ class MESHFREE_PT_minimal(ToolPanel, bpy.types.Panel):
     bl_order = 2  # below what is done every day
 
 
-CLASSES = (MESHFREE_PT_measure, MESHFREE_PT_clean, MESHFREE_PT_segment, MESHFREE_PT_surface, MESHFREE_PT_minimal)
+CLASSES = (
+    MESHFREE_PT_measure,
+    MESHFREE_PT_clean,
+    MESHFREE_PT_segment,
+    MESHFREE_PT_surface,
+    MESHFREE_PT_simulate,
+    MESHFREE_PT_minimal,
+)

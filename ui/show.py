@@ -144,6 +144,12 @@ def recolor(obj):
         use_material_preview(bpy.context)
 
 
+def follow_frame(obj):
+    """Follow an attribute that was written for another frame where viewports in Solid would show earlier colors."""
+    if is_in_solid(obj):
+        recolor(obj)
+
+
 def show_groups(obj):
     """Update the display by the setting Group Colors: on top of colors, or on plain points."""
     if obj.type not in TYPES:
@@ -503,6 +509,7 @@ _HANDLERS = {
     "splats_found": show_splats,
     "result_written": show_result,
     "mesh_made": show_alike,
+    "frame_shown": follow_frame,
     "sequence_written": show_sequence,
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,

@@ -2,7 +2,30 @@
 
 from collections.abc import Callable, Iterator
 
+import numpy as np
+from scipy.fft import dct
+
 from ..types import Floats
+
+NODES = 4096  # at which a function is evaluated
+
+
+def chebyshev_nodes() -> Floats:
+    """Return the places in [-1, 1] at which `chebyshev_coefficients` takes a function, descending."""
+    return np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+
+
+def chebyshev_coefficients(values: Floats) -> Floats:
+    """Return the coefficients of the polynomial through a function's values at `chebyshev_nodes`, (NODES,)."""
+    coefficients = dct(values) / NODES
+    coefficients[0] *= 0.5
+    return coefficients
+
+
+def degree_needed(coefficients: Floats, tolerance: float) -> int:
+    """Return the lowest degree beyond which the coefficients sum to no more than a tolerance."""
+    left = np.append(np.cumsum(np.abs(coefficients[::-1]))[::-1][1:], 0.0)  # bound of the error from each degree on
+    return int(np.argmax(left <= tolerance))
 
 
 def chebyshev_terms(product: Callable[[Floats], Floats], start: Floats) -> Iterator[Floats]:

@@ -6,10 +6,16 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.fft import dct
 from scipy.special import expit
 
-from ..algebra import Rows, chebyshev_terms, largest_eigenvalue
+from ..algebra import (
+    Rows,
+    chebyshev_coefficients,
+    chebyshev_nodes,
+    chebyshev_terms,
+    degree_needed,
+    largest_eigenvalue,
+)
 from ..arguments import as_doubles, check_array, check_finite, check_switches, real, whole
 from ..errors import PointCloudError
 from ..geometry import check_values
@@ -17,7 +23,6 @@ from ..kernel import SECOND_MOMENT
 from ..operator import LaplaceBeltrami, Spectrum, symmetric_form
 from ..types import Floats, Ints, Progress, Response
 
-_NODES = 4096  # at which a response is evaluated
 _DEGREE = 800  # of a polynomial, at most
 _ROUGH = 0.02  # largest error of a response, as a share of its largest value, that is accepted at that degree
 _ZERO = 1e-8  # eigenvalues below this share of 4 pi / area belong to constants
@@ -319,17 +324,15 @@ def corrected_operator(
 
 def _polynomial(response: Response, top: float, tolerance: float) -> Floats:
     """Return the Chebyshev coefficients of a response over [0, top], as many as the tolerance needs."""
-    angle = np.pi * (np.arange(_NODES) + 0.5) / _NODES
-    factors = respond(response, 0.5 * top * (1.0 + np.cos(angle)))
-    coefficients = dct(factors) / _NODES
-    coefficients[0] *= 0.5
+    nodes = chebyshev_nodes()
+    factors = respond(response, 0.5 * top * (1.0 + nodes))
+    coefficients = chebyshev_coefficients(factors)
     largest = np.abs(factors).max()
-    left = np.append(np.cumsum(np.abs(coefficients[::-1]))[::-1][1:], 0.0)  # bound of the error from each degree on
-    degree = int(np.argmax(left <= tolerance * largest))
+    degree = degree_needed(coefficients, tolerance * largest)
     if degree <= _DEGREE:
         return coefficients[: degree + 1]
     coefficients = coefficients[: _DEGREE + 1]
-    error = np.abs(np.polynomial.chebyshev.chebval(np.cos(angle), coefficients) - factors).max()
+    error = np.abs(np.polynomial.chebyshev.chebval(nodes, coefficients) - factors).max()
     if error > _ROUGH * largest:
         raise PointCloudError(
             f"The response changes too abruptly for a polynomial: at degree {_DEGREE} its error is"

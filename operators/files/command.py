@@ -11,7 +11,7 @@ from ...core.files import numbered_files
 from .. import registration
 from ..objects.groups import SOURCE
 from .bending import Deform, SplatInfo
-from .tool_verbs import AlignWith, AlongCurve, CompareWith, FromSources, Mesh, Orient
+from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, Mesh, Orient
 from .verbs import Analyze, Apply
 
 _OWN = {
@@ -20,6 +20,7 @@ _OWN = {
     "mesh_surface": Mesh,
     "compare": CompareWith,
     "orient_normals": Orient,
+    "simulate": Frames,
 }
 _handles = []
 

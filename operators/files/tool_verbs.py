@@ -18,6 +18,7 @@ from ..tools.along import SignedDistance
 from ..tools.compare import Compare, distances
 from ..tools.mesh import MeshSurface
 from ..tools.orient import OrientNormals
+from ..tools.simulate import Simulate
 from . import objects as files
 from . import opening
 from .arguments import as_place, place
@@ -52,6 +53,27 @@ class FromSources(Apply):
             nearest = core.geometry.nearest_rows(files.file_points(obj), arguments.at)
             tool.group = _PLACES
             assign(obj, tool.group, np.isin(np.arange(point_count(obj.data)), nearest), "REPLACE", 1.0)
+
+
+class Frames(FromSources):
+    """The verb `simulate`, whose output holds the last frame."""
+
+    left_out = LEFT_OUT | {"height", "toucher", "keep", "modes", "budget", "folder"}
+
+    def __init__(self):
+        super().__init__("simulate", _SimulateInFile)
+
+
+class _SimulateInFile(Simulate):
+    """The tool for a file, beside which no frames are kept."""
+
+    def write(self, context, obj, result):
+        *_, line = super().write(context, obj, result)
+        settings = obj.meshfree
+        context.scene.frame_set(settings.motion_first + result.frames - 1)
+        settings.motion_file = ""
+        result.motion.path.unlink()
+        return [*self.about(obj, result), line]
 
 
 class AlongCurve(Apply):

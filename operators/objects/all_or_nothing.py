@@ -61,6 +61,7 @@ class _State:
         self._obj, self._data = obj, obj.data
         self._place, self._world = obj.matrix_basis.copy(), obj.matrix_world.copy()
         self._modifiers = {item.name: inputs_of(item) if is_own(item) else {} for item in obj.modifiers}
+        self._groups = {item.name: item.node_group for item in obj.modifiers if is_own(item)}
         self._own = {name: _plain(obj[name]) for name in _own_names(obj)}
         self._settings = _values(obj.meshfree)
         self._key = obj.active_shape_key_index
@@ -74,8 +75,12 @@ class _State:
             obj.matrix_basis = self._place
         for item in [item for item in obj.modifiers if item.name not in self._modifiers]:
             obj.modifiers.remove(item)
-        _put_values(obj.meshfree, self._settings)  # before inputs, which follow settings
+        for _ in range(2):  # again, for update functions of some may change others
+            _put_values(obj.meshfree, self._settings)  # before inputs, which follow settings
         there = [name for name in self._modifiers if name in obj.modifiers]
+        for name in self._groups.keys() & set(there):
+            if obj.modifiers[name].node_group != self._groups[name]:
+                obj.modifiers[name].node_group = self._groups[name]
         for index, name in enumerate(there):
             put_inputs(obj.modifiers[name], self._modifiers[name])
             obj.modifiers.move(obj.modifiers.find(name), index)

@@ -13,6 +13,7 @@ _OWN = {
     "splats_found": [],  # (obj) whose splats are to be shown: ui/show.py
     "result_written": [],  # (obj, name of the attribute to show, empty for the one on show): ui/show.py
     "mesh_made": [],  # (obj, the new object of its mesh, to be shown like it): ui/show.py
+    "frame_shown": [],  # (obj) of a motion: ui/show.py
     "sequence_written": [],  # (objects, name of the attribute to show in one range): ui/show.py
     "views_changed": [],  # () what is drawn over them: ui/show.py
     "panels_changed": [],  # () what they show of running work: ui/show.py

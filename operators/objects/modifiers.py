@@ -7,6 +7,7 @@ from ...core import PointCloudError
 DISPLAY_TAG = "meshfree_display"  # custom property that marks the nodes and materials of our own display
 DEFORM_TAG = "meshfree_deform"  # the same of our own deformation
 SHAPE_TAG = "meshfree_shape"  # the same of a deformation that is stored, where there are no shape keys
+MOTION_TAG = "meshfree_motion"  # the same of what displaces points by a motion
 SEQUENCE_TAG = "meshfree_sequence"  # the same of what shows one object a frame
 COLLECTION = "Frames"  # input of that: the collection
 _INPUTS = "meshfree_inputs"  # custom property of the nodes: identifiers of the inputs by the names that we gave them
@@ -23,6 +24,11 @@ def is_deform(modifier) -> bool:
     return _is_tagged(modifier, DEFORM_TAG)
 
 
+def is_motion(modifier) -> bool:
+    """Whether a modifier displaces points by a motion on the surface."""
+    return _is_tagged(modifier, MOTION_TAG)
+
+
 def is_sequence(modifier) -> bool:
     """Whether a modifier shows one object of a collection at each frame."""
     return _is_tagged(modifier, SEQUENCE_TAG)
@@ -30,7 +36,7 @@ def is_sequence(modifier) -> bool:
 
 def is_own(modifier) -> bool:
     """Whether a modifier is the extension's own: what operators read comes before all of these."""
-    return is_display(modifier) or is_deform(modifier)
+    return is_display(modifier) or is_deform(modifier) or is_motion(modifier)
 
 
 def _is_tagged(modifier, tag):

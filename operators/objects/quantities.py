@@ -20,6 +20,7 @@ DISTANCE, SIGNED_DISTANCE, DEVIATION = "lb_distance", "lb_signed_distance", "lb_
 RESIDUAL = "lb_residual"
 CELL, DIRECTION, UV = "lb_cell", "lb_direction", "lb_uv"
 DISPLACEMENT = "lb_displacement"
+MOTION, MOTION_MODE = "lb_motion", "lb_motion_"
 EIGENVECTOR = "lb_eigenvector_"
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"
 
@@ -265,6 +266,8 @@ QUANTITIES = (  # in the order of the panel
         data_type="FLOAT_VECTOR",
         power=1,
     ),
+    Quantity(MOTION, "Motion", "Heat, wave, reaction or front at the frame on show", "simulate"),
+    Quantity(MOTION_MODE, "Motion Mode", "What a mode adds to the motion at its begin", "simulate", numbered=True),
     Quantity(EIGENVECTOR, "Mode", "Vibration mode of the surface", "spectrum", power=-1, numbered=True),
     Quantity(
         HEAT_SIGNATURE, "Heat Signature", "Heat that is left after some time", "signature", power=-2, numbered=True

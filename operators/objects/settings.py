@@ -345,6 +345,19 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         description="Whether colors for Solid are outdated, since Edit Mode prevents writing them",
     )
 
+    motion_file: StringProperty(
+        name="Motion File", description="File with the frames of the motion on the surface; empty for none"
+    )
+    motion_first: IntProperty(
+        name="First Frame", description="Frame of the scene with which the motion begins", min=0, soft_max=1000
+    )
+    motion_step: IntProperty(
+        name="Frame Step",
+        description="Frames of the scene from one frame on disk to the next",
+        default=1,
+        min=1,
+        soft_max=100,
+    )
     notices: CollectionProperty(
         type=notices.MESHFREE_PG_notice, name="Notices", description="Notices of tools, until dismissed"
     )

@@ -25,6 +25,7 @@ PANELS = (
     "clean",
     "surface",
     "segment",
+    "simulate",
     "deform",
     "minimal",
 )

@@ -13,6 +13,7 @@ from tests.results import RESULTS
 
 CALLS = {  # of tools that need arguments, or write more in several calls
     "signed_distance": ({"curve": "Line"},),
+    "simulate": ({"keep": "MODES", "modes": 8},),
     "spectrum": ({"count": 3},),
     "signature": ({"kind": "HEAT", "modes": 20}, {"kind": "WAVE", "modes": 20}),
 }

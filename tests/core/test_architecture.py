@@ -125,6 +125,8 @@ SIDEWAYS = {  # applications that build on others
     ("fields", "graph"),
     ("geodesics", "graph"),
     ("meshing", "sides"),
+    ("motion", "propagation"),
+    ("reaction", "propagation"),
     ("transport", "geodesics"),
     ("minimal_surface", "boundary_curve"),
     ("paths", "geodesics"),

@@ -13,6 +13,7 @@ CONSTANTS = {value: name for name, value in vars(quantities).items() if str(valu
 WIDELY = {  # scalars that the house itself needs
     "lb_area": "summed up, and weights of other results",
     "lb_mean_curvature": "on show where nothing else is chosen",
+    "lb_motion": "written for each frame by a handler, and read by nodes that displace points",
     "lb_deviation": "beside which the panel offers to swap both clouds",
 }
 

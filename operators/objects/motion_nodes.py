@@ -1,0 +1,117 @@
+"""The modifier of a motion: a formula of the time over modes, and displacement along the normals."""
+
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+from .attributes import remove_numbered, write_attribute
+from .modifiers import MOTION_TAG, is_display, is_motion, new_group, set_input
+from .node_trees import TreeBuilder
+from .quantities import MOTION, MOTION_MODE, NORMAL
+from .reading import metric
+
+NAME = "Mesh-Free Motion"
+_HEIGHT, _FIRST, _FRAMES = "Height", "First Frame", "Frames"  # inputs of the nodes
+_INPUTS = (
+    (_HEIGHT, "Float", "Displacement along the normals where the motion is 1, in local lengths"),
+    (_FIRST, "Int", "Frame of the scene with which the motion begins"),
+    (_FRAMES, "Int", "Frames of the scene from the beginning to the end", {"default_value": 1, "min_value": 1}),
+)
+
+
+class Formula(NamedTuple):
+    """A motion as a sum of modes, each by a function of the time from 0 at the first frame to 1 at the last.
+
+    Attributes
+    ----------
+    function : {"COSINE", "EXPONENT"}
+        Of nodes: ``cos(rate * time)``, or ``exp(rate * time)``.
+    rates : ndarray, (k,)
+    modes : ndarray, (n, k)
+        What each mode adds at the time zero.
+    """
+
+    function: str
+    rates: np.ndarray
+    modes: np.ndarray
+
+    def at(self, time: float):
+        """Return the motion at a time, (n,)."""
+        return self.modes @ {"COSINE": np.cos, "EXPONENT": np.exp}[self.function](self.rates * max(time, 0.0))
+
+
+def mode_name(number: int) -> str:
+    """Name of the attribute that holds what a mode of a motion adds; modes are counted from 1."""
+    return f"{MOTION_MODE}{number:03d}"
+
+
+def show_motion(obj, height: float, normals, formula, first: int, frames: int):
+    """Give an object the modifier that its motion needs, or take it away if it needs none.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    height : float
+        Displacement where the motion is 1, in lengths of the world; 0 for none.
+    normals : ndarray, (n, 3)
+        In local space.
+    formula : Formula or None
+        Of the motion; none where its attribute holds the frame on show.
+    first, frames : int
+        Of the scene.
+    """
+    modifier = next((item for item in obj.modifiers if is_motion(item)), None)
+    remove_numbered(obj.data, MOTION_MODE, 0 if formula is None else len(formula.rates))
+    if not height and formula is None:
+        if modifier is not None:
+            obj.modifiers.remove(modifier)
+        return
+    if modifier is None:
+        modifier = obj.modifiers.new(NAME, "NODES")
+        others = [item for item in obj.modifiers if item != modifier]
+        obj.modifiers.move(len(others), len([item for item in others if not is_display(item)]))
+    for number, mode in enumerate(() if formula is None else formula.modes.T, 1):
+        write_attribute(obj.data, mode_name(number), mode)
+    if height:
+        write_attribute(obj.data, NORMAL, normals)
+    modifier.node_group = _new_group(formula, bool(height))
+    scale = np.linalg.det(metric(obj)) ** (1.0 / 6.0)  # the metric has squares of lengths
+    for name, value in ((_HEIGHT, float(height / scale)), (_FIRST, first), (_FRAMES, max(frames - 1, 1))):
+        set_input(modifier, name, value)
+
+
+def _new_group(formula, displaces):
+    group = new_group(NAME, MOTION_TAG, _INPUTS)
+    tree = TreeBuilder(group)
+    given = tree.node("NodeGroupInput").outputs
+    geometry = given["Geometry"]
+    if formula is not None:
+        geometry = tree.store(geometry, MOTION, _sum(tree, formula, _time(tree, given)), "FLOAT")
+    if displaces:
+        size = tree.math("MULTIPLY", tree.attribute(MOTION, "FLOAT"), given[_HEIGHT])
+        offset = tree.node("ShaderNodeVectorMath", tree.attribute(NORMAL), Scale=size, operation="SCALE")
+        geometry = tree.node("GeometryNodeSetPosition", geometry, Offset=offset)
+    tree.output("NodeGroupOutput", geometry)
+    return group
+
+
+def _time(tree, given):
+    """Add nodes for the time from 0 at the first frame to 1 at the last; return the last one."""
+    since = tree.math("SUBTRACT", tree.node("GeometryNodeInputSceneTime").outputs["Frame"], given[_FIRST])
+    return tree.math("DIVIDE", tree.math("MAXIMUM", since, 0.0), given[_FRAMES])
+
+
+def _sum(tree, formula, time):
+    """Add nodes for the sum of all modes at a time; return the last one."""
+    total = 0.0
+    for number, rate in enumerate(formula.rates, 1):
+        share = tree.math(formula.function, tree.math("MULTIPLY", time, float(rate)))
+        total = tree.math("MULTIPLY_ADD", share, tree.attribute(mode_name(number), "FLOAT"), total)
+    return total
+
+
+def forget_groups():
+    """Remove the nodes of motions that nothing uses any more."""
+    for group in [item for item in bpy.data.node_groups if MOTION_TAG in item and not item.users]:
+        bpy.data.node_groups.remove(group)
