@@ -1,9 +1,9 @@
 """The public names of core, a line each, and where they are: `core/__init__.py` imports them as they are asked for."""
 
-from .applications.cleaning import clean_points as clean_points
 from .applications.alignment import Alignment as Alignment
 from .applications.alignment import align as align
 from .applications.alignment import match_places as match_places
+from .applications.cleaning import clean_points as clean_points
 from .applications.coarse_deformation import CoarseDeformer as CoarseDeformer
 from .applications.coarse_deformation import coarse_deformer as coarse_deformer
 from .applications.deformation import Deformation as Deformation
@@ -36,15 +36,15 @@ from .applications.meshing import mesh_surface as mesh_surface
 from .applications.meshing import values_on_mesh as values_on_mesh
 from .applications.minimal_surface import MinimalSurface as MinimalSurface
 from .applications.minimal_surface import minimal_surface as minimal_surface
-from .applications.paths import geodesic_path as geodesic_path
-from .applications.paths import polygon_length as polygon_length
-from .applications.regions import Region as Region
-from .applications.regions import measure_region as measure_region
 from .applications.motion import Heat as Heat
 from .applications.motion import Wave as Wave
 from .applications.motion import WaveState as WaveState
+from .applications.paths import geodesic_path as geodesic_path
+from .applications.paths import polygon_length as polygon_length
 from .applications.reaction import Mixture as Mixture
 from .applications.reaction import ReactionDiffusion as ReactionDiffusion
+from .applications.regions import Region as Region
+from .applications.regions import measure_region as measure_region
 from .applications.segmentation import modes_needed as modes_needed
 from .applications.segmentation import nodal_domains as nodal_domains
 from .applications.segmentation import segment as segment
