@@ -202,9 +202,12 @@ FIRST = {  # what is there before tools that a sphere with groups is not enough 
     "minimal_surface": (film, {}),
     "separate_by_segment": (parted, {}),
     "signature": (handled, {"count": 3, "modes": 10}),
+    "simulate": (handled, {"frames": 3}),
     "signed_distance": (crossed, {"curve": "Curve"}),
 }
 VARIANTS = [
+    (handled, "simulate", {"kind": "FRONT", "frames": 3, "height": 0.1}),
+    (handled, "simulate", {"keep": "MODES", "modes": 4}),
     (handled, "analyze", {"modes": 4}),
     (shared, "analyze", {}),
     (handled, "spectrum", {}),
