@@ -94,7 +94,7 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
         straight = length_text(core.polygon_length(laplacian.points[ends]))
         line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
 
-        def draw():
+        def add():
             made = _curve(f"{obj.name} Path", reading.local(path), self.thickness)
             for collection in obj.users_collection:
                 collection.objects.link(made)
@@ -104,7 +104,7 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
             self.note(f"{obj.name}: {line}", obj)
             return f"{made.name} is {line}"
 
-        return draw
+        return add
 
 
 def _curve(name, places, thickness):
