@@ -90,7 +90,8 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
                 f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
             )
         reading, laplacian = analyzed(context, obj)
-        path = cache.result(laplacian, "path", ends, compute=lambda: core.geodesic_path(laplacian, *ends.tolist()))
+        geodesics = cache.geodesics(laplacian, lambda *_: None)
+        path = core.geodesic_path(laplacian, *ends.tolist(), geodesics=geodesics)
         straight = length_text(core.polygon_length(laplacian.points[ends]))
         line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
 
