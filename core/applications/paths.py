@@ -21,7 +21,14 @@ _FARTHEST = 1.0  # spacings that a point of the path moves in one round, at most
 _MOST = 20_000  # sides of the polygon
 
 
-def geodesic_path(laplacian: LaplaceBeltrami, start: int, end: int, *, progress: Progress | None = None) -> Floats:
+def geodesic_path(
+    laplacian: LaplaceBeltrami,
+    start: int,
+    end: int,
+    *,
+    geodesics: Geodesics | None = None,
+    progress: Progress | None = None,
+) -> Floats:
     """Find the shortest path along the surface from a point to another.
 
     Parameters
@@ -30,6 +37,8 @@ def geodesic_path(laplacian: LaplaceBeltrami, start: int, end: int, *, progress:
         Of n points.
     start, end : int
         Two of them.
+    geodesics : Geodesics, optional
+        Of the same operator, if there is one: most of the work for a single path.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -74,7 +83,7 @@ def geodesic_path(laplacian: LaplaceBeltrami, start: int, end: int, *, progress:
     ends = laplacian.points[[first, last]]
     if first == last:
         return ends
-    corners = Geodesics(laplacian, progress=progress).corners(first, last)
+    corners = (geodesics or Geodesics(laplacian, progress=progress)).corners(first, last)
     report("Path", 0.5)
     path = _Path(laplacian, corners)
     path.straighten(lambda share: report("Path", 0.5 + 0.5 * share))

@@ -90,6 +90,8 @@ class Unwrap(Tool):
     )
 
     def plan(self, context, obj):
+        if np.isnan(self.radius):
+            raise PointCloudError("The radius of the texture is not a number. Use one from 0 on.")
         sources = np.flatnonzero(read_sources(obj, self.group))
         reading, operator = operator_reader(context, obj)
         points = reading.points[sources]

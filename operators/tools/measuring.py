@@ -90,11 +90,12 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
                 f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
             )
         reading, laplacian = analyzed(context, obj)
-        path = cache.result(laplacian, "path", ends, compute=lambda: core.geodesic_path(laplacian, *ends.tolist()))
+        geodesics = cache.geodesics(laplacian, lambda *_: None)
+        path = core.geodesic_path(laplacian, *ends.tolist(), geodesics=geodesics)
         straight = length_text(core.polygon_length(laplacian.points[ends]))
         line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
 
-        def draw():
+        def add():
             made = _curve(f"{obj.name} Path", reading.local(path), self.thickness)
             for collection in obj.users_collection:
                 collection.objects.link(made)
@@ -104,7 +105,7 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
             self.note(f"{obj.name}: {line}", obj)
             return f"{made.name} is {line}"
 
-        return draw
+        return add
 
 
 def _curve(name, places, thickness):

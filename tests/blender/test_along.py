@@ -181,3 +181,9 @@ class TestSignedDistance:
         assert run("signed_distance", curve="Line") == {"FINISHED"}
         assert (attribute(two, "lb_signed_distance")[900:] == 0.0).all()
         assert "300 points of Cloud are reached by no source" in capfd.readouterr().out
+
+
+def test_a_radius_that_is_no_number_is_refused():
+    obj = add_object(sphere_points(300))
+    with refused(obj, "radius of the texture is not a number"):
+        bpy.ops.meshfree.unwrap(radius=float("nan"))
