@@ -10,7 +10,7 @@ from ..types import Floats, Ints
 from .boundary import Boundary
 from .cells import Cells
 from .moments import least_error
-from .nearest import ROUNDS, Nearest
+from .nearest import FURTHEST, POWER, ROUNDS, Nearest
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
@@ -20,9 +20,7 @@ _FEWEST = (
 _WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
 _MET = 3e-3  # relative error of the moments that no wider kernel is tried for
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
-_POWER = 8  # of the mean over the neighbourhood: the widest cells, and kernels, decide
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
-_FURTHEST = 2.5  # spacings that a gap may be wide, as in rows 25 times denser along than across: it is a hole otherwise
 
 
 def smoothing_lengths(
@@ -64,7 +62,7 @@ def smoothing_lengths(
         ask for more, so that h varies less.
     """
     if options.bandwidth == "adaptive":
-        lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, _POWER)
+        lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, POWER)
         cell = _repeat(nearest.averaging(), cells.areas, ROUNDS)
         lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(_FEWEST / np.pi * cell) / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
@@ -98,7 +96,7 @@ def _widening(
         better = found < least
         rows, least = rows[better], found[better]
         result[rows] = factor
-    return (averaging @ result**_POWER) ** (1.0 / _POWER)
+    return (averaging @ result**POWER) ** (1.0 / POWER)
 
 
 def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
@@ -113,7 +111,7 @@ def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
     power : int
         Of the mean: in the eighth the widest gaps decide.
     """
-    radius = np.minimum(radius, _FURTHEST * nearest.spacing)
+    radius = np.minimum(radius, FURTHEST * nearest.spacing)
     return _repeat(nearest.averaging(), radius**power, ROUNDS) ** (1.0 / power)
 
 

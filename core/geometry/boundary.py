@@ -11,7 +11,8 @@ from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
-from .nearest import COUNT, ON, SMOOTH, Nearest, fading_weights
+from .nearest import AGREEING, COUNT, FURTHEST, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
+from .noise import LEFT
 from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
@@ -19,7 +20,6 @@ from .sheets import on_sheet
 _BLOCK = 1 << 13  # points looked at at one time
 _GAP = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
-_FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
 _BESIDE = 16  # the nearest of them, by which those that face elsewhere are found: on coarse balls more lie behind
 _AROUND = 5.0  # radii of the empty place that candidates must go around it, of 2 pi: chance leaves some of them out
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
@@ -27,10 +27,6 @@ _CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at leas
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
-_EXACT = 0.1  # of the spacing: candidates that scatter less about the boundary's course lie on it
-_NEAREST = 8  # power of the doubt in what a boundary point tells: the nearest ones on one side of a corner decide
-_STRAIGHT = 0.8  # cosine of the directions across one course of the boundary, at least
-_FURTHER = 2.0  # times the measured distance, and spacings more, within which a point of the boundary must lie
 
 
 @dataclass(frozen=True)
@@ -130,12 +126,12 @@ def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
     cosine = np.einsum("ikc,ic->ik", oriented[nearest.index[rows]], oriented[rows])
     beside = nearest.apart[rows]
     beside[:, :_BESIDE] |= np.abs(cosine[:, :_BESIDE]) < SMOOTH
-    return np.count_nonzero(beside, axis=1) > _FOLDED
+    return np.count_nonzero(beside, axis=1) >= AGREEING
 
 
 def _label_courses(points: Floats, reach: Floats) -> Ints:
     """Number the boundaries that boundary points, (k, 3), lie on; those of one are within reach of each other."""
-    distance, other = cKDTree(points).query(points, k=min(9, len(points)), workers=-1)
+    distance, other = cKDTree(points).query(points, k=min(NEXT + 1, len(points)), workers=-1)
     return label_connected(other, distance <= reach[:, None])
 
 
@@ -185,21 +181,21 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
         # Near candidates are best, and those away from corners of the boundary.
-        doubt = (near + _FURTHER * spacing) * course.scatter[seen]
+        doubt = (near + spacing) * course.scatter[seen]
         distance, curvature = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
         eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
         for side in (0, 1):
             best = np.argmin(np.where(eligible, doubt, np.inf), axis=1)
             ahead = course.outward[seen[every, best]]
-            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > _STRAIGHT)
-            trust = np.where(same, (doubt / doubt.min(axis=1, keepdims=True)) ** -_NEAREST, 0.0)
+            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > SMOOTH)
+            trust = np.where(same, (doubt / doubt.min(axis=1, keepdims=True)) ** -POWER, 0.0)
             total = trust.sum(axis=1)
             known = same.any(axis=1)
             total[~known] = 1.0
             measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
             # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
-            known &= np.where(same, near, np.inf).min(axis=1) <= _FURTHER * (measured + spacing[:, 0])
+            known &= np.where(same, near, np.inf).min(axis=1) <= measured + FURTHEST * spacing[:, 0]
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
@@ -207,7 +203,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
                 # Around a corner that the surface fills, the second boundary lies inside the first, across it.
                 chosen = seen[every, best][:, None]
                 apart, expected = course.ahead(nearest.points, chosen, seen)
-                other = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _STRAIGHT
+                other = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < SMOOTH
                 eligible = other & (apart < ON * spacing) & (near < reach[block, None])
                 eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > SMOOTH
 
@@ -270,7 +266,7 @@ def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     label = _label_courses(points[rows], np.full(len(rows), np.inf))
     fitted = np.clip(np.bincount(label)[label] // _PART, *_CURVE)[:, None]
     across = outward_directions(nearest, normals, rows)
-    near = other[:, :9]
+    near = other[:, : NEXT + 1]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
     across = _tangents(np.einsum("ik,ikc->ic", side, across[near]), normals[rows])
     along = np.cross(normals[rows], across)
@@ -287,11 +283,11 @@ def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     for half in (t < ON * spacing[:, None], t > -ON * spacing[:, None]):
         enough = np.count_nonzero(half & (weight > 0.0), axis=1) >= FEWEST
         other_fit, other_scatter = _parabola(t, e, np.where(half | ~enough[:, None], weight, 0.0))
-        better = enough & (scatter > _KINK * other_scatter + _EXACT * spacing)
+        better = enough & (scatter > _KINK * other_scatter + LEFT * spacing)
         fit[better], scatter[better] = other_fit[better], other_scatter[better]
     close = np.where(np.arange(other.shape[1]) < fitted // 2, scatter[other] * unit[other, 0], np.nan)
     usual = np.nanmedian(close, axis=1) / unit[:, 0]
-    relative = np.maximum((scatter + _EXACT * spacing) / (usual + _EXACT * spacing), 1.0)
+    relative = np.maximum((scatter + LEFT * spacing) / (usual + LEFT * spacing), 1.0)
     fit[:, 0] += _LEVEL * usual
     fit *= np.concatenate([unit, np.ones_like(unit), 1.0 / unit], axis=1)
     outward = across - fit[:, 1:2] * along

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 RIDGE = 1e-3  # added to the entropy's Hessian, where the points do not determine the terms
 _MOST = (COUNT, 64, 160)  # neighbours looked at, more where the kernel holds more; beyond, any sampling is dense enough
-_LARGEST = 1.0  # change of the logarithm of a weight: a single point leaves as much to the other ends of its pairs
+LARGEST = 2.0  # change of the logarithm of a weight: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
 _SMALL = 1e-3  # relative error of the moments that is none
 _BLOCK = 1 << 11
@@ -140,7 +140,8 @@ def _solve(terms: Floats, weights: Floats) -> Floats:
     result, coefficients = np.full(len(rows), np.inf), np.zeros((TERMS, len(rows)), dtype=terms.dtype)
     for step in range(_STEPS + 1):
         power = np.einsum("tik,ti->ik", terms, coefficients)
-        weighted = weights * np.exp(np.clip(power, -_LARGEST, _LARGEST))
+        # The other ends of its pairs add as much as a single point.
+        weighted = weights * np.exp(np.clip(power, -0.5 * LARGEST, 0.5 * LARGEST))
         products = [weighted * term for term in terms]
         missing = -np.array([product.sum(axis=1) for product in products])
         missing[0] += 1.0

@@ -13,9 +13,13 @@ from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, fit_quadrics
 
 COUNT = 41  # the point itself and 40 others
+NEXT = 8  # nearest of them: as many as there are directions in which a sheet or a row goes on
+AGREEING = 3  # neighbours that say the same are believed: there are as many faces at a corner; fewer may be chance
 ROUNDS = 9  # of averaging over neighbours, after which values vary with the place and not from point to point
+POWER = 8  # of a mean that its greatest values decide
 ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
+FURTHEST = 2.5  # spacings that a gap may be wide, as in rows 25 times denser along than across: it is a hole otherwise
 _MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
 
 

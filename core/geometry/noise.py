@@ -5,14 +5,14 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..types import Floats, Ints
-from .nearest import Nearest, fading_weights
+from .nearest import COUNT, Nearest, fading_weights
 from .quadrics import fit_quadrics
 
-_FEW = 20  # neighbours of the fit that separates noise from shape, compared with that to all 40
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
 AVERAGINGS = 4  # rounds of averaging over the neighbourhood
 _LEAST = 0.02  # noise below this share of the spacing is left alone
-LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
+LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours; a boundary
+# whose points scatter no more runs through them
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
 _NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round the shape
@@ -22,7 +22,7 @@ _BLOCK = 1 << 12  # points projected at one time
 def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
     """Return how far quadrics through 20 neighbours miss these, of all m points or of some rows, (k,)."""
     rows = np.arange(len(nearest.points)) if rows is None else rows
-    part = slice(_FEW + 1)
+    part = slice(COUNT // 2 + 1)  # with the point itself
     weight = fading_weights(nearest.distance[rows, part])
     return fit_quadrics(nearest.points, nearest.index[rows, part], weight, rows).misfit
 

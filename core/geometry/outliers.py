@@ -4,13 +4,12 @@ import numpy as np
 
 from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints
-from .nearest import ON, Nearest
+from .nearest import AGREEING, ON, Nearest
 from .noise import FILLING
 from .quadrics import Quadrics, fit_quadrics, heights_over
 
 # Neighbours asked: near ones, and some further away, where the density may be another.
 _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
-_AGREEING = 3  # of them that are enough, as on each of the three faces at a corner
 _SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
 _SPARSE = 2.5  # median spacings between points whose witnesses must show a surface that thin
 _BLOCK = 1 << 13  # points looked at at one time
@@ -92,7 +91,7 @@ def _witnesses(nearest: Nearest, rows: Ints) -> Ints:
 
 
 def _third(values: Floats) -> Floats:
-    return np.partition(values, _AGREEING - 1, axis=1)[:, _AGREEING - 1]
+    return np.partition(values, AGREEING - 1, axis=1)[:, AGREEING - 1]
 
 
 def _heights(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:

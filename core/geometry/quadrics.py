@@ -11,6 +11,7 @@ from ..types import Floats, Ints
 _BLOCK = 1 << 13  # points fitted at one time
 _CURVE = 5e-3  # roundness of neighbours on a curve
 _CURVES = 0.01  # share of the points around which they may be
+CURVED = 0.3  # share by which curvature may change a length, an area or a weight at most, where the fit is poor
 _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie on a conic
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..algebra import Anderson, inverses, on_all_cores
-from ..geometry import RIDGE, TERMS, EdgeTerms, dots, frames, put_terms
+from ..geometry import LARGEST, RIDGE, TERMS, EdgeTerms, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 _ROUNDS = 16  # of the solver, at most
 _AGAIN = 0, 2, 6  # rounds before which the Hessian is computed
 _ENOUGH = 3e-4  # root mean square of that over h, which a first moment makes of a slope, at which it stops
-_LARGEST = 2.0  # largest change of the logarithm of a weight: where more is needed the moments cannot be met
 _SMALLEST = 1e-8  # regularization of the extrapolation, see `Anderson`
 
 
@@ -198,4 +197,4 @@ def _factor(patch: Patch, basis: Floats, terms: Floats) -> Floats:
     """Return the factor of the weights of a patch, from the terms of its pairs and their coefficients, (5, m)."""
     power = np.einsum("tp,tp->p", basis[0], patch.first(terms))
     power += np.einsum("tp,tp->p", basis[1], patch.second(terms))
-    return np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST))
+    return np.exp(np.clip(0.5 * power, -LARGEST, LARGEST))
