@@ -9,16 +9,12 @@ from ..options import LaplacianOptions
 from ..types import Floats, Ints
 from .boundary import Boundary
 from .cells import Cells
-from .moments import least_error
-from .nearest import FURTHEST, POWER, ROUNDS, Nearest
+from .moments import MET, least_error
+from .nearest import ENOUGH, FURTHEST, POWER, ROUNDS, Nearest
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
-_FEWEST = (
-    24  # cells inside the kernel at least, so that weights are left to choose where five moments of a point are met
-)
 _WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
-_MET = 3e-3  # relative error of the moments that no wider kernel is tried for
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
 
@@ -64,7 +60,7 @@ def smoothing_lengths(
     if options.bandwidth == "adaptive":
         lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, POWER)
         cell = _repeat(nearest.averaging(), cells.areas, ROUNDS)
-        lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(_FEWEST / np.pi * cell) / SUPPORT)
+        lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(ENOUGH / np.pi * cell) / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
@@ -90,7 +86,7 @@ def _widening(
     least = error(rows, factor)
     for _ in range(_TIMES):
         # Where the moments are met, or better than what more of the bend costs, nothing is to be gained.
-        open_ = least > np.maximum((_WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + _MET)
+        open_ = least > np.maximum((_WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + MET)
         rows, least, factor = rows[open_], least[open_], _WIDER * factor
         found = error(rows, factor)
         better = found < least

@@ -21,7 +21,7 @@ RIDGE = 1e-3  # added to the entropy's Hessian, where the points do not determin
 _MOST = (COUNT, 64, 160)  # neighbours looked at, more where the kernel holds more; beyond, any sampling is dense enough
 LARGEST = 2.0  # change of the logarithm of a weight: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
-_SMALL = 1e-3  # relative error of the moments that is none
+MET = 3e-3  # relative error of the moments that is small enough: no wider kernel is tried for less
 _BLOCK = 1 << 11
 
 
@@ -97,7 +97,7 @@ def least_error(
                 distance, index = nearest.tree.query(nearest.points[asked], k=min(most, len(normals)))
             found[open_] = solve(asked, distance[:, 1:], index[:, 1:])
             # More neighbours can only meet the moments better.
-            more = (distance[:, -1] <= SUPPORT * lengths[asked]) & (len(normals) > most) & (found[open_] > _SMALL)
+            more = (distance[:, -1] <= SUPPORT * lengths[asked]) & (len(normals) > most) & (found[open_] > MET)
             open_ = open_[more]
             if not len(open_):
                 return
@@ -146,7 +146,7 @@ def _solve(terms: Floats, weights: Floats) -> Floats:
         missing = -np.array([product.sum(axis=1) for product in products])
         missing[0] += 1.0
         result[rows] = np.minimum(result[rows], np.linalg.norm(missing, axis=0))
-        open_ = result[rows] > _SMALL
+        open_ = result[rows] > MET
         if step == _STEPS or not open_.any():
             break
         equations = np.empty((TERMS, TERMS + 1, len(rows)))

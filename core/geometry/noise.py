@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..types import Floats, Ints
-from .nearest import COUNT, Nearest, fading_weights
+from .nearest import COUNT, ENOUGH, Nearest, fading_weights
 from .quadrics import fit_quadrics
 
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
@@ -15,7 +15,7 @@ LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with th
 # whose points scatter no more runs through them
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
-_NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round the shape
+_LARGEST = 90  # neighbours of the fit that points are projected on, at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
 
 
@@ -93,7 +93,7 @@ def project_points(tree: cKDTree, rows: Ints, noise: Floats, component: Ints | N
     """
     smallest = tree.n if component is None else np.bincount(component).min()
     # A quadric has six coefficients.
-    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, *_NEIGHBORS)
+    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, ENOUGH, _LARGEST)
     many = np.minimum(asked.astype(int), smallest - 1)
     order = np.argsort(many, kind="stable")  # those who ask for few neighbours do not wait for others' many
     result = np.empty((len(rows), 3))

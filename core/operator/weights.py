@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..geometry import Cloud, Patch
 
 _ROUNDS = 16  # of the solver, at most
-_AGAIN = 0, 2, 6  # rounds before which the Hessian is computed
 _ENOUGH = 3e-4  # root mean square of that over h, which a first moment makes of a slope, at which it stops
 _SMALLEST = 1e-8  # regularization of the extrapolation, see `Anderson`
 
@@ -86,7 +85,7 @@ def balance_weights(
         residual = np.linalg.norm(missing, axis=1)
         if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
-        if step in _AGAIN:
+        if step <= _ROUNDS // 2 and (step + 2).bit_count() == 1:  # the Hessian, each time for twice as many rounds
             inverse = inverses(moments.curvature(terms) + RIDGE * np.eye(TERMS))
             acceleration = Anderson(_SMALLEST)
         change = np.einsum("iab,ib->ia", inverse, missing - RIDGE * terms)
