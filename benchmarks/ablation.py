@@ -32,7 +32,6 @@ from core.operator import areas, curvature, images, stiffness, weights
 
 from .real_shapes import (
     MODES,
-    SAMPLINGS,
     eigenvalue_error,
     noisy_points,
     random_points,
@@ -59,11 +58,12 @@ DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"
 NOTE = """\
 The effect of each correction and each constant between the coordinates and the stiffness matrix. Every figure is the
 ratio of the error with the change to the error without it, as geometric mean of a group; above 1 the change increases
-the error. *Zoo*: seven shapes of 3,000 random points, one of them open, vertices of three meshes, points seen from four
-viewpoints, noise of 0.3 spacings, 5 % of outliers. *Awkward*: a sphere whose halves have densities of 30 : 1, and a
-sphere sampled on circles of latitude. *Smooth*: spheres of 2,000 random and even points, and a hemisphere. Errors of
-area and eigenvalues below 0.1 % count as 0.1 %, on smooth shapes below 0.01 % as 0.01 %. Boundary: number of points
-wrongly found at a boundary, plus one.
+the error. *Zoo*: 1,200 points of two shapes at random, of one as seen from four viewpoints, of one with noise of 0.3
+spacings, and of one with 10 % of outliers. *Awkward*: a sphere whose halves have densities of 30 : 1, a sphere sampled
+on circles of latitude, and one with noise of 0.8 spacings. *Smooth*: random and even spheres, one with noise of 0.05
+spacings, a hemisphere, and a square of 400 random points. Errors of area and eigenvalues below 0.1 % count as 0.1 %, on
+smooth shapes below 0.01 % as 0.01 %. Boundary: number of points wrongly found at a boundary, plus one. So few points
+show which constants matter; what they cost or gain on real shapes is in the messages of the commits.
 
 Made by `MESHFREE_ZOO=folder python -m benchmarks.ablation`.
 """
@@ -112,13 +112,7 @@ def globe(rings, sides):
 
 def square():
     """Random points of a unit square: all that four corners of a boundary ask for."""
-    return np.column_stack([np.random.default_rng(0).random((900, 2)), np.zeros(900)])
-
-
-def lines():
-    """A square of rows that are ten times as far apart as their points."""
-    x, y = np.meshgrid((np.arange(120) + 0.5) / 120, (np.arange(12) + 0.5) / 12)
-    return np.stack([x, y, np.zeros_like(x)], axis=2).reshape(-1, 3)
+    return np.column_stack([np.random.default_rng(0).random((400, 2)), np.zeros(400)])
 
 
 def noisy_sphere(noise, count=900):
@@ -134,21 +128,19 @@ def cases():
     whole = 4.0 * np.pi
     flat = np.sort((np.pi**2 * (np.arange(12)[:, None] ** 2 + np.arange(12) ** 2)).ravel())[:MODES]
     samplings = {
-        "random": lambda v, f: random_points(v, f, 1_500)[0],
-        "vertices": SAMPLINGS["vertices"],
-        "seen": lambda v, f: seen_points(v, f, 1_500),
-        "noise": lambda v, f: noisy_points(v, f, 1_500, 0.3),
-        "outliers": lambda v, f: with_outliers(v, f, 1_500, 0.05),
+        "random": lambda v, f: random_points(v, f, 1_200)[0],
+        "seen": lambda v, f: seen_points(v, f, 1_200),
+        "noise": lambda v, f: noisy_points(v, f, 1_200, 0.3),
+        "outliers": lambda v, f: with_outliers(v, f, 1_200, 0.1),
     }
     for name, sampling in (
-        *(("rocker-arm", "random"), ("fandisk", "random"), ("face", "random"), ("spot", "vertices")),
-        *(("rocker-arm", "seen"), ("cat", "noise"), ("rocker-arm", "outliers")),
+        *(("rocker-arm", "random"), ("face", "random"), ("rocker-arm", "seen"), ("cat", "noise")),
+        ("rocker-arm", "outliers"),
     ):
         vertices, faces, exact = zoo[name]
         yield "zoo", f"{name} {sampling}", samplings[sampling](vertices, faces), 1.0, exact, name == "face"
-    yield "awkward", "jump", jump(30.0, 1_500), whole, sphere, False
+    yield "awkward", "jump", jump(30.0, 1_200), whole, sphere, False
     yield "awkward", "globe", globe(24, 48), whole, sphere, False
-    yield "awkward", "lines", lines(), 1.0, flat, True
     yield "awkward", "much noise", noisy_sphere(0.8), whole, sphere, False
     yield "smooth", "random sphere", random_sphere(1_200), whole, sphere, False
     yield "smooth", "even sphere", fibonacci_sphere(800), whole, sphere, False

@@ -10,11 +10,11 @@ from ..types import Floats, Ints
 from .boundary import Boundary
 from .cells import Cells
 from .moments import MET, least_error
-from .nearest import ENOUGH, FURTHEST, POWER, ROUNDS, Nearest
+from .nearest import ENOUGH, GAP, POWER, ROUNDS, Nearest
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
-_WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
+_WIDER = 1.3  # each width that is tried over the last one
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
 
@@ -53,9 +53,9 @@ def smoothing_lengths(
         twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: as narrow as the points
         and the shape let it be. It starts from 1.08 times the radius of the cells around, in the eighth mean, times the
         factor: the width of a gap in one direction decides, not the number of points in the others. Where a wider
-        kernel would meet its moments better by more than the bend of the surface costs it, it is up to 2.2 times as
-        wide. Even points have some 22 others inside it then, random ones 55. A larger factor leaves fewer points that
-        ask for more, so that h varies less.
+        kernel would meet its moments better by more than the bend of the surface costs it, it is wider. Even points
+        have some 22 others inside it then, random ones 55. A larger factor leaves fewer points that ask for more, so
+        that h varies less.
     """
     if options.bandwidth == "adaptive":
         lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, POWER)
@@ -84,7 +84,7 @@ def _widening(
     bend = _BENT * lengths**2 * (averaging @ np.einsum("iab,iab->i", quadrics.shape_operator, quadrics.shape_operator))
     rows, result, factor = np.arange(len(lengths)), np.ones(len(lengths)), 1.0
     least = error(rows, factor)
-    for _ in range(_TIMES):
+    while len(rows):
         # Where the moments are met, or better than what more of the bend costs, nothing is to be gained.
         open_ = least > np.maximum((_WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + MET)
         rows, least, factor = rows[open_], least[open_], _WIDER * factor
@@ -107,7 +107,7 @@ def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
     power : int
         Of the mean: in the eighth the widest gaps decide.
     """
-    radius = np.minimum(radius, FURTHEST * nearest.spacing)
+    radius = np.minimum(radius, GAP * nearest.spacing)
     return _repeat(nearest.averaging(), radius**power, ROUNDS) ** (1.0 / power)
 
 

@@ -11,16 +11,15 @@ from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
-from .nearest import AGREEING, COUNT, FEW, FURTHEST, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
+from .nearest import AGREEING, COUNT, FEW, GAP, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
 from .noise import LEFT
 from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
-_GAP = np.radians(100.0)  # widest angle without a neighbour, at least
+_ANGLE = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
-_BESIDE = 16  # the nearest of them, by which those that face elsewhere are found: on coarse balls more lie behind
 _AROUND = 5.0  # radii of the empty place that candidates must go around it, of 2 pi: chance leaves some of them out
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _MOST = 34  # candidates that the boundary's course is fitted to, at most
@@ -102,7 +101,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
         gap = np.fmax.reduce(np.diff(around, axis=1), axis=1)
         # Neighbours left out sort last, as NaN: the gap over the end is counted from the last known angle.
         gap = np.fmax(gap, angle[:, 0] + 2.0 * np.pi - np.fmax.reduce(angle, axis=1))
-        return block[gap > _GAP]
+        return block[gap > _ANGLE]
 
     rows = np.concatenate(on_all_cores(facing_a_gap, blocks(len(points), _BLOCK)))
     if not len(rows):
@@ -125,7 +124,8 @@ def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
     """Tell around which points neighbours lie off their sheet or face elsewhere: it goes on there, past an edge."""
     cosine = np.einsum("ikc,ic->ik", oriented[nearest.index[rows]], oriented[rows])
     beside = nearest.apart[rows]
-    beside[:, :_BESIDE] |= np.abs(cosine[:, :_BESIDE]) < SMOOTH
+    near = slice(FEW)  # on coarse balls those further away lie behind
+    beside[:, near] |= np.abs(cosine[:, near]) < SMOOTH
     return np.count_nonzero(beside, axis=1) >= AGREEING
 
 
@@ -195,7 +195,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
             total[~known] = 1.0
             measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
             # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
-            known &= np.where(same, near, np.inf).min(axis=1) <= measured + FURTHEST * spacing[:, 0]
+            known &= np.where(same, near, np.inf).min(axis=1) <= measured + GAP * spacing[:, 0]
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)

@@ -17,11 +17,10 @@ if TYPE_CHECKING:
     from .boundary import Boundary
 
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
-RIDGE = 1e-3  # added to the entropy's Hessian, where the points do not determine the terms
 _MOST = (COUNT, 64, 160)  # neighbours looked at, more where the kernel holds more; beyond, any sampling is dense enough
 LARGEST = 2.0  # change of the logarithm of a weight: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
-MET = 3e-3  # relative error of the moments that is small enough: no wider kernel is tried for less
+MET = 2e-3  # relative error of the moments that is small enough, for a kernel, and for a ridge under the terms
 _BLOCK = 1 << 11
 
 
@@ -153,7 +152,7 @@ def _solve(terms: Floats, weights: Floats) -> Floats:
         for row, product in enumerate(products):
             for column in range(row + 1):
                 equations[row, column] = equations[column, row] = np.einsum("ik,ik->i", product, terms[column])
-        equations[range(TERMS), range(TERMS)] += RIDGE
+        equations[range(TERMS), range(TERMS)] += MET
         equations[:, TERMS] = missing
         change = eliminate(equations)[:, TERMS]
         coefficients += (change / np.maximum(np.linalg.norm(change, axis=0), 1.0)).astype(terms.dtype)

@@ -5,11 +5,10 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..types import Floats, Ints
-from .nearest import COUNT, ENOUGH, Nearest, fading_weights
+from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights
 from .quadrics import fit_quadrics
 
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
-AVERAGINGS = 4  # rounds of averaging over the neighbourhood
 _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours; a boundary
 # whose points scatter no more runs through them
@@ -43,7 +42,7 @@ def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
     """
     averaging = nearest.averaging()
     logarithms = np.log(np.maximum(np.stack(misfits, axis=1) / nearest.spacing[:, None], 1e-12))
-    for _ in range(AVERAGINGS):
+    for _ in range(ROUNDS // 2):
         logarithms = averaging @ logarithms
     means: Floats = np.exp(logarithms.T)
     return means

@@ -4,14 +4,13 @@ import numpy as np
 
 from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints
-from .nearest import AGREEING, ON, Nearest
+from .nearest import AGREEING, GAP, ON, Nearest
 from .noise import FILLING
 from .quadrics import Quadrics, fit_quadrics, heights_over
 
 # Neighbours asked: near ones, and some further away, where the density may be another.
 _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
 _SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
-_SPARSE = 2.5  # median spacings between points whose witnesses must show a surface that thin
 _BLOCK = 1 << 13  # points looked at at one time
 
 
@@ -69,7 +68,7 @@ def _off_surface(nearest: Nearest, surface: Quadrics, alone: _Alone, known: Bool
     """Tell which points lie off the surface, those that are known to among them, (m,) bool."""
     spacing, result = nearest.spacing, known.copy()
     off = _third(_heights(nearest, surface, np.arange(len(spacing))))
-    sparse = spacing > _SPARSE * np.median(spacing)
+    sparse = spacing > GAP * np.median(spacing)  # their witnesses must show a surface that thin
     suspects = np.flatnonzero(~known & ((off > ON * spacing) | (sparse & (surface.misfit > ON * spacing))))
     if not len(suspects):
         return result

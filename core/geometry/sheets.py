@@ -14,12 +14,13 @@ from ..algebra import blocks, on_all_cores
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import pair_heights
-from .nearest import COUNT, FEW, NEXT, ON, SMOOTH, Nearest
+from .nearest import COUNT, NEXT, ON, SMOOTH, Nearest
 from .pairs import Pairs
 from .patches import Patch
 from .quadrics import Quadrics, check_surface, fit_quadrics, frames
 
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
+_SEEDS = 9  # nearest neighbours, every two of which make such a plane
 _BLOCK = 1 << 11
 _AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
 # eighth; points that many spacings apart touch
@@ -162,7 +163,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
 
 
 def _own_plane(offset: Floats, weight: Floats, spacing: Floats) -> Array:
-    first, second = np.triu_indices(min(FEW, offset.shape[1] - 1), 1)
+    first, second = np.triu_indices(min(_SEEDS, offset.shape[1] - 1), 1)
     nearby = offset[:, 1 : COUNT // 2 + 1]
     a, b = offset[:, 1 + first], offset[:, 1 + second]
     normal = np.cross(a, b)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..algebra import Anderson, inverses, on_all_cores
-from ..geometry import LARGEST, RIDGE, TERMS, EdgeTerms, dots, frames, put_terms
+from ..geometry import LARGEST, MET, TERMS, EdgeTerms, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
@@ -86,9 +86,9 @@ def balance_weights(
         if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
         if step <= _ROUNDS // 2 and (step + 2).bit_count() == 1:  # the Hessian, each time for twice as many rounds
-            inverse = inverses(moments.curvature(terms) + RIDGE * np.eye(TERMS))
+            inverse = inverses(moments.curvature(terms) + MET * np.eye(TERMS))
             acceleration = Anderson(_SMALLEST)
-        change = np.einsum("iab,ib->ia", inverse, missing - RIDGE * terms)
+        change = np.einsum("iab,ib->ia", inverse, missing - MET * terms)
         change /= np.maximum(np.linalg.norm(change, axis=1, keepdims=True), 1.0)
         terms = acceleration.extrapolate(terms, terms + change)
     return Balance(moments.factor(terms), residual)
