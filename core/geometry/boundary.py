@@ -11,11 +11,11 @@ from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
-from .nearest import AGREEING, COUNT, FEW, GAP, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
+from .nearest import AGREEING, COUNT, FEW, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
 from .noise import LEFT
 from .points import FEWEST
 from .quadrics import frames
-from .sheets import on_sheet
+from .sheets import TOUCHING, on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
 _ANGLE = np.radians(100.0)  # widest angle without a neighbour, at least
@@ -195,7 +195,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
             total[~known] = 1.0
             measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
             # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
-            known &= np.where(same, near, np.inf).min(axis=1) <= measured + GAP * spacing[:, 0]
+            known &= np.where(same, near, np.inf).min(axis=1) <= measured + TOUCHING * spacing[:, 0]
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
