@@ -14,7 +14,7 @@ from ..algebra import chebyshev_terms, on_all_cores
 from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
-from ..types import Floats, Report
+from ..types import Bools, Floats, Report
 from .curvature import kernel_integral, uneven
 from .images import mirror, own_images
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..geometry import Boundary, Cloud, Pairs, Patch
 
 _FLOOR = 0.5  # least area in units of that of the Voronoi cell: all stay positive
-_DEGREE = 50  # of the polynomial that solves for the areas
+_DEGREE = 100  # of the polynomial of the first round; half of it of the second, for what the floor changed in the first
 _WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] separates from zero
 _EVEN = 1e-9  # changes of h, as a share, that are rounding
 _MANY = 1 << 20  # pairs from which a product takes longer than to start threads
@@ -165,14 +165,15 @@ class KernelMatrix:
 
 
 def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
-    """Solve A v = b by a polynomial in A, from the areas c of the Voronoi cells.
+    """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells.
 
     M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [-1, 1]; but for pairs left out between close
-    sheets, images in boundaries and noise they would be positive. p(M) times the residual is added to y in
+    sheets, images in boundaries and noise they would be positive. Each round adds p(M) times the residual to y in
     M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue, and about zero below it:
-    the smooth part is solved for, and details that the kernel does not resolve stay near the cells. Areas below c / 2
-    are set to it. A fixed number of linear steps, unlike conjugate gradients, does not amplify rounding: the result is
-    the same to 1e-10 for any order of the points.
+    the smooth part is solved for, and details that the kernel does not resolve stay near the cells. In between, areas
+    below the floor of c / 2 are set to it, held there, and released when the gradient points inward. A fixed number of
+    linear steps, unlike conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order
+    of the points.
 
     Parameters
     ----------
@@ -189,20 +190,35 @@ def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
         v, all positive.
     """
     root = np.sqrt(cells / (matrix @ cells))
-    y = cells / root
+    right, y = root * target, cells / root
+    floor = _FLOOR * y
+    held = np.zeros(len(target), dtype=bool)
+    for degree in (_DEGREE, _DEGREE // 2):
+        residual = right - root * (matrix @ (root * y))
+        held &= residual < 0.0
+        residual[held] = 0.0
+        y = np.maximum(y + _polynomial(matrix, root, residual, held, _inverse(degree)), floor)
+        held = y <= floor
+    return root * y
+
+
+def _polynomial(matrix: KernelMatrix, root: Floats, residual: Floats, held: Bools, coefficients: Floats) -> Floats:
+    """Evaluate a Chebyshev series in M on the free part of a residual."""
 
     def product(values: Floats) -> Floats:
-        return root * (matrix @ (root * values))
+        image = root * (matrix @ (root * values))
+        image[held] = 0.0
+        return image
 
-    change = np.zeros_like(y)
-    for coefficient, term in zip(_inverse(), chebyshev_terms(product, root * target - product(y)), strict=False):
-        change += coefficient * term
-    return root * np.maximum(y + change, _FLOOR * y)
+    terms, result = chebyshev_terms(product, residual), np.zeros_like(residual)
+    for coefficient, term in zip(coefficients, terms, strict=False):
+        result += coefficient * term
+    return result
 
 
 @functools.cache
-def _inverse() -> Floats:
+def _inverse(degree: int) -> Floats:
     """Return a Chebyshev series over [-1, 1]: 1 / x for x well above the width, about zero from there down."""
-    width = _WIDTH / _DEGREE
-    series: Floats = chebyshev.chebinterpolate(lambda x: expit(2.0 * x / width) * x / (x * x + width * width), _DEGREE)
+    width = _WIDTH / degree
+    series: Floats = chebyshev.chebinterpolate(lambda x: expit(2.0 * x / width) * x / (x * x + width * width), degree)
     return series
