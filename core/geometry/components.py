@@ -5,9 +5,10 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..types import Bools, Floats, Ints
-from .nearest import GAP, NEXT, Nearest
+from .nearest import NEXT, Nearest
 
 SMALLEST = 50  # points of a component that gets an operator of its own
+_GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap
 
 
 def label_components(nearest: Nearest) -> Ints:
@@ -23,9 +24,9 @@ def label_components(nearest: Nearest) -> Ints:
         The largest component is 0. Those of fewer than 50 points, which get no operator, are -1.
     """
     index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
-    # By the eight next neighbors (of eight points there are seven), and across rows by those all around.
-    spacing = distance[:, :NEXT][:, -1] * np.sqrt(np.pi / NEXT)
-    reach = GAP * np.where(nearest.in_row, nearest.spacing, spacing)
+    reach = _GAP * distance[:, :NEXT][:, -1]  # of eight points there are seven neighbors
+    even = _GAP * np.sqrt(NEXT / np.pi) * nearest.spacing  # as far as that, by how many there are in any direction
+    reach = np.where(nearest.in_row, even, reach)
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
     close = number_by_size(label_connected(index, strict))
     large = close >= 0
