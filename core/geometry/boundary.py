@@ -12,10 +12,9 @@ from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
 from .nearest import AGREEING, COUNT, FEW, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
-from .noise import LEFT
 from .points import FEWEST
 from .quadrics import frames
-from .sheets import TOUCHING, on_sheet
+from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
 _ANGLE = np.radians(100.0)  # widest angle without a neighbour, at least
@@ -26,6 +25,8 @@ _MOST = 34  # candidates that the boundary's course is fitted to, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
+_EXACT = 0.1  # of the spacing: candidates that scatter less about the boundary's course lie on it
+_FURTHER = 2.0  # spacings more than the measured distance, within which a point of the boundary lies
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
         # Near candidates are best, and those away from corners of the boundary.
-        doubt = (near + spacing) * course.scatter[seen]
+        doubt = (near + _FURTHER * spacing) * course.scatter[seen]
         distance, curvature = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
         eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
@@ -195,7 +196,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
             total[~known] = 1.0
             measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
             # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
-            known &= np.where(same, near, np.inf).min(axis=1) <= measured + TOUCHING * spacing[:, 0]
+            known &= np.where(same, near, np.inf).min(axis=1) <= measured + _FURTHER * spacing[:, 0]
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
@@ -283,11 +284,11 @@ def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     for half in (t < ON * spacing[:, None], t > -ON * spacing[:, None]):
         enough = np.count_nonzero(half & (weight > 0.0), axis=1) >= FEWEST
         other_fit, other_scatter = _parabola(t, e, np.where(half | ~enough[:, None], weight, 0.0))
-        better = enough & (scatter > _KINK * other_scatter + LEFT * spacing)
+        better = enough & (scatter > _KINK * other_scatter + _EXACT * spacing)
         fit[better], scatter[better] = other_fit[better], other_scatter[better]
     close = np.where(np.arange(other.shape[1]) < fitted // 2, scatter[other] * unit[other, 0], np.nan)
     usual = np.nanmedian(close, axis=1) / unit[:, 0]
-    relative = np.maximum((scatter + LEFT * spacing) / (usual + LEFT * spacing), 1.0)
+    relative = np.maximum((scatter + _EXACT * spacing) / (usual + _EXACT * spacing), 1.0)
     fit[:, 0] += _LEVEL * usual
     fit *= np.concatenate([unit, np.ones_like(unit), 1.0 / unit], axis=1)
     outward = across - fit[:, 1:2] * along

@@ -10,8 +10,7 @@ from .quadrics import fit_quadrics
 
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
 _LEAST = 0.02  # noise below this share of the spacing is left alone
-LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours; a boundary
-# whose points scatter no more runs through them
+LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
 _LARGEST = 90  # neighbours of the fit that points are projected on, at most: more would round the shape

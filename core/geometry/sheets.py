@@ -22,7 +22,7 @@ from .quadrics import Quadrics, check_surface, fit_quadrics, frames
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
 _BLOCK = 1 << 11
-TOUCHING = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
+_AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
 # eighth; points that many spacings apart touch
 _NEARBY, _SOURCES = 1 << 9, 1 << 6  # points that share a neighbourhood; of them, from which paths are followed at once
 
@@ -199,7 +199,7 @@ def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
     """
     sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)))
     # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
-    touching = nearest.distance <= TOUCHING * nearest.spacing[nearest.index]
+    touching = nearest.distance <= _AROUND * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
     while len(lost):
         sheet[lost] = np.where(touching[lost], sheet[nearest.index[lost]], -1).max(axis=1)
@@ -230,7 +230,7 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
         same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=1.0)
         # Across an edge only points that touch are next to each other, others may be so across a gap.
         same &= ((cosine if oriented else np.abs(cosine)) > SMOOTH) | (
-            nearest.distance[block] < TOUCHING * nearest.spacing[block, None]
+            nearest.distance[block] < _AROUND * nearest.spacing[block, None]
         )
         same[:, 0] = False
         rows = np.arange(len(block))
@@ -267,7 +267,7 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
     if not len(doubtful):
         return pairs
     first, second = pairs.first[doubtful], pairs.second[doubtful]
-    longest = TOUCHING * pairs.distance[doubtful]
+    longest = _AROUND * pairs.distance[doubtful]
     apart = ways_along(step_lengths(nearest, oriented), nearest.tree, first, second, longest) > longest
     kept = np.ones(len(pairs.first), dtype=bool)
     kept[doubtful[apart]] = False
