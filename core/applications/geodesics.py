@@ -198,7 +198,7 @@ class Geodesics:
         report = progress or (lambda stage, fraction: None)
         path = self._path(given, closed, lambda done: report("Curve", 0.5 * done))
         report("Distance", 0.5)
-        band, away, side = self._beside(path)
+        band, away, feet, across = self._beside(path)
         lengths = np.maximum(away, 1e-300)
         pairs = self._graph  # and one more point, from which the paths to the band start
         graph = sparse.csr_array(
@@ -210,12 +210,20 @@ class Geodesics:
             shape=(count + 1, count + 1),
         )
         distance, before = dijkstra(graph, indices=count, return_predecessors=True)
-        # The side on which a path leaves the curve is that of all its points.
-        root = np.where((before == count) | (before < 0), np.arange(count + 1), before)
+        # The side on which a path leaves the curve is that of all its points. As its first point may lie on the other
+        # side, next to the curve, the second one decides of those behind, seen from where the path starts.
+        known = before >= 0
+        first = np.where(known & (before < count), before, count)
+        second = known & (before < count) & (before[first] == count)
+        root = np.where(known & (before < count) & ~second, before, np.arange(count + 1))
         while np.any(root != root[root]):
             root = root[root]
-        sides = np.ones(count + 1)
-        sides[band] = side
+        at = np.zeros(count + 1, dtype=np.int64)
+        at[band] = np.arange(len(band))
+        start = at[np.where(second, first, np.arange(count + 1))[:count]]
+        offset = laplacian.surface_points - feet[start]
+        sides = np.where(np.einsum("ij,ij->i", offset, across[start]) < 0.0, -1.0, 1.0)
+        sides = np.append(sides, 1.0)
         result = np.where(np.isfinite(distance), sides[root] * distance, np.inf)[:count]
         result[path] = 0.0
         return result
@@ -266,8 +274,11 @@ class Geodesics:
             path += self.corners(first, last).tolist()[1:]
         return np.array(path)
 
-    def _beside(self, path: Ints) -> tuple[Ints, Floats, Floats]:
-        """Return the points near a polygon, (b,), how far away they are, and on which side, 1 or -1."""
+    def _beside(self, path: Ints) -> tuple[Ints, Floats, Floats, Floats]:
+        """Return the points near a polygon, (b,), how far away they are, from where on it, and which way is left there.
+
+        The last two are (b, 3).
+        """
         points, normals = self._laplacian.surface_points, self._laplacian.normals
         # Each point of the path ends a segment before it and one after it; at the ends of an open path one of them.
         chord = np.diff(points[path], axis=0)
@@ -283,20 +294,20 @@ class Geodesics:
         found = []
         for segment, kept in ((near.row, near.row < len(chord)), (near.row - 1, near.row > 0)):
             segment, point = segment[kept], near.col[kept]
-            offset = points[point] - points[path[segment]]
+            start = points[path[segment]]
+            offset = points[point] - start
             along = np.einsum("ij,ij->i", offset, chord[segment]) / np.einsum("ij,ij->i", *(chord[segment],) * 2)
-            foot = np.clip(along, 0.0, 1.0)
-            offset -= foot[:, None] * chord[segment]
+            foot = start + np.clip(along, 0.0, 1.0)[:, None] * chord[segment]
             across = np.where(
                 ((along > 0.0) & (along < 1.0))[:, None], left[segment], corner[segment + (along >= 1.0)]
             )  # at a corner the mean of both normals decides the side (Baerentzen, Aanaes, 2005)
-            away = np.linalg.norm(offset, axis=1) * arc[kept]
-            found.append((point, away, np.where(np.einsum("ij,ij->i", offset, across) < 0.0, -1.0, 1.0)))
-        point, away, side = (np.concatenate(values) for values in zip(*found, strict=True))
+            away = np.linalg.norm(points[point] - foot, axis=1) * arc[kept]
+            found.append((point, away, foot, across))
+        point, away, feet, left = (np.concatenate(values) for values in zip(*found, strict=True))
         order = np.lexsort((away, point))
         order = order[~np.isin(point[order], path)]
         band, first = np.unique(point[order], return_index=True)
-        return band, away[order][first], side[order][first]
+        return band, away[order][first], feet[order][first], left[order][first]
 
 
 def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Ints:
