@@ -125,3 +125,14 @@ def test_members_that_are_none_are_refused(members, text):
     laplacian = core.build_laplacian(core.example_sphere())
     with pytest.raises(core.InvalidPointsError, match=text):
         core.measure_region(laplacian, members)
+
+
+def test_points_left_out_and_doubled_change_nothing():
+    points = core.example_sphere()
+    with_others = np.concatenate([points, [[5.0, 5.0, 5.0]], points[:3]])
+    one, other = (
+        core.measure_region(core.build_laplacian(given), given[:, 2] > 0.2) for given in (points, with_others)
+    )
+    assert other.area == pytest.approx(one.area, rel=0.01)
+    assert other.boundary_length == pytest.approx(one.boundary_length, rel=0.01)
+    assert 0.0 < other.area_uncertainty < 0.1 * other.area
