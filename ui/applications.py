@@ -22,7 +22,7 @@ class MESHFREE_PT_measure(ToolPanel, bpy.types.Panel):
     bl_label = "Measure"
 
     def draw(self, context):
-        super().draw(context)
+        draw_tools(self.layout, self.bl_label)
         draw_measures(self.layout, context)
 
 
