@@ -10,7 +10,7 @@ from ... import core
 from ...core import PointCloudError
 from ..objects.attributes import read_attribute
 from ..objects.parts import PartRow, keep_rows
-from ..objects.quantities import ROUGHNESS, SEGMENT
+from ..objects.quantities import SEGMENT, written_by
 from ..objects.result import area_text
 from ..registration import Registration, Row
 from ..running import cache
@@ -60,7 +60,8 @@ class MeasureParts(Tool):
 
     def measured(self, obj) -> str:
         """Return the name of the attribute whose mean is wanted, empty for none."""
-        return self.source or (ROUGHNESS if ROUGHNESS in obj.data.attributes else "")
+        (usual,) = written_by("roughness")
+        return self.source or (usual if usual in obj.data.attributes else "")
 
     def write(self, context, obj, result):
         keep_rows(obj, result.rows, self.measured(obj))
