@@ -122,3 +122,40 @@ def test_it_can_be_cancelled(spheres):
 
     with pytest.raises(core.Cancelled):
         core.measure_parts(spheres, (spheres.points[:, 2] > 0.0).astype(int), progress=stop)
+
+
+@pytest.mark.parametrize("height", [-0.3, 0.0, 0.5])
+def test_the_volume_of_a_cap_above_its_rim(operators, height):
+    laplacian = operators("random sphere")
+    found = core.pile_volume(laplacian, laplacian.points[:, 2] > height)
+    rise = 1.0 - height
+    volume = np.pi * rise**2 * (3.0 - rise) / 3.0
+    assert found.above == pytest.approx(volume, rel=0.03)
+    assert abs(found.above - found.below - volume) < found.uncertainty < 0.15 * volume
+    assert found.below < 0.01 * volume
+
+
+def test_a_wave_has_as_much_above_the_plane_of_its_rim_as_below():
+    """A smooth wave of one period on flat ground: 0.1 sin(2 pi u) sin(pi u)^2 sin(pi v)^2, 0.025 / pi on both sides."""
+    u, v = np.meshgrid(np.linspace(-0.5, 1.5, 81), np.linspace(-0.5, 1.5, 81), indexing="ij")
+    inside = (np.abs(u - 0.5) < 0.5) & (np.abs(v - 0.5) < 0.5)
+    ends = np.where(inside, np.sin(np.pi * u) ** 2 * np.sin(np.pi * v) ** 2, 0.0)
+    points = np.column_stack([u.ravel(), v.ravel(), (0.1 * np.sin(2.0 * np.pi * u) * ends).ravel()])
+    found = core.pile_volume(core.build_laplacian(points), inside.ravel())
+    np.testing.assert_allclose([found.above, found.below], 0.025 / np.pi, rtol=0.03)
+
+
+def test_piles_turn_and_scale(operators):
+    laplacian = operators("even sphere")
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    chosen = laplacian.points[:, 0] > 0.2
+    one = core.pile_volume(laplacian, chosen)
+    other = core.pile_volume(core.build_laplacian(2.0 * laplacian.points @ turn.T), chosen)
+    assert other.above == pytest.approx(8.0 * one.above, rel=1e-4)
+    assert other.uncertainty == pytest.approx(8.0 * one.uncertainty, rel=1e-4)
+
+
+def test_what_ends_nowhere_has_no_rim(operators):
+    laplacian = operators("even sphere")
+    with pytest.raises(core.InvalidPointsError, match="The part of 2500 points has 0 points at its rim"):
+        core.pile_volume(laplacian, np.ones(2500, dtype=bool))
