@@ -3,6 +3,7 @@
 import bpy
 
 from ..operators.objects.quantities import STRAY
+from .measures import draw_measures
 from .panel import ReadyPanel, draw_tools
 
 
@@ -19,6 +20,10 @@ class MESHFREE_PT_measure(ToolPanel, bpy.types.Panel):
     """Quantities at each point: curvature, roughness, distances, fields"""
 
     bl_label = "Measure"
+
+    def draw(self, context):
+        draw_tools(self.layout, self.bl_label)
+        draw_measures(self.layout, context)
 
 
 class MESHFREE_PT_clean(ToolPanel, bpy.types.Panel):

@@ -85,6 +85,7 @@ def _draw_export(self, _context):
     layout.operator("meshfree.export_splats", text="Gaussian Splats (.ply)")
     layout.operator("meshfree.export_operator", text="Laplacian and Modes (.npz)")
     layout.operator("meshfree.export_eigenvalues", text="Eigenvalues (.csv)")
+    layout.operator("meshfree.export_measures", text="Measures (.csv)")
 
 
 class MESHFREE_FH_points(bpy.types.FileHandler):

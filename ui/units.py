@@ -19,7 +19,7 @@ _ADAPTIVE = {
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
 }
 _LEFT_OPEN = ("ADAPTIVE", "METERS", "FEET")  # the latter two are defaults of new scenes
-_RAISED = {1: "", 2: "²"}
+_RAISED = {1: "", 2: "²", 3: "³"}
 
 
 def attribute_power(name: str) -> int:

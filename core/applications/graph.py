@@ -121,7 +121,13 @@ def coupled_components(laplacian: LaplaceBeltrami) -> Ints:
 
 
 def mean_spacing(laplacian: LaplaceBeltrami) -> Floats:
-    """Return the distance between the points of an even sample as dense as the neighbours of each, (n,) [L]."""
+    """Return the distance between the points of an even sample as dense as the neighbours of each, (n,) [L].
+
+    Points left out have no neighbours, and get the median of the others.
+    """
     stiffness = laplacian.stiffness
     neighbors = sparse.csr_array((np.ones(stiffness.nnz), stiffness.indices, stiffness.indptr), shape=stiffness.shape)
-    return np.sqrt(neighbors @ laplacian.areas / np.maximum(neighbors.sum(axis=1), 1.0))
+    spacing = np.sqrt(neighbors @ laplacian.areas / np.maximum(neighbors.sum(axis=1), 1.0))
+    known = laplacian.component >= 0
+    result: Floats = np.where(known, spacing, np.median(spacing[known]))
+    return result

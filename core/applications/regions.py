@@ -34,7 +34,7 @@ _THIN = 0.7  # of the depth of a thin part that may be taken for that
 _TURNS = 0.06, 0.09  # by which the line turns along a spacing, until plain sums are nearer to the area
 _VARIANCE = 1.0 / 7.0  # of the derivative of the step
 _AREA_OFF = 1.0  # of the area of a square of one spacing: what each such piece of the line leaves open, two deviations
-_LENGTH_OFF = 0.01, 0.05  # of the length of the line, and of the boundary of the surface
+LENGTH_OFF = 0.01, 0.05  # of the length of the line, and of the boundary of the surface
 _NEAREST = 24  # pieces of the line by which the distance of a point is measured
 _PARALLEL = 0.3  # cosine between the directions across the line at two points, at least, if it is one line
 _STEEP = 1.5  # length of a chord over that in the tangent plane, at most, on one sheet
@@ -116,7 +116,6 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
     report = progress or (lambda stage, fraction: None)
     share = _shares(laplacian, members)
     known, spacing = laplacian.component >= 0, mean_spacing(laplacian)
-    spacing[~known] = np.median(spacing[known])  # any length will do: their areas are zero
     report("Line", 0.0)
     line = _find_line(laplacian, share > 0.5, spacing, lambda done: report("Line", done))
     report("Areas", 0.9)
@@ -129,7 +128,7 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
     turn = abs(second) / max(length, 1e-300) * float(np.median(spacing))
     fine = np.clip((_TURNS[1] - turn) / (_TURNS[1] - _TURNS[0]), 0.0, 1.0) if np.all(share % 1.0 == 0.0) else 0.0
     area = fine * smooth + (1.0 - fine) * plain
-    own = _along_boundary(areas * step, laplacian.boundary_distance, spacing)
+    own = float(boundary_lengths(areas * step, laplacian.boundary_distance, spacing).sum())
     weight = areas * (fine * step + (1.0 - fine) * share)
     squared = areas @ (_slope(inside / width) / width * spacing**3)
     return Region(
@@ -137,7 +136,7 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
         boundary_length=length + own,
         centroid=weight @ laplacian.surface_points / max(weight.sum(), 1e-300),
         area_uncertainty=_AREA_OFF * float(np.sqrt(squared)),
-        length_uncertainty=float(np.dot(_LENGTH_OFF, (length * (_WIDE * spacing / width).max() ** 1.5, own))),
+        length_uncertainty=float(np.dot(LENGTH_OFF, (length * (_WIDE * spacing / width).max() ** 1.5, own))),
     )
 
 
@@ -197,10 +196,15 @@ def _edge(x: Floats) -> Floats:
     return 2.0 * _slope(np.maximum(x, 0.0))
 
 
-def _along_boundary(areas: Floats, distance: Floats, spacing: Floats) -> float:
-    """Return the length of the surface's boundary by areas within two distances from it, extrapolated to none."""
-    narrow, wide = (areas @ (_edge(distance / width) / width) for width in (_NARROW * spacing, 2.0 * _NARROW * spacing))
-    return float(2.0 * narrow - wide)
+def boundary_lengths(areas: Floats, distance: Floats, spacing: Floats) -> Floats:
+    """Return the length of the surface's boundary next to each point, (n,), summed over a strip along it.
+
+    It is that of areas within two distances from the boundary, extrapolated to none, so that single ones may be below
+    zero.
+    """
+    narrow, wide = (areas * _edge(distance / width) / width for width in (_NARROW * spacing, 2.0 * _NARROW * spacing))
+    result: Floats = 2.0 * narrow - wide
+    return result
 
 
 class _Line(NamedTuple):

@@ -11,12 +11,13 @@ from ...core.files import numbered_files
 from .. import registration
 from ..objects.groups import SOURCE
 from .bending import Deform, SplatInfo
-from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, Mesh, Orient
+from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, MeasureFile, Mesh, Orient
 from .verbs import Analyze, Apply
 
 _OWN = {
     "align_points": AlignWith,
     "signed_distance": AlongCurve,
+    "measure_parts": MeasureFile,
     "mesh_surface": Mesh,
     "compare": CompareWith,
     "orient_normals": Orient,

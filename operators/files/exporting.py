@@ -11,6 +11,7 @@ from ... import core
 from ...core import PointCloudError
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
+from ..objects.parts import kept_rows
 from ..objects.place import place_of
 from ..objects.reading import TYPES, read_points
 from ..objects.result import read_eigenvalues
@@ -22,6 +23,7 @@ from ..running.job import JobOperator
 from ..running.ready import reporting
 from ..tools.splats import SplatOperator
 from .objects import analysis_arrays, file_filter, point_table, save_arrays
+from .rows import write_rows
 from .splats import splats_in_world, splats_to_write
 
 
@@ -199,9 +201,36 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
         return write
 
 
+class MESHFREE_OT_export_measures(ExportOperator, bpy.types.Operator):
+    """Export the measures of the active object's parts as a CSV file, in world lengths"""
+
+    bl_idname = "meshfree.export_measures"
+    bl_label = "Export Measures"
+    filename_ext = ".csv"
+
+    filter_glob: file_filter(".csv")
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason or len(context.object.meshfree.parts):
+            return reason
+        return f'"{context.object.name}" has no measures. Press Measure Parts first'
+
+    def plan(self, context, obj):
+        name, rows = obj.name, kept_rows(obj)
+
+        def write(path, progress):
+            write_rows(path, rows)
+            return f"{name}: {len(rows)} parts written to {path.name}"
+
+        return write
+
+
 TOOLS = (
     Registration(MESHFREE_OT_export_points),
     Registration(MESHFREE_OT_export_splats, panel=Row("Splats", 1, 5, "Export Splats...")),
     Registration(MESHFREE_OT_export_operator),
     Registration(MESHFREE_OT_export_eigenvalues),
+    Registration(MESHFREE_OT_export_measures),
 )

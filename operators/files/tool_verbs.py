@@ -16,12 +16,14 @@ from ..running.application import build_operator, naming
 from ..tools.align import Align
 from ..tools.along import SignedDistance
 from ..tools.compare import Compare, distances
+from ..tools.measures import MeasureParts
 from ..tools.mesh import MeshSurface
 from ..tools.orient import OrientNormals
 from ..tools.simulate import Simulate
 from . import objects as files
 from . import opening
 from .arguments import as_place, place
+from .rows import TABLES, write_rows
 from .verbs import LEFT_OUT, Apply
 
 _PLACES = "--at"  # group of the points nearest to given positions
@@ -137,6 +139,33 @@ class Mesh(Apply):
         ((_, name, opened),) = tool.made
         mesh = bpy.data.objects[name].data
         return {"vertices": len(mesh.vertices), "faces": len(mesh.polygons), "open_edges": opened}
+
+
+class MeasureFile(Apply):
+    """The verb `measure`, whose outputs are tables."""
+
+    outputs = TABLES
+
+    def __init__(self):
+        super().__init__("measure_parts", _MeasureInFile)
+        self.name = "measure"
+
+    def save(self, tool, obj, output):
+        write_rows(output, tool.rows)
+        return []
+
+    def figures(self, tool, result):
+        return {"parts": [row.record() for row in result.rows]}
+
+
+class _MeasureInFile(MeasureParts):
+    """The same tool, which remembers its rows in double precision."""
+
+    rows = ()
+
+    def write(self, context, obj, result):
+        self.rows = result.rows
+        return super().write(context, obj, result)
 
 
 class WithReference(Apply):

@@ -12,7 +12,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import deform_settings, notices
+from . import deform_settings, notices, parts
 from .color_choices import color_choice
 from .handlers import notify
 from .options import DEFAULTS, PAPER_DEFAULTS
@@ -395,12 +395,23 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         min=0.0,
         subtype="DISTANCE",
     )
+    parts: CollectionProperty(
+        type=parts.MESHFREE_PG_part, name="Parts", description="Measures of components and segments"
+    )
+    part_attribute: StringProperty(name="Attribute of the Means", description="Whose means the measures of parts hold")
+    parts_of: StringProperty(name="Parts of", description="Checksum of the points whose parts were measured")
     fingerprint: StringProperty(name="Fingerprint", description="Checksum of the points that were analyzed")
     metric: FloatVectorProperty(name="Metric", description="Scale and shear that were analyzed", size=9)
     settings_used: StringProperty(name="Settings Used", description="Settings of the last analysis")
 
 
-CLASSES = (MESHFREE_PG_stage, *notices.PROPERTY_GROUPS, *deform_settings.CLASSES, MESHFREE_PG_settings)
+CLASSES = (
+    MESHFREE_PG_stage,
+    parts.MESHFREE_PG_part,
+    *notices.PROPERTY_GROUPS,
+    *deform_settings.CLASSES,
+    MESHFREE_PG_settings,
+)
 
 
 def attach():

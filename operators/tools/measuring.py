@@ -21,7 +21,8 @@ class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
 
     volume: BoolProperty(
         name="Volume",
-        description="Measure the volume within the whole surface, too, its openings closed. It takes longer",
+        description="Measure the volume within the whole surface, its openings closed, and that of the selected points"
+        " over the plane of their rim. It takes longer",
         default=False,
     )
 
@@ -33,7 +34,9 @@ class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
         if self.volume:
             found = cache.result(laplacian, "volume", compute=lambda: core.enclosed_volume(laplacian))
             lines.append(f"Volume {_within(volume_text, found.volume, found.uncertainty)}")
-            notices = found.notices
+            pile, missing = _pile(laplacian, chosen)
+            lines += pile
+            notices = [*found.notices, *missing]
         left = np.count_nonzero(chosen & (laplacian.component < 0))
         if left:
             notices = [f"{left:,} selected points are left out of the Laplacian, and not measured.", *notices]
@@ -62,6 +65,16 @@ def _texts(laplacian, region, chosen):
         f"Size {' x '.join(map(length_text, sizes))} along the axes of the world",
         f"Mean curvature {mean:.4g} on average, {most:.4g} at most, in 1 / length",
     ]
+
+
+def _pile(laplacian, chosen):
+    """Return the volumes above and below the plane through the rim of a part as a line, or why there are none."""
+    try:
+        found = core.pile_volume(laplacian, chosen)
+    except core.InvalidPointsError as error:
+        return [], [f"{error} Its volume over the rim was not measured."]
+    above = _within(volume_text, found.above, found.uncertainty)
+    return [f"Over the plane of its rim {above}, below it {volume_text(found.below)}"], []
 
 
 def _within(text, value, off):

@@ -40,6 +40,7 @@ def test_half_a_sphere(obj, mode):
     assert figure(obj, "Boundary") == pytest.approx(2.0 * np.pi, rel=0.02)
     assert figure(obj, "Mean curvature") == pytest.approx(1.0, rel=0.02)
     assert figure(obj, "Volume") == pytest.approx(4.0 * np.pi / 3.0, rel=0.01)
+    assert figure(obj, "Over the plane of its rim") == pytest.approx(2.0 * np.pi / 3.0, rel=0.04)
 
 
 def test_the_figures_follow_the_scale_and_the_last_selection(obj):
@@ -78,3 +79,10 @@ def test_nothing_selected_is_said(obj):
     choose(obj, np.zeros(1000, dtype=bool))
     with refused(obj, "No points of .* are selected"):
         bpy.ops.meshfree.measure_selection()
+
+
+def test_what_has_no_rim_has_no_volume_over_it(obj):
+    choose(obj, np.ones(1000, dtype=bool))
+    bpy.ops.meshfree.measure_selection(volume=True)
+    assert "0 points at its rim" in told(obj)
+    assert "Over the plane" not in told(obj)

@@ -11,7 +11,15 @@ from tests.blender.test_manual import operators
 # Words that stay small within a label, and names that are not written as others are.
 SMALL = {"a", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "the", "to", "with"}
 # These change nothing in the scene.
-NO_UNDO = {"export_eigenvalues", "export_operator", "export_points", "export_splats", "stop"}
+NO_UNDO = {
+    "copy_measures",
+    "export_eigenvalues",
+    "export_measures",
+    "export_operator",
+    "export_points",
+    "export_splats",
+    "stop",
+}
 UNLOGGED = {"stop"}  # nothing to repeat
 # A button beside its menu, as with all presets of Blender.
 HIDDEN = {"add_preset"}

@@ -130,6 +130,8 @@ SIDEWAYS = {  # applications that build on others
     ("transport", "geodesics"),
     ("minimal_surface", "boundary_curve"),
     ("paths", "geodesics"),
+    ("parts", "graph"),
+    ("parts", "regions"),
     ("regions", "graph"),
     ("segmentation", "graph"),
     ("selection", "geodesics"),

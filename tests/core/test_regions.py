@@ -138,3 +138,14 @@ def test_points_left_out_do_not_count():
     assert beside.area == pytest.approx(alone.area, rel=1e-6)
     assert beside.boundary_length == pytest.approx(alone.boundary_length, rel=1e-6)
     np.testing.assert_allclose(beside.centroid, alone.centroid, atol=1e-6)
+
+
+def test_points_left_out_and_doubled_change_nothing():
+    points = core.example_sphere()
+    with_others = np.concatenate([points, [[5.0, 5.0, 5.0]], points[:3]])
+    one, other = (
+        core.measure_region(core.build_laplacian(given), given[:, 2] > 0.2) for given in (points, with_others)
+    )
+    assert other.area == pytest.approx(one.area, rel=0.01)
+    assert other.boundary_length == pytest.approx(one.boundary_length, rel=0.01)
+    assert 0.0 < other.area_uncertainty < 0.1 * other.area
