@@ -48,6 +48,9 @@ from .applications.regions import measure_region as measure_region
 from .applications.segmentation import modes_needed as modes_needed
 from .applications.segmentation import nodal_domains as nodal_domains
 from .applications.segmentation import segment as segment
+from .applications.sections import CrossSection as CrossSection
+from .applications.sections import SectionCurve as SectionCurve
+from .applications.sections import cross_section as cross_section
 from .applications.selection import front_point as front_point
 from .applications.selection import grow as grow
 from .applications.selection import opposite_ends as opposite_ends
