@@ -45,12 +45,12 @@ from .applications.reaction import Mixture as Mixture
 from .applications.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.regions import Region as Region
 from .applications.regions import measure_region as measure_region
-from .applications.segmentation import modes_needed as modes_needed
-from .applications.segmentation import nodal_domains as nodal_domains
-from .applications.segmentation import segment as segment
 from .applications.sections import CrossSection as CrossSection
 from .applications.sections import SectionCurve as SectionCurve
 from .applications.sections import cross_section as cross_section
+from .applications.segmentation import modes_needed as modes_needed
+from .applications.segmentation import nodal_domains as nodal_domains
+from .applications.segmentation import segment as segment
 from .applications.selection import front_point as front_point
 from .applications.selection import grow as grow
 from .applications.selection import opposite_ends as opposite_ends

@@ -271,6 +271,19 @@ def path(path):
     single(obj, "lb_distance", path)
 
 
+def section(path):
+    """A plane through the shape, and beside it the section that it cuts."""
+    obj = coral()
+    bpy.ops.object.empty_add(location=(0.0, 0.0, 0.0), rotation=(1.1, 0.0, 0.5))
+    plane = bpy.context.object
+    studio.activate(obj)
+    obj.meshfree.coverage = 100.0
+    bpy.ops.meshfree.cross_section(plane=plane.name, thickness=0.4 * SPACING)
+    bpy.data.objects[f"{obj.name} Section"].data.materials.append(studio.paint("Section", studio.CLAY))
+    bpy.ops.meshfree.analyze()
+    single(obj, "lb_mean_curvature", path)
+
+
 def iso_lines(path):
     """Lines of equal height of a mode, shown on discs and as tubes of their own."""
     shown, made = coral(), coral()

@@ -20,6 +20,7 @@ _SIDE = 0.25  # spacings between corners, at most, so that polygons are close to
 _ROUNDS = 3  # of moving corners onto the surface
 _STEP = 0.5  # spacings that a corner moves in one of them, at most
 _FLAT = 0.1  # sine of the angle between plane and surface below which the place of the curve is in doubt
+_TOUCHING = 0.01  # share of corners in such a place before it is said
 _SHORT = 1.0  # spacings that a curve is long, at least
 
 
@@ -251,7 +252,7 @@ def _notices(curves: list[SectionCurve], short: int, flat: float) -> list[str]:
         )
     if short:
         result.append(f"{short} curves shorter than the distance between points are left out of the section.")
-    if flat > 0.0:
+    if flat > _TOUCHING:
         result.append(
             f"At {flat:.0%} of its corners the plane only touches the surface: there the section is in doubt. Move or"
             " turn the plane a little."

@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
 from ...core import PointCloudError
-from ..objects.place import copy_place
+from ..objects.curves import add_curves
 from ..objects.result import area_text, length_text, volume_text
 from ..registration import Registration, Row
 from ..running import cache
@@ -96,26 +96,12 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
         line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
 
         def add():
-            made = _curve(f"{obj.name} Path", reading.local(path), self.thickness)
-            for collection in obj.users_collection:
-                collection.objects.link(made)
-            made.matrix_world = obj.matrix_world
-            copy_place(made, obj)
+            made = add_curves(obj, f"{obj.name} Path", [(reading.local(path), False)], self.thickness)
             self.begin_notices([obj])
             self.note(f"{obj.name}: {line}", obj)
             return f"{made.name} is {line}"
 
         return add
-
-
-def _curve(name, places, thickness):
-    """Return a curve object along places, (k, 3)."""
-    curve = bpy.data.curves.new(name, "CURVE")
-    curve.dimensions, curve.bevel_depth = "3D", thickness
-    spline = curve.splines.new("POLY")
-    spline.points.add(len(places) - 1)
-    spline.points.foreach_set("co", np.column_stack([places, np.ones(len(places))]).astype(np.float32).reshape(-1))
-    return bpy.data.objects.new(name, curve)
 
 
 TOOLS = (

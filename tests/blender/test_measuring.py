@@ -78,3 +78,11 @@ def test_nothing_selected_is_said(obj):
     choose(obj, np.zeros(1000, dtype=bool))
     with refused(obj, "No points of .* are selected"):
         bpy.ops.meshfree.measure_selection()
+
+
+def test_a_path_of_points_with_columns_of_their_file(obj):
+    obj["lb_columns"] = '{"points": 1000, "columns": {}}'
+    obj["lb_offset"] = (100.0, 0.0, 0.0)
+    choose(obj, np.arange(1000) < 2)
+    assert bpy.ops.meshfree.geodesic_path() == {"FINISHED"}
+    assert tuple(bpy.data.objects[f"{obj.name} Path"]["lb_offset"]) == (100.0, 0.0, 0.0)
