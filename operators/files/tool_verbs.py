@@ -25,6 +25,7 @@ from . import opening
 from .arguments import as_place, place
 from .verbs import LEFT_OUT, Apply
 
+_CURVES = "curve,closed,x,y,z", ["%d", "%d", "%.17g", "%.17g", "%.17g"]  # columns of a file of curves, and their form
 _PLACES = "--at"  # group of the points nearest to given positions
 
 
@@ -179,14 +180,7 @@ class Section(Apply):
             for number, curve in enumerate(curves, 1)
         ]
         with replacing(output) as part:
-            np.savetxt(
-                part,
-                np.concatenate(columns),
-                ["%d", "%d", *3 * ["%.17g"]],
-                ",",
-                header="curve,closed,x,y,z",
-                comments="",
-            )
+            np.savetxt(part, np.concatenate(columns), _CURVES[1], ",", header=_CURVES[0], comments="")
         return []
 
     def figures(self, tool, result):
