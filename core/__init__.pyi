@@ -41,6 +41,8 @@ from .applications.motion import Wave as Wave
 from .applications.motion import WaveState as WaveState
 from .applications.paths import geodesic_path as geodesic_path
 from .applications.paths import polygon_length as polygon_length
+from .applications.profile import Profile as Profile
+from .applications.profile import profile as profile
 from .applications.reaction import Mixture as Mixture
 from .applications.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.regions import Region as Region
