@@ -84,14 +84,7 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
     )
 
     def prepare(self, context, obj):
-        ends = np.flatnonzero(selected(obj))
-        if len(ends) != 2:
-            raise PointCloudError(
-                f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
-            )
-        reading, laplacian = analyzed(context, obj)
-        geodesics = cache.geodesics(laplacian, lambda *_: None)
-        path = core.geodesic_path(laplacian, *ends.tolist(), geodesics=geodesics)
+        reading, laplacian, ends, path = selected_path(context, obj)
         straight = length_text(core.polygon_length(laplacian.points[ends]))
         line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
 
@@ -102,6 +95,35 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
             return f"{made.name} is {line}"
 
         return add
+
+
+def selected_path(context, obj):
+    """Find the shortest path between the two selected points.
+
+    Returns
+    -------
+    Reading
+    LaplaceBeltrami
+    ndarray, (2,) int
+        These points.
+    ndarray, (k, 3)
+        Corners of the path, as points are read.
+    """
+    ends = np.flatnonzero(selected(obj))
+    if len(ends) != 2:
+        raise PointCloudError(
+            f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
+        )
+    reading, laplacian = analyzed(context, obj)
+    path = cache.result(
+        laplacian,
+        "path",
+        ends,
+        compute=lambda: core.geodesic_path(
+            laplacian, *ends.tolist(), geodesics=cache.geodesics(laplacian, lambda *_: None)
+        ),
+    )
+    return reading, laplacian, ends, path
 
 
 TOOLS = (

@@ -56,8 +56,7 @@ class CrossSection(Tool):
             found = core.cross_section(laplacian, place, normal, mesh=mesh, progress=progress)
             if not found.curves:
                 raise PointCloudError(
-                    f'The plane passes beside the surface of "{name}", or only touches it. Move the object that is'
-                    " chosen as Plane to where it cuts."
+                    f'The plane passes beside the surface of "{name}", or only touches it. Move it to where it cuts.'
                 )
             lines = [(reading.local(curve.points), curve.closed) for curve in found.curves]
             return found, lines, guessed
