@@ -33,8 +33,8 @@ shapes were run with the same ones.
 Made by `MESHFREE_ZOO=folder MESHFREE_RAW=folder python -m benchmarks.strays`; the clouds are not part of the project.
 """
 ABOUT_RAW = """\
-Clouds as scanners give them. They hold stray points of their own: all 136 that are taken of poste_france lie more than
-26 spacings from the rest, most of them a thousand. Human, man and horse are vertices of meshes, of uneven density, and
+Clouds as scanners give them. They hold stray points of their own: what is taken of poste_france lies more than 26
+spacings from the rest, most of it a thousand. Human, man and horse are vertices of meshes, of uneven density, and
 parts of Human and brain are nested shells, nearer to each other than strays are to them; tree is hardly a surface.
 """
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import solve_banded
 
-from ..arguments import whole
+from ..arguments import as_doubles, check_array, check_finite, whole
 from ..errors import ComponentError, InvalidPointsError
 from ..operator import ImplicitSurface, LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
@@ -90,18 +91,23 @@ def geodesic_path(
     return np.concatenate([ends[:1], path.places()[1:-1], ends[1:]])
 
 
-def polygon_length(corners: Floats) -> float:
+def polygon_length(corners: ArrayLike) -> float:
     """Return the length of a polygon.
 
     Parameters
     ----------
-    corners : ndarray, (k, 3)
+    corners : array_like, (k, 3)
         In their order [L].
 
     Returns
     -------
     float
         [L]
+
+    Raises
+    ------
+    InvalidPointsError
+        Corners of a wrong shape, or not finite.
 
     See Also
     --------
@@ -117,7 +123,10 @@ def polygon_length(corners: Floats) -> float:
     >>> print(round(core.polygon_length(points[[0, 799]]), 1))
     2.0
     """
-    return float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum())
+    advice = "Give x, y, z of each corner."
+    places = as_doubles(check_array(corners, "Corners", [(None, 3)], advice))
+    check_finite(places, "corners", advice)
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
 def _checked(laplacian: LaplaceBeltrami, start: Any, end: Any) -> tuple[int, int]:

@@ -115,11 +115,12 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
     """
     report = progress or (lambda stage, fraction: None)
     share = _shares(laplacian, members)
-    spacing = mean_spacing(laplacian)
+    known, spacing = laplacian.component >= 0, mean_spacing(laplacian)
+    spacing[~known] = np.median(spacing[known])  # any length will do: their areas are zero
     report("Line", 0.0)
     line = _find_line(laplacian, share > 0.5, spacing, lambda done: report("Line", done))
     report("Areas", 0.9)
-    areas = np.where(laplacian.component >= 0, laplacian.areas, 0.0)
+    areas = np.where(known, laplacian.areas, 0.0)
     inside, width = _from_line(laplacian, line, share > 0.5, spacing)
     step, second = _step(inside / width), float(areas @ (_second(inside / width) / width**2))
     length = float(areas @ (_slope(inside / width) / width))

@@ -18,6 +18,7 @@ from ..geometry import (
 from ..types import Bools, Floats, Progress
 
 _NEEDED = 13  # distinct points: the point itself and as many others as tell its spacing
+_SPARSE = 2.0  # times the spacing of the cloud: sparser parts must have more points
 
 
 class Strays:
@@ -79,6 +80,10 @@ class Strays:
         self.part_counts = counts[scaled.inverse]
         self.part_areas: Floats = areas[scaled.inverse]
         self._beside = (self.part_counts > 0) & (self.part_counts < self.part_counts.max())
+        sparsity = np.sqrt(self.part_areas / np.maximum(self.part_counts, 1)) / np.median(
+            nearest.spacing * scaled.scale
+        )
+        self._evident = self.part_counts / np.maximum(1.0, sparsity / _SPARSE)
 
     def chosen(self, strictness: float = 1.0, *, smallest: int = PARTS, smallest_area: float = 0.0) -> Bools:
         """Choose the stray points.
@@ -89,7 +94,8 @@ class Strays:
             Above 1 points nearer to the surface are stray, below 1 only those farther away. More strictness never
             chooses fewer.
         smallest : int
-            Points of parts with fewer points are stray, but for the part of most points; 0 for no parts.
+            Points of parts with fewer points are stray, but for the part of most points; 0 for no parts. Of parts
+            more than twice as sparse as the cloud, which scattered points make by chance, more are asked for.
         smallest_area : float
             Points of parts with less area are stray, too [L^2].
 
@@ -110,7 +116,7 @@ class Strays:
             )
         if not real(smallest_area) >= 0.0:
             raise PointCloudError(f"The smallest area is {smallest_area!r}. Use a number that is not negative.")
-        small = (self.part_counts < smallest) | (self.part_areas < smallest_area)
+        small = (self._evident < smallest) | (self.part_areas < smallest_area)
         return (self.scores * strictness > 1.0) | (small & self._beside)
 
 
@@ -133,7 +139,8 @@ def stray_points(
         fewer.
     smallest : int
         Points of parts with fewer points are stray, but for the part of most points; 0 for no parts. Gaps separate
-        parts.
+        parts. Of parts more than twice as sparse as the cloud, which scattered points make by chance, more are asked
+        for.
     smallest_area : float
         Points of parts with less area are stray, too [L^2].
     progress : callable, optional

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import exprel
 
-from ..arguments import as_doubles, check_array, check_finite, not_negative, positive
+from ..arguments import as_array, as_doubles, check_array, check_finite, not_negative, positive
 from ..geometry import check_values
 from ..operator import Spectrum
 from ..types import Floats
@@ -94,7 +94,8 @@ def wave_modes(
 
 
 def _function(values: ArrayLike, count: int) -> Floats:
-    return check_values(np.full(count, values) if np.ndim(values) == 0 else values, count, columns=False)
+    given = as_array(values, "Values")
+    return check_values(np.full(count, given) if given.ndim == 0 else given, count, columns=False)
 
 
 def _swing(times: Floats, frequency: Floats, fading: float) -> tuple[Floats, Floats]:

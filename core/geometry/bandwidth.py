@@ -9,20 +9,14 @@ from ..options import LaplacianOptions
 from ..types import Floats, Ints
 from .boundary import Boundary
 from .cells import Cells
-from .moments import least_error
-from .nearest import ROUNDS, Nearest
+from .moments import MET, least_error
+from .nearest import ENOUGH, GAP, POWER, ROUNDS, Nearest
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
-_FEWEST = (
-    24  # cells inside the kernel at least, so that weights are left to choose where five moments of a point are met
-)
-_WIDER, _TIMES = 1.3, 3  # each width that is tried over the last one, and how many wider ones there are
-_MET = 3e-3  # relative error of the moments that no wider kernel is tried for
+_WIDER = 1.3  # each width that is tried over the last one
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
-_POWER = 8  # of the mean over the neighbourhood: the widest cells, and kernels, decide
 _STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
-_FURTHEST = 2.5  # spacings that a gap may be wide, as in rows 25 times denser along than across: it is a hole otherwise
 
 
 def smoothing_lengths(
@@ -59,14 +53,14 @@ def smoothing_lengths(
         twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: as narrow as the points
         and the shape let it be. It starts from 1.08 times the radius of the cells around, in the eighth mean, times the
         factor: the width of a gap in one direction decides, not the number of points in the others. Where a wider
-        kernel would meet its moments better by more than the bend of the surface costs it, it is up to 2.2 times as
-        wide. Even points have some 22 others inside it then, random ones 55. A larger factor leaves fewer points that
-        ask for more, so that h varies less.
+        kernel would meet its moments better by more than the bend of the surface costs it, it is wider. Even points
+        have some 22 others inside it then, random ones 55. A larger factor leaves fewer points that ask for more, so
+        that h varies less.
     """
     if options.bandwidth == "adaptive":
-        lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, _POWER)
+        lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, POWER)
         cell = _repeat(nearest.averaging(), cells.areas, ROUNDS)
-        lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(_FEWEST / np.pi * cell) / SUPPORT)
+        lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(ENOUGH / np.pi * cell) / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
@@ -90,15 +84,15 @@ def _widening(
     bend = _BENT * lengths**2 * (averaging @ np.einsum("iab,iab->i", quadrics.shape_operator, quadrics.shape_operator))
     rows, result, factor = np.arange(len(lengths)), np.ones(len(lengths)), 1.0
     least = error(rows, factor)
-    for _ in range(_TIMES):
+    while len(rows):
         # Where the moments are met, or better than what more of the bend costs, nothing is to be gained.
-        open_ = least > np.maximum((_WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + _MET)
+        open_ = least > np.maximum((_WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + MET)
         rows, least, factor = rows[open_], least[open_], _WIDER * factor
         found = error(rows, factor)
         better = found < least
         rows, least = rows[better], found[better]
         result[rows] = factor
-    return (averaging @ result**_POWER) ** (1.0 / _POWER)
+    return (averaging @ result**POWER) ** (1.0 / POWER)
 
 
 def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
@@ -113,7 +107,7 @@ def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
     power : int
         Of the mean: in the eighth the widest gaps decide.
     """
-    radius = np.minimum(radius, _FURTHEST * nearest.spacing)
+    radius = np.minimum(radius, GAP * nearest.spacing)
     return _repeat(nearest.averaging(), radius**power, ROUNDS) ** (1.0 / power)
 
 

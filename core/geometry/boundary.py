@@ -11,26 +11,22 @@ from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
-from .nearest import COUNT, ON, SMOOTH, Nearest, fading_weights
+from .nearest import AGREEING, COUNT, FEW, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
 from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
-_GAP = np.radians(100.0)  # widest angle without a neighbour, at least
+_ANGLE = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
-_FOLDED = 2  # neighbours off its sheet, or facing elsewhere, that a boundary point may have
-_BESIDE = 16  # the nearest of them, by which those that face elsewhere are found: on coarse balls more lie behind
 _AROUND = 5.0  # radii of the empty place that candidates must go around it, of 2 pi: chance leaves some of them out
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
-_CURVE = (12, 34)  # candidates that the boundary's course is fitted to: at least, at most
+_MOST = 34  # candidates that the boundary's course is fitted to, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
 _EXACT = 0.1  # of the spacing: candidates that scatter less about the boundary's course lie on it
-_NEAREST = 8  # power of the doubt in what a boundary point tells: the nearest ones on one side of a corner decide
-_STRAIGHT = 0.8  # cosine of the directions across one course of the boundary, at least
-_FURTHER = 2.0  # times the measured distance, and spacings more, within which a point of the boundary must lie
+_FURTHER = 2.0  # spacings more than the measured distance, within which a point of the boundary lies
 
 
 @dataclass(frozen=True)
@@ -106,7 +102,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
         gap = np.fmax.reduce(np.diff(around, axis=1), axis=1)
         # Neighbours left out sort last, as NaN: the gap over the end is counted from the last known angle.
         gap = np.fmax(gap, angle[:, 0] + 2.0 * np.pi - np.fmax.reduce(angle, axis=1))
-        return block[gap > _GAP]
+        return block[gap > _ANGLE]
 
     rows = np.concatenate(on_all_cores(facing_a_gap, blocks(len(points), _BLOCK)))
     if not len(rows):
@@ -129,13 +125,14 @@ def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
     """Tell around which points neighbours lie off their sheet or face elsewhere: it goes on there, past an edge."""
     cosine = np.einsum("ikc,ic->ik", oriented[nearest.index[rows]], oriented[rows])
     beside = nearest.apart[rows]
-    beside[:, :_BESIDE] |= np.abs(cosine[:, :_BESIDE]) < SMOOTH
-    return np.count_nonzero(beside, axis=1) > _FOLDED
+    near = slice(FEW)  # on coarse balls those further away lie behind
+    beside[:, near] |= np.abs(cosine[:, near]) < SMOOTH
+    return np.count_nonzero(beside, axis=1) >= AGREEING
 
 
 def _label_courses(points: Floats, reach: Floats) -> Ints:
     """Number the boundaries that boundary points, (k, 3), lie on; those of one are within reach of each other."""
-    distance, other = cKDTree(points).query(points, k=min(9, len(points)), workers=-1)
+    distance, other = cKDTree(points).query(points, k=min(NEXT + 1, len(points)), workers=-1)
     return label_connected(other, distance <= reach[:, None])
 
 
@@ -192,14 +189,14 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
         for side in (0, 1):
             best = np.argmin(np.where(eligible, doubt, np.inf), axis=1)
             ahead = course.outward[seen[every, best]]
-            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > _STRAIGHT)
-            trust = np.where(same, (doubt / doubt.min(axis=1, keepdims=True)) ** -_NEAREST, 0.0)
+            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > SMOOTH)
+            trust = np.where(same, (doubt / doubt.min(axis=1, keepdims=True)) ** -POWER, 0.0)
             total = trust.sum(axis=1)
             known = same.any(axis=1)
             total[~known] = 1.0
             measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
             # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
-            known &= np.where(same, near, np.inf).min(axis=1) <= _FURTHER * (measured + spacing[:, 0])
+            known &= np.where(same, near, np.inf).min(axis=1) <= measured + _FURTHER * spacing[:, 0]
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
@@ -207,7 +204,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
                 # Around a corner that the surface fills, the second boundary lies inside the first, across it.
                 chosen = seen[every, best][:, None]
                 apart, expected = course.ahead(nearest.points, chosen, seen)
-                other = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < _STRAIGHT
+                other = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < SMOOTH
                 eligible = other & (apart < ON * spacing) & (near < reach[block, None])
                 eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > SMOOTH
 
@@ -265,12 +262,12 @@ class _Course:
 
 def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     points = nearest.points
-    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_CURVE[1] + 1, len(rows)), workers=-1)
+    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_MOST + 1, len(rows)), workers=-1)
     # A boundary that is given may be sparse, so that its courses are found without a reach.
     label = _label_courses(points[rows], np.full(len(rows), np.inf))
-    fitted = np.clip(np.bincount(label)[label] // _PART, *_CURVE)[:, None]
+    fitted = np.clip(np.bincount(label)[label] // _PART, FEW, _MOST)[:, None]
     across = outward_directions(nearest, normals, rows)
-    near = other[:, :9]
+    near = other[:, : NEXT + 1]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
     across = _tangents(np.einsum("ik,ikc->ic", side, across[near]), normals[rows])
     along = np.cross(normals[rows], across)

@@ -11,7 +11,7 @@ from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints, Report
 from .distances import arc_squared
 from .nearest import COUNT, Nearest
-from .quadrics import frames
+from .quadrics import CURVED, frames
 from .sheets import on_sheet
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ _BLOCK = 1 << 12
 _MANY = 21, COUNT, 4 * COUNT, 16 * COUNT  # of the nearest points, the first itself: more are looked at while a cell is
 # open, as a jump of density has them on one side
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
-_CURVED = -0.5  # least Gaussian curvature times the squared radius, where the fit is poor
 _OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
 _CLOSEST = 1e-6  # spacings that a cut lies off its point, at least: by `_SAME`, a longer one hides the others
@@ -142,7 +141,7 @@ def _cuts(
     squared = arc_squared(distance**2, left, right, np.abs(cosine))
     # The direction of the arc at the point, from its chord and a third of the angle between the normals.
     step = (chord + ((right - left) / 6.0)[:, :, None] * other) @ frame
-    length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -0.25, 0.25))
+    length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -CURVED, CURVED))
     length = np.maximum(length, _CLOSEST * nearest.spacing[rows, None])
     cuts = step * (counted / (np.maximum(np.linalg.norm(step, axis=2), 1e-300) * length))[:, :, None]
     inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])
@@ -208,7 +207,6 @@ def _triangles(corner: Floats, other: Floats, gaussian_curvature: Floats) -> Flo
     """Return the areas of triangles with one corner at the point, on a surface of that curvature."""
     plane = 0.5 * (corner[:, 0] * other[:, 1] - corner[:, 1] * other[:, 0])
     squared = np.einsum("ic,ic->i", corner, corner) + np.einsum("ic,ic->i", other, corner + other)
-    curved = (
-        np.maximum(gaussian_curvature * squared / 3.0, _CURVED) + 1e-12
-    )  # of the mean squared distance along the edge
+    # Of the mean squared distance along the edge.
+    curved = np.maximum(gaussian_curvature * squared / 3.0, -CURVED) + 1e-12
     return plane * 2.0 * (1.0 - 1.0 / np.sqrt(1.0 + curved)) / curved

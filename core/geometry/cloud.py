@@ -23,14 +23,13 @@ from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
-from .quadrics import Quadrics, check_surface, frames
+from .quadrics import MANY, Quadrics, check_surface, frames
 from .rows import look_across_rows
 from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 from .winding import orient_by_winding
 
 _DRAWN = 20  # points that a surface needs at least, to be drawn
 _NARROW = 0.6  # h over the depth of the surface that is too wide
-_MANY = 0.1  # share of narrow, or of noisy points: fewer are a few places, and not the whole scan
 
 
 @dataclass(frozen=True)
@@ -225,7 +224,7 @@ def read_cloud(
             left_out=len(scaled.points) - len(own),
             share=1.0 - len(own) / len(scaled.points),
             noise=sample.noise,
-            narrow=bool(np.mean(lengths > _NARROW * depth(nearest, edge.distance)) > _MANY),
+            narrow=bool(np.mean(lengths > _NARROW * depth(nearest, edge.distance)) > MANY),
         ),
     )
 
@@ -344,7 +343,7 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
     if options.projection != "auto":
         return _project(surface, noise, np.ones(len(noise), dtype=bool))[0]
     noisy = noise > 0.0
-    if noisy.mean() < _MANY:
+    if noisy.mean() < MANY:
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
     before = _roughly(surface, noise, filling)
@@ -486,7 +485,7 @@ def _notices(duplicates: int, left_out: int, share: float, noise: Floats, narrow
         f"Noise of {level:.2f} of the spacing was smoothed within the operator, at {noisy:.0%} of the points.": noisy
         > filling,
         f"Noise of more than half the spacing, at {filling:.0%} of the points, was smoothed within the operator, and"
-        " details with it: areas may be off by 10 % and more. Use more exact points.": filling > _MANY,
+        " details with it: areas may be off by 10 % and more. Use more exact points.": filling > MANY,
         f"Outliers and small components left out of the operator: {left_out} ({100.0 * share:.2g} %).": left_out,
         "Part of the surface is so narrow that the kernel covers several of its sides: areas there may be off by 10 %"
         " and more. Add points.": narrow,

@@ -5,12 +5,16 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..types import Bools, Floats, Ints
-from .nearest import Nearest
+from .nearest import NEXT, Nearest
 
 SMALLEST = 50  # points of a component that gets an operator of its own
 _GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap
-ACROSS = 3.2  # spacings that it is across rows
-_FIRST = 8  # neighbours that points are joined to before the others
+
+
+def even_reach(nearest: Nearest) -> Floats:
+    """Return the edge that is a gap by how many points there are in any direction, (m,): that of points in rows."""
+    reach: Floats = _GAP * np.sqrt(NEXT / np.pi) * nearest.spacing
+    return reach
 
 
 def label_components(nearest: Nearest) -> Ints:
@@ -26,8 +30,8 @@ def label_components(nearest: Nearest) -> Ints:
         The largest component is 0. Those of fewer than 50 points, which get no operator, are -1.
     """
     index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
-    reach = _GAP * distance[:, :_FIRST][:, -1]  # of eight points there are seven neighbors
-    reach = np.where(nearest.in_row, ACROSS * nearest.spacing, reach)
+    reach = _GAP * distance[:, :NEXT][:, -1]  # of eight points there are seven neighbors
+    reach = np.where(nearest.in_row, even_reach(nearest), reach)
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
     close = number_by_size(label_connected(index, strict))
     large = close >= 0
@@ -41,7 +45,7 @@ def label_connected(index: Ints, joined: Bools) -> Ints:
     """Number the components of points whose neighbours, (m, k) int, are joined to them, (m, k) bool."""
     label = np.arange(len(index), dtype=np.int32)
     # The nearest neighbours make few components, so that hardly a step to the others is left that joins two.
-    for some in (slice(0, _FIRST), slice(_FIRST, None)):
+    for some in (slice(0, NEXT), slice(NEXT, None)):
         row, column = np.nonzero(joined[:, some] & (label[index[:, some]] != label[:, None]))
         ends = label[row], label[index[row, some.start + column]]
         graph = sparse.csr_array((np.ones(len(row), dtype=bool), ends), shape=(label.max() + 1,) * 2)

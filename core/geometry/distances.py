@@ -9,14 +9,11 @@ import numpy as np
 
 from ..algebra import on_all_cores
 from ..types import Floats
-from .nearest import SMOOTH, Nearest
+from .nearest import AGREEING, NEXT, SMOOTH, Nearest
 from .patches import Patch
 
 if TYPE_CHECKING:
     from .cloud import Cloud
-
-_STEPS = 8  # nearest neighbours whose chords give the squared slope
-_ACROSS = 3  # of these chords lead across a sharp edge: the slope there does not count
 
 
 def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | float = 1.0) -> Floats:
@@ -94,14 +91,14 @@ def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
         averaged over the neighbourhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
         change too fast between neighbours to be right, do not count: arcs make up for them already.
     """
-    near = slice(1, _STEPS + 1)
+    near = slice(1, NEXT + 1)
     index, counted = nearest.index[:, near], nearest.weight[:, near] > 0.0
     chord = nearest.points[index] - nearest.points[:, None]
     cosine = np.einsum("ikc,ic->ik", normals[index], normals)
     side = np.where(cosine < 0.0, -1.0, 1.0)
     height = np.einsum("ikc,ic->ik", chord, normals) + side * np.einsum("ikc,ikc->ik", chord, normals[index])
     across = counted & (np.abs(cosine) < SMOOTH)
-    smooth = counted & ~across & (across.sum(axis=1) < _ACROSS)[:, None]
+    smooth = counted & ~across & (across.sum(axis=1) < AGREEING)[:, None]
     slope = np.where(smooth, (0.5 * height / nearest.distance[:, near]) ** 2, 0.0)
     return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
 

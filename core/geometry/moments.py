@@ -17,11 +17,10 @@ if TYPE_CHECKING:
     from .boundary import Boundary
 
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
-RIDGE = 1e-3  # added to the entropy's Hessian, where the points do not determine the terms
 _MOST = (COUNT, 64, 160)  # neighbours looked at, more where the kernel holds more; beyond, any sampling is dense enough
-_LARGEST = 1.0  # change of the logarithm of a weight: a single point leaves as much to the other ends of its pairs
+LARGEST = 2.0  # change of the logarithm of a weight: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
-_SMALL = 1e-3  # relative error of the moments that is none
+MET = 2e-3  # relative error of the moments that is small enough, for a kernel, and for a ridge under the terms
 _BLOCK = 1 << 11
 
 
@@ -97,7 +96,7 @@ def least_error(
                 distance, index = nearest.tree.query(nearest.points[asked], k=min(most, len(normals)))
             found[open_] = solve(asked, distance[:, 1:], index[:, 1:])
             # More neighbours can only meet the moments better.
-            more = (distance[:, -1] <= SUPPORT * lengths[asked]) & (len(normals) > most) & (found[open_] > _SMALL)
+            more = (distance[:, -1] <= SUPPORT * lengths[asked]) & (len(normals) > most) & (found[open_] > MET)
             open_ = open_[more]
             if not len(open_):
                 return
@@ -140,19 +139,20 @@ def _solve(terms: Floats, weights: Floats) -> Floats:
     result, coefficients = np.full(len(rows), np.inf), np.zeros((TERMS, len(rows)), dtype=terms.dtype)
     for step in range(_STEPS + 1):
         power = np.einsum("tik,ti->ik", terms, coefficients)
-        weighted = weights * np.exp(np.clip(power, -_LARGEST, _LARGEST))
+        # The other ends of its pairs add as much as a single point.
+        weighted = weights * np.exp(np.clip(power, -0.5 * LARGEST, 0.5 * LARGEST))
         products = [weighted * term for term in terms]
         missing = -np.array([product.sum(axis=1) for product in products])
         missing[0] += 1.0
         result[rows] = np.minimum(result[rows], np.linalg.norm(missing, axis=0))
-        open_ = result[rows] > _SMALL
+        open_ = result[rows] > MET
         if step == _STEPS or not open_.any():
             break
         equations = np.empty((TERMS, TERMS + 1, len(rows)))
         for row, product in enumerate(products):
             for column in range(row + 1):
                 equations[row, column] = equations[column, row] = np.einsum("ik,ik->i", product, terms[column])
-        equations[range(TERMS), range(TERMS)] += RIDGE
+        equations[range(TERMS), range(TERMS)] += MET
         equations[:, TERMS] = missing
         change = eliminate(equations)[:, TERMS]
         coefficients += (change / np.maximum(np.linalg.norm(change, axis=0), 1.0)).astype(terms.dtype)

@@ -13,9 +13,15 @@ from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, fit_quadrics
 
 COUNT = 41  # the point itself and 40 others
+NEXT = 8  # nearest of them: as many as there are directions in which a sheet or a row goes on
+AGREEING = 3  # neighbours that say the same are believed: there are as many faces at a corner; fewer may be chance
+FEW = 12  # neighbours that a spacing, a quadric or a parabola follows from at least
+ENOUGH = 24  # neighbours from which five or six numbers follow, with some freedom left
 ROUNDS = 9  # of averaging over neighbours, after which values vary with the place and not from point to point
+POWER = 8  # of a mean that its greatest values decide
 ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
+GAP = 2.5  # spacings that a gap may be wide, as in rows 25 times denser along than across: it is a hole otherwise
 _MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
 
 
@@ -73,7 +79,7 @@ class Nearest:
 
         A quadric has six coefficients: a point that would keep fewer than a dozen neighbours keeps all of them.
         """
-        few = np.count_nonzero(kept & (self.weight > 0.0), axis=1) < 12
+        few = np.count_nonzero(kept & (self.weight > 0.0), axis=1) < FEW
         return replace(self, weight=np.where(kept | few[:, None], self.weight, 0.0))
 
     def across(self, component: Ints) -> Bools:
@@ -124,7 +130,7 @@ def find_nearest(points: Floats) -> Nearest:
 
 def spacing_of(distance: Floats) -> Floats:
     """Return the spacing of an even sample as dense as the nearest twelve neighbours, by their distances (n, k)."""
-    last = min(12, distance.shape[1] - 1)
+    last = min(FEW, distance.shape[1] - 1)
     return distance[:, last] * np.sqrt(np.pi / last)
 
 

@@ -5,25 +5,23 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..types import Floats, Ints
-from .nearest import Nearest, fading_weights
+from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights
 from .quadrics import fit_quadrics
 
-_FEW = 20  # neighbours of the fit that separates noise from shape, compared with that to all 40
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
-AVERAGINGS = 4  # rounds of averaging over the neighbourhood
 _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
 FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three, all of leaves in a volume
-_NEIGHBORS = (24, 90)  # of the fit that points are projected on, at least and at most: more would round the shape
+_LARGEST = 90  # neighbours of the fit that points are projected on, at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
 
 
 def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
     """Return how far quadrics through 20 neighbours miss these, of all m points or of some rows, (k,)."""
     rows = np.arange(len(nearest.points)) if rows is None else rows
-    part = slice(_FEW + 1)
+    part = slice(COUNT // 2 + 1)  # with the point itself
     weight = fading_weights(nearest.distance[rows, part])
     return fit_quadrics(nearest.points, nearest.index[rows, part], weight, rows).misfit
 
@@ -44,7 +42,7 @@ def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
     """
     averaging = nearest.averaging()
     logarithms = np.log(np.maximum(np.stack(misfits, axis=1) / nearest.spacing[:, None], 1e-12))
-    for _ in range(AVERAGINGS):
+    for _ in range(ROUNDS // 2):
         logarithms = averaging @ logarithms
     means: Floats = np.exp(logarithms.T)
     return means
@@ -94,7 +92,7 @@ def project_points(tree: cKDTree, rows: Ints, noise: Floats, component: Ints | N
     """
     smallest = tree.n if component is None else np.bincount(component).min()
     # A quadric has six coefficients.
-    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, *_NEIGHBORS)
+    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, ENOUGH, _LARGEST)
     many = np.minimum(asked.astype(int), smallest - 1)
     order = np.argsort(many, kind="stable")  # those who ask for few neighbours do not wait for others' many
     result = np.empty((len(rows), 3))

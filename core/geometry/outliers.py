@@ -4,15 +4,13 @@ import numpy as np
 
 from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints
-from .nearest import ON, Nearest
+from .nearest import AGREEING, GAP, ON, Nearest
 from .noise import FILLING
 from .quadrics import Quadrics, fit_quadrics, heights_over
 
 # Neighbours asked: near ones, and some further away, where the density may be another.
 _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
-_AGREEING = 3  # of them that are enough, as on each of the three faces at a corner
 _SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
-_SPARSE = 2.5  # median spacings between points whose witnesses must show a surface that thin
 _BLOCK = 1 << 13  # points looked at at one time
 
 
@@ -70,7 +68,7 @@ def _off_surface(nearest: Nearest, surface: Quadrics, alone: Alone, known: Bools
     """Tell which points lie off the surface, those that are known to among them, (m,) bool."""
     spacing, result = nearest.spacing, known.copy()
     off = third_least(heights_over_witnesses(nearest, surface, np.arange(len(spacing))))
-    sparse = spacing > _SPARSE * np.median(spacing)
+    sparse = spacing > GAP * np.median(spacing)  # their witnesses must show a surface that thin
     suspects = np.flatnonzero(~known & ((off > ON * spacing) | (sparse & (surface.misfit > ON * spacing))))
     if not len(suspects):
         return result
@@ -94,7 +92,7 @@ def witnesses_of(nearest: Nearest, rows: Ints) -> Ints:
 
 def third_least(values: Floats) -> Floats:
     """Return the third least of each row."""
-    return np.partition(values, _AGREEING - 1, axis=1)[:, _AGREEING - 1]
+    return np.partition(values, AGREEING - 1, axis=1)[:, AGREEING - 1]
 
 
 def heights_over_witnesses(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:

@@ -10,7 +10,8 @@ from ..types import Floats, Ints
 
 _BLOCK = 1 << 13  # points fitted at one time
 _CURVE = 5e-3  # roundness of neighbours on a curve
-_CURVES = 0.01  # share of the points around which they may be
+MANY = 0.1  # share of the points: fewer are a few places, and not the whole scan
+CURVED = 0.3  # share by which curvature may change a length, an area or a weight at most, where the fit is poor
 _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie on a conic
 
 
@@ -157,7 +158,7 @@ def check_surface(roundness: Floats) -> None:
         The points of many neighbourhoods lie along a curve.
     """
     curves, count = np.count_nonzero(roundness < _CURVE), len(roundness)
-    if curves > _CURVES * count:
+    if curves > MANY * count:
         raise NotASurfaceError(
             f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane."
             " Use points of a surface."

@@ -7,11 +7,10 @@ import numpy as np
 from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints
 from .components import label_connected
-from .nearest import Nearest, fading_weights
+from .nearest import NEXT, Nearest, fading_weights
 from .quadrics import fit_quadrics, roundness
 
 _ROW = 0.2  # roundness of the nearest points of a row: ten times denser along than across, and of the nearest eight
-_NEXT = 8  # nearest neighbours that a row is followed by
 _WIDER = 16  # times the 40 neighbours are looked at: the next row may be a hundred times as far as the next point
 _BLOCK = 1 << 11  # points looked at at one time
 
@@ -32,7 +31,7 @@ def look_across_rows(nearest: Nearest) -> Nearest:
     Nearest
         The same one where points nowhere lie along rows.
     """
-    if nearest.index.shape[1] <= _NEXT:
+    if nearest.index.shape[1] <= NEXT:
         return nearest
     rows = np.flatnonzero((nearest.quadrics.roundness < _ROW) & ~nearest.in_row)
     rows = rows[_round(nearest, rows) < _ROW]
@@ -51,8 +50,8 @@ def look_across_rows(nearest: Nearest) -> Nearest:
         alone[part] = ~beside.any(axis=1)
         offset = nearest.points[other] - nearest.points[block, None]
         every = np.arange(len(block))
-        sector = _sectors(offset, offset[:, _NEXT], offset[every, beside.argmax(axis=1)])
-        sector[:, 0] = 8  # the point itself
+        sector = _sectors(offset, offset[:, NEXT], offset[every, beside.argmax(axis=1)])
+        sector[:, 0] = NEXT  # the point itself
         chosen = np.argsort(_ranks(sector), axis=1, kind="stable")[:, : index.shape[1]]
         chosen.sort(axis=1)
         found = ~alone[part]
@@ -75,14 +74,14 @@ def look_across_rows(nearest: Nearest) -> Nearest:
 
 def _round(nearest: Nearest, rows: Ints) -> Floats:
     """Return how round the nearest eight neighbours of some points lie, (k,)."""
-    offset = nearest.points[nearest.index[rows, : _NEXT + 1]]
+    offset = nearest.points[nearest.index[rows, : NEXT + 1]]
     offset = offset - offset.mean(axis=1, keepdims=True)
     return roundness(np.linalg.eigvalsh(np.swapaxes(offset, 1, 2) @ offset))
 
 
 def _label_rows(nearest: Nearest, in_row: Bools) -> Ints:
     """Number the rows, chains of points each of which is next to those nearest to it, (m,); other points are alone."""
-    next_to = nearest.index[:, : _NEXT + 1]
+    next_to = nearest.index[:, : NEXT + 1]
     return label_connected(next_to, in_row[:, None] | in_row[next_to])
 
 
@@ -92,7 +91,7 @@ def _sectors(offset: Floats, along: Floats, beside: Floats) -> Ints:
     across = beside - np.einsum("ic,ic->i", beside, along)[:, None] * along
     across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
     angle = np.arctan2(np.einsum("ikc,ic->ik", offset, across), np.einsum("ikc,ic->ik", offset, along))
-    return np.round(angle * (4.0 / np.pi)).astype(int) % 8
+    return np.round(angle * (0.5 * NEXT / np.pi)).astype(int) % NEXT
 
 
 def _ranks(label: Ints) -> Ints:

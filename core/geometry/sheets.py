@@ -14,7 +14,7 @@ from ..algebra import blocks, on_all_cores
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import pair_heights
-from .nearest import ON, SMOOTH, Nearest
+from .nearest import COUNT, NEXT, ON, SMOOTH, Nearest
 from .pairs import Pairs
 from .patches import Patch
 from .quadrics import Quadrics, check_surface, fit_quadrics, frames
@@ -22,7 +22,6 @@ from .quadrics import Quadrics, check_surface, fit_quadrics, frames
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
 _BLOCK = 1 << 11
-_SECTORS = 8  # directions in which a sheet is followed from every point
 _AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
 # eighth; points that many spacings apart touch
 _NEARBY, _SOURCES = 1 << 9, 1 << 6  # points that share a neighbourhood; of them, from which paths are followed at once
@@ -162,7 +161,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
 
 def _own_plane(offset: Floats, weight: Floats, spacing: Floats) -> Array:
     first, second = np.triu_indices(min(_SEEDS, offset.shape[1] - 1), 1)
-    nearby = offset[:, 1:21]
+    nearby = offset[:, 1 : COUNT // 2 + 1]
     a, b = offset[:, 1 + first], offset[:, 1 + second]
     normal = np.cross(a, b)
     length = np.linalg.norm(normal, axis=2)
@@ -224,7 +223,7 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
         flat = (nearest.points[index] - nearest.points[block, None]) @ frames(normals[block])[:, :, 1:]
         angle = np.arctan2(flat[:, :, 1], flat[:, :, 0])
         # Counted from the nearest neighbour, so that they turn with the points.
-        sector = np.round((angle - angle[:, 1:2]) * (0.5 * _SECTORS / np.pi)) % _SECTORS
+        sector = np.round((angle - angle[:, 1:2]) * (0.5 * NEXT / np.pi)) % NEXT
         same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=1.0)
         # Across an edge only points that touch are next to each other, others may be so across a gap.
         same &= ((cosine if oriented else np.abs(cosine)) > SMOOTH) | (
@@ -232,7 +231,7 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
         )
         same[:, 0] = False
         rows = np.arange(len(block))
-        for side in range(_SECTORS):
+        for side in range(NEXT):
             ahead = same & (sector == side)
             first = ahead.argmax(axis=1)
             result[block, first] |= ahead[rows, first]

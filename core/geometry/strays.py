@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..types import Bools, Floats, Ints, Report
-from .components import ACROSS, label_connected
+from .components import even_reach, label_connected
 from .nearest import ON, Nearest
 from .noise import FILLING
 from .outliers import Alone, heights_over_witnesses, third_least, witnesses_of
@@ -110,7 +110,7 @@ def label_parts(nearest: Nearest) -> Ints:
     reach = _GAP * distance[:, min(_NEAR - 1, last)]
     close = np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
     label = label_connected(index, distance <= close)
-    wide = np.where(nearest.in_row, ACROSS * nearest.spacing, _WIDE * distance[:, min(_REACH - 1, last)])
+    wide = np.where(nearest.in_row, even_reach(nearest), _WIDE * distance[:, min(_REACH - 1, last)])
     while True:
         large = (np.bincount(label) >= PARTS)[label]
         joined = ~large[:, None] & large[index] & (distance <= wide[index])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..geometry import Boundary, Cloud, Pairs, Patch
 
 _FLOOR = 0.5  # least area in units of that of the Voronoi cell: all stay positive
-_DEGREES = 100, 50  # of the polynomials of two rounds: the second makes up for what the floor changed in the first
+_DEGREE = 100  # of the polynomial of the first round; half of it of the second, for what the floor changed in the first
 _WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] separates from zero
 _EVEN = 1e-9  # changes of h, as a share, that are rounding
 _MANY = 1 << 20  # pairs from which a product takes longer than to start threads
@@ -193,7 +193,7 @@ def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
     right, y = root * target, cells / root
     floor = _FLOOR * y
     held = np.zeros(len(target), dtype=bool)
-    for degree in _DEGREES:
+    for degree in (_DEGREE, _DEGREE // 2):
         residual = right - root * (matrix @ (root * y))
         held &= residual < 0.0
         residual[held] = 0.0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..geometry import frames
+from ..geometry import CURVED, frames
 from ..kernel import SECOND_MOMENT
 from ..types import Floats
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from .laplacian import LaplaceBeltrami
 
 _UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which the expansion holds
-_LARGEST = 0.3  # most that curvature may change an area or a weight, where the fit is poor
 
 
 def kernel_integral(lengths: Floats, gaussian: Floats) -> Floats:
@@ -43,7 +42,7 @@ def second_moment(lengths: Floats, gaussian: Floats) -> Floats:
 
 
 def _curved(lengths: Floats, gaussian: Floats, factor: float) -> Floats:
-    return 1.0 + np.clip(factor * lengths**2 * gaussian, -_LARGEST, _LARGEST)
+    return 1.0 + np.clip(factor * lengths**2 * gaussian, -CURVED, CURVED)
 
 
 def uneven(excess: Floats) -> Floats:

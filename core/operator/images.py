@@ -2,11 +2,9 @@
 
 import numpy as np
 
-from ..geometry import SMOOTH, Boundary, Pairs
+from ..geometry import CURVED, SMOOTH, Boundary, Pairs
 from ..kernel import SUPPORT
 from ..types import Bools, Floats, Ints
-
-_BEND = 0.5  # most that the curvature of a boundary may change an image
 
 
 def mirror(pairs: Pairs, distance: Floats, boundary: Boundary) -> list[tuple[Ints, Floats, Floats]]:
@@ -71,7 +69,7 @@ def _images(
     larger = np.ones(len(rows))
     for side in (0, 1):
         left, right = np.where(seen[:, side], d[:, side], 0.0), np.where(seen[:, side], e[:, side], 0.0)
-        growth = np.clip(curvature[:, side] * (left + right), -_BEND, _BEND)
+        growth = np.clip(curvature[:, side] * (left + right), -CURVED, CURVED)
         added = 4.0 * left * right + growth * np.maximum(squared - (left - right) ** 2, 0.0)
         further += added
         larger *= 1.0 + growth

@@ -420,6 +420,11 @@ def laplacian_of(
             "The kernel of most points covers more than a third of the object, which is too wide for good results."
             " Add points, or make the kernel narrower."
         )
+    component = scaled.scatter(cloud.component, -1)
+    alone = (component >= 0) & (assembled.matrix.diagonal() == 0.0)
+    component[alone] = -1
+    if alone.any():
+        notices.append(f"Points of a surface with no others within their kernels, left out: {np.count_nonzero(alone)}.")
     trust = measure_trust(cloud, assembled.residual)
     doubt = np.where(trust < 0.5, cloud.cause, Doubt.NONE)
     if options.bandwidth == "adaptive":  # the width of others is the caller's choice
@@ -428,7 +433,7 @@ def laplacian_of(
         points=points,
         surface_points=points + scaled.scatter(cloud.moved * scaled.scale, 0.0),
         normals=scaled.scatter(cloud.normals, (0.0, 0.0, 1.0)),
-        areas=scaled.scatter(areas * scaled.scale**2 / scaled.copies, NO_AREA),
+        areas=np.where(alone, NO_AREA, scaled.scatter(areas * scaled.scale**2 / scaled.copies, NO_AREA)),
         shape_operator=scaled.scatter(cloud.shape_operator / scaled.scale, 0.0),
         gaussian_curvature=scaled.scatter(cloud.gaussian_curvature / scaled.scale**2, 0.0),
         cell_radius=scaled.scatter(
@@ -438,9 +443,9 @@ def laplacian_of(
         near_boundary=scaled.scatter(cloud.boundary.reached(pairs.lengths), False),
         boundary_distance=scaled.scatter(cloud.boundary.distance[:, 0] * scaled.scale, np.inf),
         boundary_direction=scaled.scatter(cloud.boundary.outward[:, 0], 0.0),
-        component=scaled.scatter(cloud.component, -1),
-        trust=scaled.scatter(trust, 0.0),
-        doubt=scaled.scatter(doubt, Doubt.LEFT_OUT),
+        component=component,
+        trust=np.where(alone, 0.0, scaled.scatter(trust, 0.0)),
+        doubt=np.where(alone, Doubt.LEFT_OUT, scaled.scatter(doubt, Doubt.LEFT_OUT)),
         smoothing_lengths=scaled.scatter(pairs.lengths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         kernel_widths=scaled.scatter(assembled.widths * scaled.scale, pairs.lengths.mean() * scaled.scale),
         stiffness=assembled.matrix,

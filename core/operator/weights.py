@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..algebra import Anderson, inverses, on_all_cores
-from ..geometry import RIDGE, TERMS, EdgeTerms, dots, frames, put_terms
+from ..geometry import LARGEST, MET, TERMS, EdgeTerms, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from ..geometry import Cloud, Patch
 
 _ROUNDS = 16  # of the solver, at most
-_AGAIN = 0, 2, 6  # rounds before which the Hessian is computed
 _ENOUGH = 3e-4  # root mean square of that over h, which a first moment makes of a slope, at which it stops
-_LARGEST = 2.0  # largest change of the logarithm of a weight: where more is needed the moments cannot be met
 _SMALLEST = 1e-8  # regularization of the extrapolation, see `Anderson`
 
 
@@ -87,10 +85,10 @@ def balance_weights(
         residual = np.linalg.norm(missing, axis=1)
         if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
             break
-        if step in _AGAIN:
-            inverse = inverses(moments.curvature(terms) + RIDGE * np.eye(TERMS))
+        if step <= _ROUNDS // 2 and (step + 2).bit_count() == 1:  # the Hessian, each time for twice as many rounds
+            inverse = inverses(moments.curvature(terms) + MET * np.eye(TERMS))
             acceleration = Anderson(_SMALLEST)
-        change = np.einsum("iab,ib->ia", inverse, missing - RIDGE * terms)
+        change = np.einsum("iab,ib->ia", inverse, missing - MET * terms)
         change /= np.maximum(np.linalg.norm(change, axis=1, keepdims=True), 1.0)
         terms = acceleration.extrapolate(terms, terms + change)
     return Balance(moments.factor(terms), residual)
@@ -198,4 +196,4 @@ def _factor(patch: Patch, basis: Floats, terms: Floats) -> Floats:
     """Return the factor of the weights of a patch, from the terms of its pairs and their coefficients, (5, m)."""
     power = np.einsum("tp,tp->p", basis[0], patch.first(terms))
     power += np.einsum("tp,tp->p", basis[1], patch.second(terms))
-    return np.exp(np.clip(0.5 * power, -_LARGEST, _LARGEST))
+    return np.exp(np.clip(0.5 * power, -LARGEST, LARGEST))

@@ -453,6 +453,26 @@ def calls():
         {"areas": laplacian.areas, "points": points, "points_before": points, "tolerance": 0.02},
     )
     yield core.grow, on, {"chosen": [0], "distance": 0.3}
+    yield core.stray_points, {}, {"points": points, "strictness": 1.0, "smallest": 30, "smallest_area": 0.0}
+    yield core.thin_out, {}, {"points": points, "spacing": 0.2}
+    yield core.thin_out, {}, {"points": points, "count": 100, "keep_edges": False}
+    yield core.clean_points, on, {"keep_edges": True, "dirichlet": False}
+    yield core.measure_region, on, {"members": top}
+    yield core.geodesic_path, on, {"start": 0, "end": 150}
+    yield core.polygon_length, {}, {"corners": points[:9]}
+    turned = points[:, [1, 2, 0]]
+    yield core.align, {"points": points + 0.01}, {"target": points, "overlap": 0.9, "scale": True}
+    yield core.match_places, {}, {"places": points[:4], "others": turned[:4], "scale": True}
+    yield core.Heat, on, {"step": 0.1}
+    yield core.Heat(laplacian, 0.1).advance, {}, {"state": low}
+    yield core.Wave, on, {"step": 0.1, "speed": 1.0}
+    yield core.Wave(laplacian, 0.1).advance, {}, {"state": np.column_stack([low, low])}
+    yield core.ReactionDiffusion, on, {"step": 1.0, "feed": 0.04, "kill": 0.06, "rates": (1e-3, 5e-4)}
+    yield (
+        core.wave_modes,
+        of,
+        {"areas": laplacian.areas, "displacement": low, "velocity": low, "speed": 1.0, "damping": 0.1},
+    )
     yield core.opposite_ends, on, {"share": 0.05}
     yield core.front_point, {}, {"points": points, "eye": [0, 0, 5], "direction": [0, 0, -1], "reach": 0.1}
     corners = np.random.default_rng(0).integers(n, size=(40, 3))

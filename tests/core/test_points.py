@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import fibonacci_sphere
+from benchmarks.samplings import fibonacci_sphere, uneven_sphere
 from core.geometry.points import scale_points
 
 
@@ -238,3 +238,16 @@ def test_points_left_out_before_stay_so():
     known = twice.inverse >= 0
     np.testing.assert_array_equal(twice.points[twice.inverse[known]], scaled.points[scaled.inverse[known]])
     np.testing.assert_array_equal(twice.scatter(np.ones(56), 0.0), np.where(known, 1.0, 0.0))
+
+
+def test_points_with_no_others_within_their_kernels_are_left_out():
+    """They have no row in the matrix, which solvers would wait for."""
+    narrow = core.LaplacianOptions(bandwidth="global", neighbors=20, bandwidth_factor=0.3)
+    laplacian = core.build_laplacian(uneven_sphere(3000, ratio=60.0), options=narrow)
+    alone = np.diff(laplacian.stiffness.indptr) == 0
+    assert alone.any()
+    np.testing.assert_array_equal(laplacian.component < 0, alone)
+    np.testing.assert_array_equal(laplacian.doubt == core.Doubt.LEFT_OUT, alone)
+    assert laplacian.areas[alone].max() < 1e-200
+    assert any("no others within" in notice for notice in laplacian.notices)
+    assert np.isfinite(laplacian.eigenpairs(4).eigenvalues).all()

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import core
+from benchmarks.samplings import random_sphere
 from core.applications.regions import _edge, _second, _slope, _step
 
 
@@ -125,3 +126,15 @@ def test_members_that_are_none_are_refused(members, text):
     laplacian = core.build_laplacian(core.example_sphere())
     with pytest.raises(core.InvalidPointsError, match=text):
         core.measure_region(laplacian, members)
+
+
+def test_points_left_out_do_not_count():
+    points = random_sphere(2000)
+    alone = core.measure_region(core.build_laplacian(points), points[:, 2] > 0.3)
+    far = np.concatenate([points, 3.0 * np.eye(3), points[:5] * 1.7])
+    laplacian = core.build_laplacian(far)
+    assert np.count_nonzero(laplacian.component < 0) == 8
+    beside = core.measure_region(laplacian, np.append(points[:, 2] > 0.3, np.ones(8, dtype=bool)))
+    assert beside.area == pytest.approx(alone.area, rel=1e-6)
+    assert beside.boundary_length == pytest.approx(alone.boundary_length, rel=1e-6)
+    np.testing.assert_allclose(beside.centroid, alone.centroid, atol=1e-6)

@@ -63,6 +63,20 @@ def test_a_curve_is_refused(points):
         core.build_laplacian(points)
 
 
+def test_few_wires_are_told_and_many_refused():
+    def with_wire(count):
+        along = np.linspace(0.0, 1.5, count)
+        wire = np.column_stack([0.5 + 0.2 * np.cos(4.0 * along), 0.5 + 0.2 * np.sin(4.0 * along), along])
+        return np.concatenate([square, wire])
+
+    square = np.column_stack([np.random.default_rng(0).random((2000, 2)), np.zeros(2000)])
+    laplacian = core.build_laplacian(with_wire(150))
+    assert np.median(laplacian.trust[2000:]) < 0.5 < np.median(laplacian.trust[:2000])
+    assert any("points lie in rows" in notice for notice in laplacian.notices)
+    with pytest.raises(core.NotASurfaceError, match="along a curve"):
+        core.build_laplacian(with_wire(1000))
+
+
 def test_neighbors_lie_all_around():
     points = grid_points(np.arange(400.0), 50.0 * np.arange(9), [0.0])
     middle = 4 * 400 + 200 if points[1, 0] == 1.0 else 200 * 9 + 4

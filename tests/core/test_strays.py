@@ -123,6 +123,14 @@ def test_small_parts_are_taken_below_a_number_or_an_area():
         np.testing.assert_array_equal(core.stray_points(points, **settings), found)
 
 
+@pytest.mark.parametrize(("count", "taken"), [(40, True), (400, False)])
+def test_sparser_parts_need_more_points(count, taken):
+    """Forty points five spacings apart may be chance, four hundred are not."""
+    wall = square_random(count) * np.sqrt(count) * 5.0 * SPACING
+    points = np.concatenate([random_sphere(COUNT), np.roll(wall, 1, axis=1) + [3.0, 0.0, 0.0]])
+    assert np.all(core.stray_points(points)[COUNT:] == taken)
+
+
 def test_a_floating_clump_is_taken_unless_parts_may_have_any_size():
     clump = [0.0, 0.0, 2.0] + 0.3 * SPACING * np.random.default_rng(3).normal(size=(20, 3))
     points = np.concatenate([random_sphere(COUNT), clump])
