@@ -46,10 +46,15 @@ from .applications.parts import part_means as part_means
 from .applications.parts import pile_volume as pile_volume
 from .applications.paths import geodesic_path as geodesic_path
 from .applications.paths import polygon_length as polygon_length
+from .applications.profile import Profile as Profile
+from .applications.profile import profile as profile
 from .applications.reaction import Mixture as Mixture
 from .applications.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.regions import Region as Region
 from .applications.regions import measure_region as measure_region
+from .applications.sections import CrossSection as CrossSection
+from .applications.sections import SectionCurve as SectionCurve
+from .applications.sections import cross_section as cross_section
 from .applications.segmentation import modes_needed as modes_needed
 from .applications.segmentation import nodal_domains as nodal_domains
 from .applications.segmentation import segment as segment

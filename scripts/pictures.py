@@ -271,6 +271,19 @@ def path(path):
     single(obj, "lb_distance", path)
 
 
+def section(path):
+    """The section by a plane that leans towards the viewer, on the shape."""
+    obj = coral()
+    bpy.ops.object.empty_add(rotation=(-0.3, 0.2, 0.0))
+    plane = bpy.context.object
+    studio.activate(obj)
+    obj.meshfree.coverage = 100.0
+    bpy.ops.meshfree.cross_section(plane=plane.name, thickness=0.7 * SPACING)
+    bpy.data.objects[f"{obj.name} Section"].data.materials.append(studio.paint("Section", studio.CLAY))
+    bpy.ops.meshfree.analyze()
+    single(obj, "lb_mean_curvature", path)
+
+
 def iso_lines(path):
     """Lines of equal height of a mode, shown on discs and as tubes of their own."""
     shown, made = coral(), coral()
@@ -410,6 +423,7 @@ PICTURES = {
     "signature": signature,
     "distance": distance,
     "path": path,
+    "section": section,
     "iso_lines": iso_lines,
     "signed_distance": signed_distance,
     "nearest_source": nearest_source,

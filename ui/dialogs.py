@@ -8,6 +8,7 @@ from ..operators.files.exporting import MESHFREE_OT_export_points, MESHFREE_OT_e
 from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, has_group
 from ..operators.running.application import ApplicationOperator
+from ..operators.tools.profile import MESHFREE_OT_profile
 from ..operators.tools.select import MESHFREE_OT_select_grow, selection
 from ..operators.tools.sequence import MESHFREE_OT_analyze_sequence
 from .wrapping import draw_text
@@ -19,7 +20,7 @@ def draw_setting(layout, settings, name: str, obj):
     """Draw a setting; that of a group or an attribute with a list of those of an object."""
     if name.endswith("group"):
         search_group(layout, settings, name, obj)
-    elif name in {"viewpoint", "curve"}:
+    elif name in {"viewpoint", "curve", "plane"}:
         layout.prop_search(settings, name, bpy.data, "objects")
     elif name == "source":
         layout.prop_search(settings, name, obj.data, "attributes")
@@ -86,6 +87,7 @@ _ASKING = (
     MESHFREE_OT_deform_bake,
     MESHFREE_OT_analyze_sequence,
     MESHFREE_OT_select_grow,
+    MESHFREE_OT_profile,
 )
 for kind in _ASKING:
     kind.draw = _draw_asked

@@ -6,7 +6,7 @@ from bpy.props import FloatProperty, IntProperty
 
 from .. import core
 from ..operators.objects.attributes import own_positions, read_attribute
-from ..operators.objects.place import OFFSET
+from ..operators.objects.curves import add_curves
 from ..operators.registration import Registration, Row
 from ..operators.running.application import ApplicationOperator, operator_reader
 from ..operators.tools.mesh import surface_mesh
@@ -66,13 +66,8 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
         return compute
 
     def write(self, context, obj, result):
-        name = f"{obj.name} Iso Lines"
-        made = bpy.data.objects.new(name, _curve(name, result, self.thickness))
-        for collection in obj.users_collection:
-            collection.objects.link(made)
-        made.matrix_world = obj.matrix_world
-        if OFFSET in obj:
-            made[OFFSET] = obj[OFFSET]
+        lines = [(line.points, line.closed) for line in result]
+        made = add_curves(obj, f"{obj.name} Iso Lines", lines, self.thickness)
         levels = len({line.level for line in result})
         return [f"{made.name}: {len(result):,} lines at {levels:,} values of {label(shown_attribute(obj))}"]
 
@@ -115,20 +110,6 @@ def _on_points(context, obj, values):
         return reading.local(mesh.vertices), mesh.faces, carried
 
     return compute
-
-
-def _curve(name, lines, thickness):
-    """Return a curve of polygons."""
-    curve = bpy.data.curves.new(name, "CURVE")
-    curve.dimensions = "3D"
-    curve.bevel_depth = thickness
-    for line in lines:
-        spline = curve.splines.new("POLY")
-        spline.points.add(len(line.points) - 1)
-        places = np.column_stack([line.points, np.ones(len(line.points))])
-        spline.points.foreach_set("co", places.astype(np.float32).reshape(-1))
-        spline.use_cyclic_u = line.closed
-    return curve
 
 
 TOOLS = (Registration(MESHFREE_OT_iso_lines_to_curves, menu=Row("Object", 2, 2)),)

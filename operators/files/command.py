@@ -11,7 +11,7 @@ from ...core.files import numbered_files
 from .. import registration
 from ..objects.groups import SOURCE
 from .bending import Deform, SplatInfo
-from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, MeasureFile, Mesh, Orient
+from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, MeasureFile, Mesh, Orient, Section
 from .verbs import Analyze, Apply
 
 _OWN = {
@@ -22,6 +22,7 @@ _OWN = {
     "compare": CompareWith,
     "orient_normals": Orient,
     "simulate": Frames,
+    "cross_section": Section,
 }
 _handles = []
 

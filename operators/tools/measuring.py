@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
 from ...core import PointCloudError
-from ..objects.place import copy_place
+from ..objects.curves import add_curves
 from ..objects.result import area_text, length_text, volume_text
 from ..registration import Registration, Row
 from ..running import cache
@@ -97,23 +97,12 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
     )
 
     def prepare(self, context, obj):
-        ends = np.flatnonzero(selected(obj))
-        if len(ends) != 2:
-            raise PointCloudError(
-                f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
-            )
-        reading, laplacian = analyzed(context, obj)
-        geodesics = cache.geodesics(laplacian, lambda *_: None)
-        path = core.geodesic_path(laplacian, *ends.tolist(), geodesics=geodesics)
+        reading, laplacian, ends, path = selected_path(context, obj)
         straight = length_text(core.polygon_length(laplacian.points[ends]))
         line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
 
         def add():
-            made = _curve(f"{obj.name} Path", reading.local(path), self.thickness)
-            for collection in obj.users_collection:
-                collection.objects.link(made)
-            made.matrix_world = obj.matrix_world
-            copy_place(made, obj)
+            made = add_curves(obj, f"{obj.name} Path", [(reading.local(path), False)], self.thickness)
             self.begin_notices([obj])
             self.note(f"{obj.name}: {line}", obj)
             return f"{made.name} is {line}"
@@ -121,14 +110,33 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
         return add
 
 
-def _curve(name, places, thickness):
-    """Return a curve object along places, (k, 3)."""
-    curve = bpy.data.curves.new(name, "CURVE")
-    curve.dimensions, curve.bevel_depth = "3D", thickness
-    spline = curve.splines.new("POLY")
-    spline.points.add(len(places) - 1)
-    spline.points.foreach_set("co", np.column_stack([places, np.ones(len(places))]).astype(np.float32).reshape(-1))
-    return bpy.data.objects.new(name, curve)
+def selected_path(context, obj):
+    """Find the shortest path between the two selected points.
+
+    Returns
+    -------
+    Reading
+    LaplaceBeltrami
+    ndarray, (2,) int
+        These points.
+    ndarray, (k, 3)
+        Corners of the path, as points are read.
+    """
+    ends = np.flatnonzero(selected(obj))
+    if len(ends) != 2:
+        raise PointCloudError(
+            f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
+        )
+    reading, laplacian = analyzed(context, obj)
+    path = cache.result(
+        laplacian,
+        "path",
+        ends,
+        compute=lambda: core.geodesic_path(
+            laplacian, *ends.tolist(), geodesics=cache.geodesics(laplacian, lambda *_: None)
+        ),
+    )
+    return reading, laplacian, ends, path
 
 
 TOOLS = (

@@ -95,10 +95,17 @@ def surface_mesh(laplacian, detail, progress):
     """Return a mesh of the points of an operator, and the `Prolongation` to its vertices, made only once."""
 
     def make():
-        mesh = core.mesh_surface(laplacian, detail, progress=progress)
+        mesh = bare_mesh(laplacian, detail, progress)
         return mesh, core.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
 
     return cache.result(laplacian, "mesh", detail, compute=make)
+
+
+def bare_mesh(laplacian, detail, progress):
+    """Return a mesh of the points of an operator, made only once."""
+    return cache.result(
+        laplacian, "bare mesh", detail, compute=lambda: core.mesh_surface(laplacian, detail, progress=progress)
+    )
 
 
 class _Kept:

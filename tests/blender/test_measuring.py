@@ -86,3 +86,11 @@ def test_what_has_no_rim_has_no_volume_over_it(obj):
     bpy.ops.meshfree.measure_selection(volume=True)
     assert "0 points at its rim" in told(obj)
     assert "Over the plane" not in told(obj)
+
+
+def test_a_path_of_points_with_columns_of_their_file(obj):
+    obj["lb_columns"] = '{"points": 1000, "columns": {}}'
+    obj["lb_offset"] = (100.0, 0.0, 0.0)
+    choose(obj, np.arange(1000) < 2)
+    assert bpy.ops.meshfree.geodesic_path() == {"FINISHED"}
+    assert tuple(bpy.data.objects[f"{obj.name} Path"]["lb_offset"]) == (100.0, 0.0, 0.0)

@@ -460,6 +460,8 @@ def calls():
     yield core.measure_region, on, {"members": top}
     yield core.geodesic_path, on, {"start": 0, "end": 150}
     yield core.polygon_length, {}, {"corners": points[:9]}
+    yield core.cross_section, on, {"point": [0.0, 0.0, 0.1], "normal": [0.0, 1.0, 2.0]}
+    yield core.profile, on, {"path": points[:9], "values": low}
     turned = points[:, [1, 2, 0]]
     yield core.align, {"points": points + 0.01}, {"target": points, "overlap": 0.9, "scale": True}
     yield core.match_places, {}, {"places": points[:4], "others": turned[:4], "scale": True}

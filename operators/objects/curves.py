@@ -1,0 +1,74 @@
+"""Curve objects: lines on the surface of an object's points, and plots."""
+
+import bpy
+import numpy as np
+
+from .place import OFFSET
+
+
+def add_curves(obj, name, lines, thickness=0.0):
+    """Add a curve object beside an object, with the same place.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name : str
+    lines : iterable of ((k, 3) ndarray, bool)
+        Corners in the object's local space, and whether the last one is joined to the first.
+    thickness : float
+        Radius of tubes along the lines.
+
+    Returns
+    -------
+    bpy.types.Object
+    """
+    made = bpy.data.objects.new(name, _curve(name, lines, thickness))
+    _link(made, obj)
+    made.matrix_world = obj.matrix_world
+    if OFFSET in obj:
+        made[OFFSET] = obj[OFFSET]
+    return made
+
+
+def plot(obj, name, across, values):
+    """Add a curve object beside an object, upright in the world: numbers along X, values along Z, from zero.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    name : str
+    across, values : ndarray, (k,)
+        Where a value is not finite, there is a gap.
+
+    Returns
+    -------
+    bpy.types.Object
+    """
+    known = np.isfinite(values)
+    places = np.column_stack([across, values, np.zeros(len(values))])
+    runs = np.split(np.arange(len(values)), np.flatnonzero(np.diff(known)) + 1)
+    lines = [(places[run], False) for run in runs if known[run[0]] and len(run) > 1]
+    made = bpy.data.objects.new(name, _curve(name, lines, 0.0))
+    _link(made, obj)
+    made.rotation_euler.x = 0.5 * np.pi
+    made.location.xy = obj.matrix_world.translation.xy
+    return made
+
+
+def _link(made, obj):
+    """Link an object to the collections of another one."""
+    for collection in obj.users_collection:
+        collection.objects.link(made)
+
+
+def _curve(name, lines, thickness):
+    """Return a curve of polygons, as of `add_curves`."""
+    curve = bpy.data.curves.new(name, "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", thickness
+    for points, closed in lines:
+        spline = curve.splines.new("POLY")
+        spline.points.add(len(points) - 1)
+        places = np.column_stack([points, np.ones(len(points))])
+        spline.points.foreach_set("co", places.astype(np.float32).reshape(-1))
+        spline.use_cyclic_u = closed
+    return curve

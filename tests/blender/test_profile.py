@@ -1,0 +1,98 @@
+"""Profile: the height or an attribute along the path between two selected points, as a curve and a table."""
+
+import bpy
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests.blender.clouds import add_object, local_points, sphere_points
+from tests.blender.operators import refused
+from tests.blender.test_smooth_colors import add_values
+
+
+@pytest.fixture
+def obj():
+    """A sphere with two points selected, a right angle apart."""
+    obj = add_object(sphere_points(1000))
+    points = local_points(obj)
+    ends = [0, int(np.abs(points @ points[0]).argmin())]
+    obj.data.vertices.foreach_set("select", np.isin(np.arange(1000), ends))
+    obj.location = (1.0, 2.0, 3.0)
+    bpy.context.view_layer.update()
+    return obj
+
+
+def told(obj):
+    return "\n".join(notice.text for notice in obj.meshfree.notices)
+
+
+def drawn(obj):
+    """Return the corners of the curve in the world, (k, 3), in their order."""
+    made = bpy.data.objects[f"{obj.name} Profile"]
+    bpy.context.view_layer.update()
+    matrix = np.array(made.matrix_world)
+    local = np.array([point.co[:3] for spline in made.data.splines for point in spline.points])
+    return local @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def table(obj):
+    text = bpy.data.texts[f"{obj.name} Profile.csv"].as_string()
+    return text.splitlines()[0], np.loadtxt(text.splitlines()[1:], delimiter=",")
+
+
+def test_height_by_distance(obj):
+    assert bpy.ops.meshfree.profile() == {"FINISHED"}
+    places, (header, rows) = drawn(obj), table(obj)
+    assert header == "distance,x,y,z,height"
+    assert_allclose(rows[-1, 0], 0.5 * np.pi, atol=0.03)
+    assert_allclose(np.linalg.norm(rows[:, 1:4] - [1.0, 2.0, 3.0], axis=1), 1.0, atol=5e-3)
+    assert_allclose(rows[:, 4], rows[:, 3], atol=1e-9)
+    assert_allclose(places[:, 0], 1.0 + rows[:, 0], atol=1e-5)
+    assert_allclose(places[:, 1], 2.0, atol=1e-5)
+    assert_allclose(places[:, 2], rows[:, 4], atol=1e-5)
+    assert "height along Z from" in told(obj)
+
+
+def test_an_attribute_in_edit_mode_along_another_axis(obj):
+    points = local_points(obj)
+    add_values(obj, "wide", 10.0 * points[:, 1])
+    obj.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert bpy.ops.meshfree.profile(source="wide", axis="Y") == {"FINISHED"}
+    assert obj.mode == "EDIT"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    header, rows = table(obj)
+    assert header == "distance,x,y,z,height,wide"
+    assert_allclose(rows[:, 4], rows[:, 2], atol=1e-9)
+    assert_allclose(rows[:, 5], 10.0 * (rows[:, 2] - 2.0), atol=0.2)
+    assert_allclose(drawn(obj)[:, 2], rows[:, 5], atol=1e-5)
+
+
+def test_gaps_are_told(obj):
+    points = local_points(obj)
+    ends = np.flatnonzero([vertex.select for vertex in obj.data.vertices])
+    middle = points[ends].sum(axis=0) / np.linalg.norm(points[ends].sum(axis=0))
+    add_values(obj, "some", np.where(points @ middle > 0.95, np.nan, 1.0))
+    assert bpy.ops.meshfree.profile(source="some") == {"FINISHED"}
+    assert len(bpy.data.objects[f"{obj.name} Profile"].data.splines) == 2
+    missing = np.count_nonzero(np.isnan(table(obj)[1][:, 5]))
+    assert f"{missing} of " in told(obj)
+
+
+def test_what_has_no_profile_is_refused(obj):
+    obj.data.attributes.new("label", "INT", "POINT")
+    with refused(obj, 'no attribute "nothing"'):
+        bpy.ops.meshfree.profile(source="nothing")
+    with refused(obj, "is not one number"):
+        bpy.ops.meshfree.profile(source="label")
+    obj.data.vertices.foreach_set("select", np.arange(1000) < 3)
+    with refused(obj, "3 points of .* are selected"):
+        bpy.ops.meshfree.profile()
+
+
+def test_an_attribute_without_values_leaves_nothing(obj):
+    add_values(obj, "none", np.full(1000, np.nan))
+    with pytest.raises(RuntimeError, match="has no values along the path"):
+        bpy.ops.meshfree.profile(source="none")
+    assert len(bpy.data.objects) == 1
+    assert not bpy.data.texts
