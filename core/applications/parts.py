@@ -14,12 +14,8 @@ from ..geometry import as_mask
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
 from .graph import mean_spacing
-from .regions import LENGTH_OFF, boundary_lengths, measure_region
+from .regions import LENGTH_OFF, STRIP, area_doubts, boundary_lengths, measure_region
 
-_MOMENTS = 0.1  # share of an area that may be wrong where trust is a half
-_ROUGH = 0.04  # of the height of noise, over the spacing: what it adds to areas
-_ROUNDED = 6.0  # of noise times spacing times the squared mean curvature: what smoothing it takes from edges
-_STRIP = 0.2  # of the spacing, along the boundary of the surface: where that is
 _NEAR = 7  # nearest points, the point itself among them, of which one is beyond the rim
 
 
@@ -101,14 +97,14 @@ def measure_parts(
     spacing = mean_spacing(laplacian)
     own = boundary_lengths(laplacian.areas, laplacian.boundary_distance, spacing)
     areas, lengths = parts.sums(laplacian.areas), parts.sums(own)
-    doubt = parts.sums(_doubts(laplacian, spacing)) + _STRIP * np.abs(parts.sums(spacing * own))
+    doubt = parts.sums(area_doubts(laplacian, spacing)) + STRIP * np.abs(parts.sums(spacing * own))
     doubt_of_lengths = LENGTH_OFF[1] * np.abs(lengths)
     divided = np.flatnonzero(parts.divided())
     for done, part in enumerate(divided):
         report("Parts", done / len(divided))
         region = measure_region(laplacian, parts.members(part))
         areas[part], lengths[part] = region.area, region.boundary_length
-        doubt[part] = np.hypot(doubt[part], region.area_uncertainty)
+        doubt[part] = region.area_uncertainty
         doubt_of_lengths[part] = region.length_uncertainty
     return Parts(parts.labels, parts.counts(), areas, doubt, np.maximum(lengths, 0.0), doubt_of_lengths)
 
@@ -292,13 +288,3 @@ class _Labelled:
 def _checked(labels: ArrayLike, count: int) -> Ints:
     """Return the labels of points."""
     return check_array(labels, "Labels", [(count,)], f"Give a whole number for each of {count} points.", "iu")
-
-
-def _doubts(laplacian: LaplaceBeltrami, spacing: Floats) -> Floats:
-    """Return by how much the area of each point may be wrong, (n,)."""
-    missed = _MOMENTS * np.sqrt(1.0 / np.maximum(laplacian.trust, 1e-6) - 1.0)
-    noise = np.linalg.norm(laplacian.surface_points - laplacian.points, axis=1)
-    bend = 0.5 * np.trace(laplacian.shape_operator, axis1=1, axis2=2)
-    rough = noise / spacing * (_ROUGH + _ROUNDED * (spacing * bend) ** 2)
-    result: Floats = laplacian.areas * np.minimum(missed + rough, 1.0)
-    return result

@@ -33,6 +33,10 @@ _NARROW = 3.0  # spacings from the boundary of the surface over which areas are 
 _THIN = 0.7  # of the depth of a thin part that may be taken for that
 _TURNS = 0.06, 0.09  # by which the line turns along a spacing, until plain sums are nearer to the area
 _VARIANCE = 1.0 / 7.0  # of the derivative of the step
+_MOMENTS = 0.1  # share of an area that may be wrong where trust is a half
+_ROUGH = 0.04  # of the height of noise, over the spacing: what it adds to areas
+_ROUNDED = 6.0  # of noise times spacing times the squared mean curvature: what smoothing it takes from edges
+STRIP = 0.2  # of the spacing, along the boundary of the surface: where that is
 _AREA_OFF = 1.0  # of the area of a square of one spacing: what each such piece of the line leaves open, two deviations
 LENGTH_OFF = 0.01, 0.05  # of the length of the line, and of the boundary of the surface
 _NEAREST = 24  # pieces of the line by which the distance of a point is measured
@@ -56,7 +60,8 @@ class Region:
     centroid : ndarray, (3,)
         Mean of positions by area [L].
     area_uncertainty, length_uncertainty : float
-        The true values are expected within these: a point tells only by its spacing where the line is.
+        The true values are expected within these: a point tells only by its spacing where the line is, and areas are
+        as good as the trust in them, and noise, allow.
     """
 
     area: float
@@ -128,16 +133,27 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
     turn = abs(second) / max(length, 1e-300) * float(np.median(spacing))
     fine = np.clip((_TURNS[1] - turn) / (_TURNS[1] - _TURNS[0]), 0.0, 1.0) if np.all(share % 1.0 == 0.0) else 0.0
     area = fine * smooth + (1.0 - fine) * plain
-    own = float(boundary_lengths(areas * step, laplacian.boundary_distance, spacing).sum())
+    owned = boundary_lengths(areas * step, laplacian.boundary_distance, spacing)
+    own, doubt = float(owned.sum()), float(share @ area_doubts(laplacian, spacing) + STRIP * abs(spacing @ owned))
     weight = areas * (fine * step + (1.0 - fine) * share)
     squared = areas @ (_slope(inside / width) / width * spacing**3)
     return Region(
         area=area,
         boundary_length=length + own,
         centroid=weight @ laplacian.surface_points / max(weight.sum(), 1e-300),
-        area_uncertainty=_AREA_OFF * float(np.sqrt(squared)),
+        area_uncertainty=float(np.hypot(_AREA_OFF * np.sqrt(squared), doubt)),
         length_uncertainty=float(np.dot(LENGTH_OFF, (length * (_WIDE * spacing / width).max() ** 1.5, own))),
     )
+
+
+def area_doubts(laplacian: LaplaceBeltrami, spacing: Floats) -> Floats:
+    """Return by how much the area of each point may be wrong, (n,): by missed moments, and by noise."""
+    missed = _MOMENTS * np.sqrt(1.0 / np.maximum(laplacian.trust, 1e-6) - 1.0)
+    noise = np.linalg.norm(laplacian.surface_points - laplacian.points, axis=1)
+    bend = 0.5 * np.trace(laplacian.shape_operator, axis1=1, axis2=2)
+    rough = noise / spacing * (_ROUGH + _ROUNDED * (spacing * bend) ** 2)
+    result: Floats = laplacian.areas * np.minimum(missed + rough, 1.0)
+    return result
 
 
 def _shares(laplacian: LaplaceBeltrami, members: ArrayLike) -> Floats:

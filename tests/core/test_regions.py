@@ -77,7 +77,8 @@ def test_all_of_a_closed_surface_has_no_boundary(operators):
     laplacian = operators("even sphere")
     found = core.measure_region(laplacian, np.ones(len(laplacian.points), dtype=bool))
     assert found.area == pytest.approx(laplacian.areas.sum(), rel=1e-12)
-    assert found.boundary_length == found.area_uncertainty == 0.0
+    assert found.boundary_length == 0.0
+    assert 0.0 < found.area_uncertainty < 0.02 * found.area
     np.testing.assert_allclose(found.centroid, 0.0, atol=1e-3)
 
 
@@ -149,3 +150,11 @@ def test_points_left_out_and_doubled_change_nothing():
     assert other.area == pytest.approx(one.area, rel=0.01)
     assert other.boundary_length == pytest.approx(one.boundary_length, rel=0.01)
     assert 0.0 < other.area_uncertainty < 0.1 * other.area
+
+
+def test_the_area_of_all_is_as_uncertain_as_that_of_its_component():
+    rng, points = np.random.default_rng(0), random_sphere(1500)
+    laplacian = core.build_laplacian(points * (1.0 + 0.01 * rng.standard_normal((1500, 1))))
+    found, parts = core.measure_region(laplacian, np.ones(1500, dtype=bool)), core.measure_parts(laplacian)
+    assert found.area_uncertainty == pytest.approx(parts.area_uncertainties[0], rel=1e-9)
+    assert found.area_uncertainty > 1e-3 * found.area
