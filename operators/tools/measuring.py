@@ -78,8 +78,8 @@ def _pile(laplacian, chosen):
 
 
 def _within(text, value, off):
-    """Return a number with its uncertainty, as texts of the scene's units."""
-    return f"{text(value)} +- {text(off)}"
+    """Return a number in the scene's units with its uncertainty, as a share of it."""
+    return f"{text(value)} +- {100.0 * off / abs(value):.2g} %" if value else f"{text(value)} +- {text(off)}"
 
 
 class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
