@@ -460,6 +460,9 @@ def calls():
     yield core.measure_region, on, {"members": top}
     yield core.geodesic_path, on, {"start": 0, "end": 150}
     yield core.polygon_length, {}, {"corners": points[:9]}
+    yield core.measure_parts, on, {"labels": top.astype(int)}
+    yield core.part_means, on, {"values": low, "labels": top.astype(int)}
+    yield core.pile_volume, on, {"members": top}
     yield core.cross_section, on, {"point": [0.0, 0.0, 0.1], "normal": [0.0, 1.0, 2.0]}
     yield core.profile, on, {"path": points[:9], "values": low}
     turned = points[:, [1, 2, 0]]
