@@ -139,6 +139,7 @@ def part_means(laplacian: LaplaceBeltrami, values: ArrayLike, labels: ArrayLike 
     --------
     The squared height over the unit sphere is 1 / 3 on average:
 
+    >>> import numpy as np
     >>> import core
     >>> points = core.example_sphere()
     >>> print(core.part_means(core.build_laplacian(points), points[:, 2] ** 2)[0].round(2))
@@ -206,6 +207,7 @@ def pile_volume(laplacian: LaplaceBeltrami, members: ArrayLike) -> Pile:
     --------
     Half of the unit ball, 2 pi / 3:
 
+    >>> import numpy as np
     >>> import core
     >>> points = core.example_sphere()
     >>> found = core.pile_volume(core.build_laplacian(points), points[:, 2] > 0)
