@@ -100,5 +100,5 @@ class MESHFREE_OT_cross_section(CrossSection, ApplicationOperator, bpy.types.Ope
 
 
 TOOLS = (
-    Registration(MESHFREE_OT_cross_section, panel=Row("Measure", 6, 1), menu=Row("Object", 7, 5), verb=CrossSection),
+    Registration(MESHFREE_OT_cross_section, panel=Row("Measure", 6, 2), menu=Row("Object", 7, 5), verb=CrossSection),
 )
