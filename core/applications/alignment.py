@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from ..algebra import nearest_rotations
 from ..arguments import check_array, check_finite, check_positions, check_switches, real
 from ..errors import InvalidPointsError, PointCloudError
-from ..geometry import check_points, read_surface
+from ..geometry import SMOOTH, check_points, read_surface
 from ..options import LaplacianOptions
 from ..types import Array, Bools, Floats, Ints, Progress, Report
 
@@ -27,7 +27,6 @@ _NARROWER = 0.85  # each further kernel, down to one spacing
 _ROUNDS, _FINE_ROUNDS = 80, 20  # at most
 _STILL = 2e-2, 1e-6  # spacings that a round may move points by when it is the last one
 _FACING = 0.3  # least cosine between normals of points that may be one place of the surface
-_SMOOTH = 0.7  # the same for points a spacing apart
 _BESIDE = 1.0  # spacings along the surface from the closest point, which is beside the surface otherwise
 _SPREAD = 3.0  # standard deviations, the width of the last kernel
 _TOGETHER = 0.5  # spacings across the surface within which points lie on it
@@ -391,7 +390,7 @@ class _Search:
         for _ in range(_FINE_ROUNDS):
             self.report()
             pairs = self.matches(matrix)
-            pairs = pairs.take((pairs.aside < _BESIDE) & (pairs.cosine > _SMOOTH))
+            pairs = pairs.take((pairs.aside < _BESIDE) & (pairs.cosine > SMOOTH))
             matrix, moved = self.step(matrix, pairs, self.weight(pairs))
             if moved < _STILL[1] * self.unit:
                 break
@@ -431,7 +430,7 @@ class _Search:
         """Tell whether the surfaces agree where they overlap, and nothing slides."""
         pairs = self.matches(matrix)
         above, height = pairs.aside < _BESIDE, np.abs(pairs.height)
-        agree = above & (pairs.cosine > _SMOOTH) & (height < _TOGETHER * pairs.spacing)
+        agree = above & (pairs.cosine > SMOOTH) & (height < _TOGETHER * pairs.spacing)
         against = above & ~agree & (height < _NEAR * pairs.spacing)
         count = len(self.moving.places)
         overlap, both = float(agree[:count].mean()), float(agree.mean())

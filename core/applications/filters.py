@@ -16,7 +16,7 @@ from ..algebra import (
     degree_needed,
     largest_eigenvalue,
 )
-from ..arguments import as_doubles, check_array, check_finite, check_switches, real, whole
+from ..arguments import as_doubles, check_array, check_finite, check_switches, not_negative, real, whole
 from ..errors import PointCloudError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
@@ -46,9 +46,7 @@ def exponential(time: float) -> Response:
     PointCloudError
         A time that is negative or not finite.
     """
-    number = real(time)
-    if not 0.0 <= number < np.inf:
-        raise PointCloudError(f"The time of an exponential response is {time!r}. Use a number that is not negative.")
+    number = not_negative(time, "time of an exponential response")
     return lambda eigenvalues: np.exp(-number * np.asarray(eigenvalues))
 
 
@@ -72,9 +70,7 @@ def fairing(time: float, order: int = 3) -> Response:
     PointCloudError
         A time that is negative or not finite, or another order.
     """
-    number, power = real(time), whole(order)
-    if not 0.0 <= number < np.inf:
-        raise PointCloudError(f"The time of the fairing is {time!r}. Use a number that is not negative.")
+    number, power = not_negative(time, "time of the fairing"), whole(order)
     if power not in (1, 2, 3):
         raise PointCloudError(f"The order of the fairing is {order!r}. Use 1, 2 or 3.")
     return lambda eigenvalues: 1.0 / (1.0 + (number * np.asarray(eigenvalues)) ** power)

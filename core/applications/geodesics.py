@@ -212,15 +212,15 @@ class Geodesics:
         distance, before = dijkstra(graph, indices=count, return_predecessors=True)
         # The side on which a path leaves the curve is that of all its points. As its first point may lie on the other
         # side, next to the curve, the second one decides of those behind, seen from where the path starts.
-        known = before >= 0
-        first = np.where(known & (before < count), before, count)
-        second = known & (before < count) & (before[first] == count)
-        root = np.where(known & (before < count) & ~second, before, np.arange(count + 1))
+        every = np.arange(count + 1)
+        further = (before >= 0) & (before < count)  # reached over another point
+        second = further & (before[np.where(further, before, count)] == count)
+        root = np.where(further & ~second, before, every)
         while np.any(root != root[root]):
             root = root[root]
         at = np.zeros(count + 1, dtype=np.int64)
         at[band] = np.arange(len(band))
-        start = at[np.where(second, first, np.arange(count + 1))[:count]]
+        start = at[np.where(second, before, every)[:count]]
         offset = laplacian.surface_points - feet[start]
         sides = np.where(np.einsum("ij,ij->i", offset, across[start]) < 0.0, -1.0, 1.0)
         sides = np.append(sides, 1.0)

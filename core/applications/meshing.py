@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
-from ..arguments import real
+from ..arguments import positive
 from ..errors import NotEnoughMemoryError, PointCloudError
 from ..geometry import Prolongation, check_points
 from ..memory import available_memory
@@ -98,9 +98,7 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     True
     """
     report = progress or (lambda stage, fraction: None)
-    size = real(detail)
-    if not 0.0 < size < np.inf:
-        raise PointCloudError(f"The detail of the mesh is {detail!r}. Use a number above zero.")
+    size = positive(detail, "detail of the mesh")
     report("Grid", 0.5)
     kept = laplacian.component >= 0
     spacing = np.sqrt(np.median(laplacian.areas[kept]))

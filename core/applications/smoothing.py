@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..algebra import solve_symmetric
-from ..arguments import check_switches, real, whole
+from ..arguments import check_switches, positive, real, whole
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import check_values
 from ..operator import LaplaceBeltrami, Spectrum
@@ -261,9 +261,7 @@ def roughness(
     """
     if wavelength is None:
         wavelength = _DETAIL * float(np.median(laplacian.smoothing_lengths))
-    length = real(wavelength)
-    if not 0.0 < length < np.inf:
-        raise PointCloudError(f"The wavelength of the roughness is {wavelength!r}. Use a number above zero.")
+    length = positive(wavelength, "wavelength of the roughness")
     smooth = fair_points(laplacian, (length / (2.0 * np.pi)) ** 2, progress=progress)
     return np.einsum("ij,ij->i", laplacian.points - smooth, laplacian.normals)
 

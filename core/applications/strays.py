@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import real, whole
+from ..arguments import positive, real, whole
 from ..errors import PointCloudError
 from ..geometry import (
     PARTS,
@@ -108,8 +108,7 @@ class Strays:
         PointCloudError
             A strictness that is not above zero, or sizes that are negative.
         """
-        if not 0.0 < real(strictness) < np.inf:
-            raise PointCloudError(f"The strictness is {strictness!r}. Use a number above zero.")
+        positive(strictness, "strictness")
         if not whole(smallest) >= 0:
             raise PointCloudError(
                 f"The smallest part has {smallest!r} points. Use a whole number that is not negative."

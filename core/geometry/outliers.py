@@ -10,7 +10,7 @@ from .quadrics import Quadrics, fit_quadrics, heights_over
 
 # Neighbours asked: near ones, and some further away, where the density may be another.
 _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
-_SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
+SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
 _BLOCK = 1 << 13  # points looked at at one time
 
 
@@ -76,7 +76,7 @@ def _off_surface(nearest: Nearest, surface: Quadrics, alone: Alone, known: Bools
     alone.fit(nearest, surface, np.unique(witnesses))
     scatter = alone.scatter[witnesses]
     height = heights_over_witnesses(nearest, alone.surface, suspects)
-    height /= ON * spacing[suspects, None] + _SCATTERS * scatter
+    height /= ON * spacing[suspects, None] + SCATTERS * scatter
     height[sparse[suspects, None] & (scatter > FILLING * spacing[witnesses])] = np.inf
     found = -1
     while np.count_nonzero(result) > found:
@@ -124,7 +124,7 @@ def _let_go(nearest: Nearest, surface: Quadrics, rows: Ints) -> tuple[Quadrics, 
     def weigh(part: slice) -> None:
         block = rows[part]
         height, scatter = _scatter(surface, points, block, nearest.index[block])
-        far = height / np.maximum(_SCATTERS * scatter, ON * spacing[block])[:, None]
+        far = height / np.maximum(SCATTERS * scatter, ON * spacing[block])[:, None]
         weight[part] = nearest.weight[block] * np.maximum(1.0 - far**2, 1e-3) ** 2
 
     parts = blocks(len(rows), _BLOCK)

@@ -4,20 +4,18 @@ import numpy as np
 
 from ..types import Bools, Floats, Ints, Report
 from .components import even_reach, label_connected
-from .nearest import ON, Nearest
+from .nearest import GAP, ON, Nearest
 from .noise import FILLING
-from .outliers import Alone, heights_over_witnesses, third_least, witnesses_of
+from .outliers import SCATTERS, Alone, heights_over_witnesses, third_least, witnesses_of
 from .quadrics import fit_quadrics
 from .rows import look_across_rows
 
 PARTS = 30  # points of a part that others are joined to, and that is no clump of stray points
 _ON = 0.4  # spacings from the surface within which a point lies on it
-_SCATTERS = 3.0  # standard deviations of the surface more than that are on it, too
 _AROUND = slice(1, 25)  # neighbours whose spacing a point's own is compared with, by their lower quartile
 _LONELY = 1.7  # times that a point's third neighbour is away: no witness until it is known to be on the surface
 _SPARSE = 1.3  # times its spacing: witnesses must show a surface
 _FILLING = 0.6  # scatter around a witness, in spacings, that no surface has
-_SPARSER = 2.5  # times the median spacing of the cloud: they must show one without volume
 _ROUGHER = 2.0  # nor has it so much more than the upper quartile of the cloud
 _ROUNDS = 6  # after which what is on the surface hardly changes
 _NEAR, _GAP = 3, 2.5  # points within so many distances of their third neighbours, at both ends, are joined
@@ -47,7 +45,7 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
     spacing, surface = nearest.spacing, nearest.quadrics
     around = np.quantile(spacing[nearest.index[:, _AROUND]], 0.25, axis=1)
     third = nearest.distance[:, min(_NEAR, nearest.distance.shape[1] - 1)]
-    sparse, sparsest = spacing > _SPARSE * around, spacing > _SPARSER * np.median(spacing)
+    sparse, sparsest = spacing > _SPARSE * around, spacing > GAP * np.median(spacing)
     off, before = third > _LONELY * around, np.zeros(len(spacing), dtype=bool)
     for _ in range(_ROUNDS):
         report()
@@ -71,7 +69,7 @@ def _scores(clean: Nearest, sparse: Bools, sparsest: Bools, off: Bools) -> Float
     alone.fit(clean, surface, np.unique(witnesses))
     scatter = alone.scatter[witnesses]
     height = heights_over_witnesses(clean, alone.surface, suspects)
-    height /= _ON * spacing[suspects, None] + _SCATTERS * scatter
+    height /= _ON * spacing[suspects, None] + SCATTERS * scatter
     limit = np.where(sparse, max(_FILLING, _ROUGHER * roughness), np.inf)
     limit[sparsest] = FILLING
     filling = scatter > limit[suspects, None] * spacing[witnesses]

@@ -11,8 +11,8 @@ from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
 from ..algebra import coarse_to_fine, lift_lowest
-from ..arguments import real, whole
-from ..errors import PointCloudError, SolverError, TooFewPointsError, UnresolvedModesError
+from ..arguments import positive, whole
+from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
 from ..types import Floats, Ints, Progress, Report
@@ -62,8 +62,7 @@ def solve_spectrum(
         raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
     if count > n // 3:
         raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
-    if not 0.0 < real(tolerance) < np.inf:
-        raise PointCloudError(f"The tolerance of the modes is {tolerance!r}. Use a number above zero.")
+    positive(tolerance, "tolerance of the modes")
     check_mode_memory(n, int(count))
     count, done = int(count), 0.0
 
