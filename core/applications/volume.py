@@ -41,13 +41,17 @@ class EnclosedVolume:
     notices: list[str]
 
 
-def enclosed_volume(laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> EnclosedVolume:
+def enclosed_volume(
+    laplacian: LaplaceBeltrami, *, mesh: SurfaceMesh | None = None, progress: Progress | None = None
+) -> EnclosedVolume:
     """Measure the volume that the surface of points encloses.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
         Of n points. The signs of its normals do not matter.
+    mesh : SurfaceMesh, optional
+        Of the same operator, if there is one: most of the work.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -89,7 +93,7 @@ def enclosed_volume(laplacian: LaplaceBeltrami, *, progress: Progress | None = N
     4.19 True [0]
     """
     report = progress or (lambda stage, fraction: None)
-    mesh = mesh_surface(laplacian, progress=progress)
+    mesh = mesh or mesh_surface(laplacian, progress=progress)
     report("Volume", 0.95)
     kept = laplacian.component >= 0
     unit = float(np.sqrt(np.median(laplacian.areas[kept])))

@@ -13,8 +13,8 @@ from ..objects.parts import PartRow, keep_rows
 from ..objects.quantities import SEGMENT, written_by
 from ..objects.result import area_text
 from ..registration import Registration, Row
-from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
+from .mesh import volume_of
 
 _LOST = "points are left out of the Laplacian, and not measured"
 
@@ -124,7 +124,7 @@ def _rows(laplacian, kind, labels, values, progress):
 
 def _add_volumes(laplacian, table, progress):
     """Add the volumes of closed components to their rows, which are those of the table."""
-    found = cache.result(laplacian, "volume", compute=lambda: core.enclosed_volume(laplacian, progress=progress))
+    found = volume_of(laplacian, progress)
     closed = (found.openings == 0) & (found.volumes > 0.0)
     for number in np.flatnonzero(closed).tolist():
         table.rows[number] = table.rows[number]._replace(

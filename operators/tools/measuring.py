@@ -10,6 +10,7 @@ from ..objects.curves import add_curves
 from ..objects.result import area_text, length_text, volume_text
 from ..registration import Registration, Row
 from ..running import cache
+from .mesh import volume_of
 from .select import SelectionOperator, analyzed, selected
 
 
@@ -32,7 +33,7 @@ class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
         region = cache.result(laplacian, "region", chosen, compute=lambda: core.measure_region(laplacian, chosen))
         lines, notices = _texts(laplacian, region, chosen), []
         if self.volume:
-            found = cache.result(laplacian, "volume", compute=lambda: core.enclosed_volume(laplacian))
+            found = volume_of(laplacian, lambda *_: None)
             lines.append(f"Volume {_within(volume_text, found.volume, found.uncertainty)}")
             pile, missing = _pile(laplacian, chosen)
             lines += pile

@@ -108,6 +108,15 @@ def bare_mesh(laplacian, detail, progress):
     )
 
 
+def volume_of(laplacian, progress):
+    """Return the `EnclosedVolume` of an operator, by the mesh that other tools make, too, measured only once."""
+    return cache.result(
+        laplacian,
+        "volume",
+        compute=lambda: core.enclosed_volume(laplacian, mesh=bare_mesh(laplacian, 1.0, progress), progress=progress),
+    )
+
+
 class _Kept:
     """The data of an object's points: attributes, colors, and weights in vertex groups."""
 

@@ -71,3 +71,10 @@ def test_a_flat_sheet_has_a_doubt_and_no_volume(operators):
     assert found.uncertainty > 0.05
     assert abs(found.volume) < found.uncertainty
     assert found.openings.sum() >= 1
+
+
+def test_a_mesh_that_there_is_already_gives_the_same():
+    laplacian = core.build_laplacian(core.example_sphere())
+    alone, given = (core.enclosed_volume(laplacian, mesh=mesh) for mesh in (None, core.mesh_surface(laplacian)))
+    assert given.volume == alone.volume
+    assert given.uncertainty == alone.uncertainty
