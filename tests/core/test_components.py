@@ -171,8 +171,8 @@ class TestIslands:
 
     @pytest.mark.parametrize("count", [110, 200])
     def test_a_small_random_disc(self, count):
-        areas = [core.estimate_areas(disc_random(count, seed)[0]).sum() for seed in range(3)]
-        np.testing.assert_allclose(areas, np.pi, rtol=0.07)
+        areas = np.array([core.estimate_areas(disc_random(count, seed)[0]).sum() for seed in range(10)])
+        assert np.sqrt(np.mean((areas / np.pi - 1.0) ** 2)) < 0.05
 
     @pytest.mark.parametrize(("count", "bound"), [(110, 0.2), (200, 0.1)])
     def test_a_small_hemisphere(self, count, bound):
