@@ -7,7 +7,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..geometry import SMALLEST
+from ..geometry import COUNT
 from ..operator import LaplaceBeltrami
 from ..types import Array, Bools, Floats, Ints
 
@@ -112,11 +112,11 @@ def _bridge(lengths: sparse.csr_array, points: Floats, component: Ints) -> spars
 def coupled_components(laplacian: LaplaceBeltrami) -> Ints:
     """Number the components of the cloud between which the operator couples no points, (n,) int.
 
-    Those of fewer than 50 points are -1: points left out, and single ones within a component that are so far off
+    Those of fewer than 41 points are -1: points left out, and single ones within a component that are so far off
     its surface that they have no neighbours.
     """
     count, label = connected_components(laplacian.stiffness, directed=False)
-    large = np.bincount(label, minlength=count) >= SMALLEST
+    large = np.bincount(label, minlength=count) >= COUNT
     return np.where(large, np.cumsum(large) - 1, -1)[label]
 
 

@@ -2,11 +2,11 @@
 
 from .boundary import Boundary
 from .cloud import Cloud, Discs, estimate_normals, read_cloud, read_surface, surface_discs
-from .components import SMALLEST, move_apart
+from .components import move_apart
 from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights
 from .doubt import Doubt
 from .moments import LARGEST, MET, TERMS, EdgeTerms, put_terms
-from .nearest import ON, ROUNDS, SMOOTH, fading_weights, find_nearest, nearest_rows, typical_distance
+from .nearest import COUNT, ON, ROUNDS, SMOOTH, fading_weights, find_nearest, nearest_rows, typical_distance
 from .normals import unit_normals
 from .orientation import orient_normals, toward
 from .pairs import Pairs, find_pairs

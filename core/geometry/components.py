@@ -5,9 +5,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..types import Bools, Floats, Ints
-from .nearest import NEXT, Nearest
+from .nearest import COUNT, NEXT, Nearest
 
-SMALLEST = 50  # points of a component that gets an operator of its own
 _GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap
 
 
@@ -27,7 +26,7 @@ def label_components(nearest: Nearest) -> Ints:
     Returns
     -------
     ndarray, (m,) int
-        The largest component is 0. Those of fewer than 50 points, which get no operator, are -1.
+        The largest component is 0. Those of fewer points than a neighbourhood has, 41, which get no operator, are -1.
     """
     index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
     reach = _GAP * distance[:, :NEXT][:, -1]  # of eight points there are seven neighbors
@@ -53,7 +52,7 @@ def label_connected(index: Ints, joined: Bools) -> Ints:
     return label
 
 
-def number_by_size(label: Ints, smallest: int = SMALLEST) -> Ints:
+def number_by_size(label: Ints, smallest: int = COUNT) -> Ints:
     """Number labels by how many points have them, the most frequent 0; rarer ones than the smallest size are -1."""
     _, label, size = np.unique(label, return_inverse=True, return_counts=True)
     order = np.argsort(-size, kind="stable")

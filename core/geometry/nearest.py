@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, fit_quadrics
 
-COUNT = 41  # the point itself and 40 others
+COUNT = 41  # the point itself and 40 others, so that a component has an operator if its neighbourhoods lie within it
 NEXT = 8  # nearest of them: as many as there are directions in which a sheet or a row goes on
 AGREEING = 3  # neighbours that say the same are believed: there are as many faces at a corner; fewer may be chance
 FEW = 12  # neighbours that a spacing, a quadric or a parabola follows from at least

@@ -14,7 +14,7 @@ from benchmarks.samplings import (
     uneven_sphere,
 )
 from core.geometry.components import label_components, move_apart
-from core.geometry.nearest import find_nearest
+from core.geometry.nearest import COUNT, find_nearest
 from core.options import LaplacianOptions
 
 LARGE, SMALL = fibonacci_sphere(1500), 0.7 * fibonacci_sphere(900) + [4.0, 0.0, 0.0]
@@ -38,10 +38,10 @@ class TestLabels:
         label = label_components(find_nearest(np.concatenate([SMALL, LARGE])))
         np.testing.assert_array_equal(label, np.repeat([1, 0], [900, 1500]))
 
-    @pytest.mark.parametrize("count", [45, 55])
-    def test_components_of_fewer_than_fifty_points_are_none(self, count):
+    @pytest.mark.parametrize("count", [40, 41])
+    def test_components_smaller_than_a_neighbourhood_are_none(self, count):
         label = label_components(find_nearest(np.concatenate([LARGE, 0.1 * fibonacci_sphere(count) + [3.0, 0.0, 0.0]])))
-        np.testing.assert_array_equal(label, np.repeat([0, -1 if count < 50 else 1], [1500, count]))
+        np.testing.assert_array_equal(label, np.repeat([0, -1 if count < COUNT else 1], [1500, count]))
 
     @pytest.mark.parametrize(
         "points", [random_sphere(1500), uneven_sphere(1000), noisy_sphere(1000, 0.5)], ids=["random", "jump", "noisy"]
