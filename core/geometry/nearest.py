@@ -21,7 +21,7 @@ ROUNDS = 9  # of averaging over neighbours, after which values vary with the pla
 POWER = 8  # of a mean that its greatest values decide
 ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
-GAP = 2.5  # spacings that a gap may be wide, as in rows 25 times denser along than across: it is a hole otherwise
+GAP = 2.5  # times the usual that a gap may be wide, as in rows 25 times denser along than across: else it is a hole
 _MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
 
 
