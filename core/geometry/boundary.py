@@ -21,7 +21,6 @@ _ANGLE = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 _AROUND = 5.0  # radii of the empty place that candidates must go around it, of 2 pi: chance leaves some of them out
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
-_MOST = 34  # candidates that the boundary's course is fitted to, at most
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
@@ -262,10 +261,10 @@ class _Course:
 
 def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     points = nearest.points
-    distance, other = cKDTree(points[rows]).query(points[rows], k=min(_MOST + 1, len(rows)), workers=-1)
+    distance, other = cKDTree(points[rows]).query(points[rows], k=min(COUNT, len(rows)), workers=-1)
     # A boundary that is given may be sparse, so that its courses are found without a reach.
     label = _label_courses(points[rows], np.full(len(rows), np.inf))
-    fitted = np.clip(np.bincount(label)[label] // _PART, FEW, _MOST)[:, None]
+    fitted = np.clip(np.bincount(label)[label] // _PART, FEW, COUNT - 1)[:, None]
     across = outward_directions(nearest, normals, rows)
     near = other[:, : NEXT + 1]
     side = np.where(np.einsum("ikc,ic->ik", normals[rows[near]], normals[rows]) > 0.0, 1.0, 0.0)
