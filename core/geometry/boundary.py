@@ -11,7 +11,7 @@ from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
-from .nearest import AGREEING, COUNT, FEW, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
+from .nearest import AGREEING, COUNT, FEW, GAP, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
 from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
@@ -25,7 +25,6 @@ _PART = 3  # of a short boundary no more than a third: a longer part of a square
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
 _EXACT = 0.1  # of the spacing: candidates that scatter less about the boundary's course lie on it
-_FURTHER = 2.0  # spacings more than the measured distance, within which a point of the boundary lies
 
 
 @dataclass(frozen=True)
@@ -181,7 +180,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
         seen, near = view[block], span[block]
         spacing = nearest.spacing[block, None]
         # Near candidates are best, and those away from corners of the boundary.
-        doubt = (near + _FURTHER * spacing) * course.scatter[seen]
+        doubt = (near + GAP * spacing) * course.scatter[seen]
         distance, curvature = course.measure(nearest.points, normals, block, seen)
         every = np.arange(len(block))
         eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
@@ -195,7 +194,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
             total[~known] = 1.0
             measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
             # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
-            known &= np.where(same, near, np.inf).min(axis=1) <= measured + _FURTHER * spacing[:, 0]
+            known &= np.where(same, near, np.inf).min(axis=1) <= measured + GAP * spacing[:, 0]
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
