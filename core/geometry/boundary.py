@@ -12,6 +12,7 @@ from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
 from .distances import arc_squared
 from .nearest import AGREEING, COUNT, FEW, GAP, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
+from .noise import LEFT
 from .points import FEWEST
 from .quadrics import frames
 from .sheets import on_sheet
@@ -24,7 +25,6 @@ _REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
-_EXACT = 0.1  # of the spacing: candidates that scatter less about the boundary's course lie on it
 
 
 @dataclass(frozen=True)
@@ -282,11 +282,11 @@ def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     for half in (t < ON * spacing[:, None], t > -ON * spacing[:, None]):
         enough = np.count_nonzero(half & (weight > 0.0), axis=1) >= FEWEST
         other_fit, other_scatter = _parabola(t, e, np.where(half | ~enough[:, None], weight, 0.0))
-        better = enough & (scatter > _KINK * other_scatter + _EXACT * spacing)
+        better = enough & (scatter > _KINK * other_scatter + LEFT * spacing)
         fit[better], scatter[better] = other_fit[better], other_scatter[better]
     close = np.where(np.arange(other.shape[1]) < fitted // 2, scatter[other] * unit[other, 0], np.nan)
     usual = np.nanmedian(close, axis=1) / unit[:, 0]
-    relative = np.maximum((scatter + _EXACT * spacing) / (usual + _EXACT * spacing), 1.0)
+    relative = np.maximum((scatter + LEFT * spacing) / (usual + LEFT * spacing), 1.0)
     fit[:, 0] += _LEVEL * usual
     fit *= np.concatenate([unit, np.ones_like(unit), 1.0 / unit], axis=1)
     outward = across - fit[:, 1:2] * along

@@ -10,7 +10,7 @@ from .quadrics import fit_quadrics
 
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
 _LEAST = 0.02  # noise below this share of the spacing is left alone
-LEFT = 0.08  # of the spacing: noise that a fit may leave, which shrinks with the root of its neighbours
+LEFT = 0.08  # of the spacing: scatter about a fit that counts as none; it shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 MOST = 6  # rounds of smoothing
 FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three, all of leaves in a volume
