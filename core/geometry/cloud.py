@@ -18,7 +18,7 @@ from .components import label_components, move_apart
 from .distances import measure_squared_slope
 from .doubt import likely_causes
 from .nearest import Nearest, find_nearest
-from .noise import FALLING, FILLING, LEFT, MOST, mean_misfits, near_misfit, noise_level, project_points
+from .noise import FALLING, FILLING, LEFT, mean_misfits, near_misfit, noise_level, project_points
 from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
@@ -347,7 +347,7 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
     before = _roughly(surface, noise, filling)
-    for _ in range(MOST):
+    while noisy.any():
         surface, changed = _project(surface, np.where(filling, first, noise), noisy)
         rows = np.flatnonzero(changed)
         near[rows] = near_misfit(surface.sample.nearest, rows)
@@ -355,8 +355,6 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
         left = _roughly(surface, noise, filling)
         # What does not fall so fast is no noise, such as leaves.
         noisy &= (left > LEFT) & (left < FALLING * before)
-        if not noisy.any():
-            break
         before = left
     return replace(surface, sample=replace(surface.sample, noise=first))
 

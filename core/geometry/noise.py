@@ -12,7 +12,6 @@ _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly a
 _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: scatter about a fit that counts as none; it shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
-MOST = 6  # rounds of smoothing
 FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three, all of leaves in a volume
 _LARGEST = 90  # neighbours of the fit that points are projected on, at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
