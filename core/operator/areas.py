@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from ..geometry import Boundary, Cloud, Pairs, Patch
 
 _DEGREE = 100  # of the polynomial of the first round; half of it of the second, for what the floor changed in the first
-_WIDTH = 2.0  # over the degree: least eigenvalue that a polynomial of that degree on [-1, 1] separates from zero
 _EVEN = 1e-9  # changes of h, as a share, that are rounding
 _MANY = 1 << 20  # pairs from which a product takes longer than to start threads
 NO_AREA = 1e-300  # of points left out: positive, and negligible in any sum
@@ -218,6 +217,6 @@ def _polynomial(matrix: KernelMatrix, root: Floats, residual: Floats, held: Bool
 @functools.cache
 def _inverse(degree: int) -> Floats:
     """Return a Chebyshev series over [-1, 1]: 1 / x for x well above the width, about zero from there down."""
-    width = _WIDTH / degree
+    width = np.pi / degree  # what a polynomial of that degree separates from zero: the distance between its zeros there
     series: Floats = chebyshev.chebinterpolate(lambda x: expit(2.0 * x / width) * x / (x * x + width * width), degree)
     return series
