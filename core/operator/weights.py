@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..geometry import Cloud, Patch
 
 _ROUNDS = 16  # of the solver, at most
-_ENOUGH = 3e-4  # root mean square of that over h, which a first moment makes of a slope, at which it stops
 _SMALLEST = 1e-8  # regularization of the extrapolation, see `Anderson`
 
 
@@ -83,7 +82,7 @@ def balance_weights(
     for step in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)
-        if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < _ENOUGH:
+        if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < MET:  # what a first moment makes of a slope
             break
         if step <= _ROUNDS // 2 and (step + 2).bit_count() == 1:  # the Hessian, each time for twice as many rounds
             inverse = inverses(moments.curvature(terms) + MET * np.eye(TERMS))
