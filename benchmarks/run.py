@@ -52,8 +52,8 @@ PAGES = """\
 The defaults are made for [real shapes](real_shapes.md): eleven, in eleven samplings, compared with the best packaged
 peer. Further pages: [awkward samplings and raw clouds](awkward.md), with the problems that are reported; [the
 ablation](ablation.md) of each correction and each constant; [time and memory](scaling.md) of all stages up to a million
-points; [the alignment](alignment.md) of two clouds. With kernels of 22 to 54 points a row, which suit real shapes,
-errors on spheres are larger than with the 41 to 117 of version 0.2, which `bandwidth_factor=1.7` gives.
+points; [the alignment](alignment.md) of two clouds. The default kernels, of 22 points a row on even points and 54 on
+random ones, suit real shapes; `bandwidth_factor=1.7` gives 41 and 117, with smaller errors on spheres.
 """
 ABOUT = "Goals of the figures and tables below. Peer over ours: the error of the peer divided by that of this project."
 
