@@ -48,7 +48,7 @@ MODULES = (
 )
 UNTUNED = {  # why a number is no constant: its names, with the module where others have the same one
     "how much is done at one time": ("_BLOCK", "_SOURCES", "_NEARBY", "areas._MANY", "nearest._MEASURED"),
-    "how many neighbors are searched among": ("cells._MANY", "moments._MOST", "rows._WIDER", "boundary._REACH"),
+    "how many neighbors are searched among": ("moments._MORE", "rows._WIDER", "boundary._REACH"),
     "what is lost in rounding": ("_SAME", "_EVEN", "_SMALLEST", "_RIDGE", "_AT_BOUNDARY", "cells._CLOSEST", "NO_AREA"),
     "rounds after which an iteration has long ended": ("moments._STEPS",),
     "how many terms there are": ("TERMS",),

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from .boundary import Boundary
 
 _BLOCK = 1 << 12
-_MANY = 21, COUNT, 4 * COUNT, 16 * COUNT  # of the nearest points, the first itself: more are looked at while a cell is
-# open, as a jump of density has them on one side
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
 _OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
@@ -87,7 +85,8 @@ def measure_cells(
         rows = np.flatnonzero(boundary.distance[:, 0] < np.maximum(nearest.distance[:, -1], before.radius))
     whole = ~np.any(nearest.apart, axis=1)  # no neighbour was left out: more of them can close a cell
     spacing = nearest.spacing
-    for many in _MANY:
+    # Few points close most cells; more are looked at while one is open, as a jump of density has them on one side.
+    for many in (COUNT // 2 + 1, COUNT, 4 * COUNT, 16 * COUNT):
         still_open = np.zeros(count, dtype=bool)
 
         def measure(part: slice, rows: Ints = rows, many: int = many, still_open: Bools = still_open) -> None:

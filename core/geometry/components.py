@@ -30,11 +30,11 @@ def label_components(nearest: Nearest) -> Ints:
     reach = GAP * distance[:, :NEXT][:, -1]  # of eight points there are seven neighbors
     reach = np.where(nearest.in_row, even_reach(nearest), reach)
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
-    close = number_by_size(label_connected(index, strict))
+    close = number_by_size(label_connected(index, strict), COUNT)
     large = close >= 0
     loose = large[:, None] & large[index] & (distance <= np.maximum(reach[:, None], reach[index]))
     result = np.full(len(close), -1)
-    result[large] = number_by_size(label_connected(index, strict | loose)[large])
+    result[large] = number_by_size(label_connected(index, strict | loose)[large], COUNT)
     return result
 
 
@@ -50,7 +50,7 @@ def label_connected(index: Ints, joined: Bools) -> Ints:
     return label
 
 
-def number_by_size(label: Ints, smallest: int = COUNT) -> Ints:
+def number_by_size(label: Ints, smallest: int) -> Ints:
     """Number labels by how many points have them, the most frequent 0; rarer ones than the smallest size are -1."""
     _, label, size = np.unique(label, return_inverse=True, return_counts=True)
     order = np.argsort(-size, kind="stable")

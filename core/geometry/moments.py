@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .boundary import Boundary
 
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
-_MOST = (COUNT, 64, 160)  # neighbours looked at, more where the kernel holds more; beyond, any sampling is dense enough
+_MORE = 64, 160  # neighbours looked at where the kernel holds more than 40; beyond, any sampling is dense enough
 LARGEST = 2.0  # change of the logarithm of a weight: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
 MET = 2e-3  # relative error of the moments that is small enough, for a kernel, and for a ridge under the terms
@@ -88,7 +88,7 @@ def least_error(
     def measure(part: slice) -> None:
         block, found = rows[part], result[part]
         open_ = np.arange(len(block))
-        for most in _MOST:
+        for most in (COUNT, *_MORE):
             asked = block[open_]
             if most == COUNT:
                 distance, index = nearest.distance[asked], nearest.index[asked]

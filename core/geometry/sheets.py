@@ -194,7 +194,7 @@ def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
     ndarray, (m,) int
         The largest component is 0; points off the surface are -1.
     """
-    sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)))
+    sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)), COUNT)
     # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
     touching = nearest.distance <= _AROUND * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
